@@ -14,7 +14,8 @@ Rate = Annotated[Scalar, require_quantity("mm h-1", above=0)]
 
 
 class PhysicalLimits(CatalogueEntry):
-    """The largest value of each quantity; ``position`` is along the route, ``brake_time`` any time of a brake."""
+    """The largest value of each quantity, and the smallest length of a hazard; ``position`` is along the route,
+    ``brake_time`` any time of a brake."""
 
     rain_rate: Rate
     snow_rate: Rate
@@ -25,6 +26,7 @@ class PhysicalLimits(CatalogueEntry):
     brake_time: Seconds
     position: Metres
     hazard_length: Metres
+    shortest_hazard: Metres
     hazard_height: Metres
     duration: Seconds
     frame_rate: Annotated[Scalar, require_quantity("Hz", above=0)]

@@ -85,6 +85,12 @@ def scenario_problems(scenario: Scenario, unknown: Collection[str] = ()) -> list
         )
     if abs(s.hazard_height_m) > 0 and s.hazard_length_m == 0:
         problems.append(f"a hazard of height {s.hazard_height_m:g} m needs hazard_length_m above 0; it is 0")
+    shortest = load_physical_limits().shortest_hazard
+    if abs(s.hazard_height_m) > 0 and 0 < s.hazard_length_m < shortest.value:
+        problems.append(
+            f"hazard_length_m must be at least {shortest.value:g} {shortest.unit} ({shortest.source});"
+            f" it is {s.hazard_length_m:g}"
+        )
     return problems
 
 

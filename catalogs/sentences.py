@@ -34,6 +34,16 @@ def shorten(text: object, most: int = 200) -> str:
     return f"{line[: most - len(tail) - 3]}...{tail}"
 
 
+def name_some(labels: list[str]) -> str:
+    """The first of some labels, and how many more there are.
+
+    Parameters
+    ----------
+    labels : one or more
+    """
+    return shorten(labels[0]) if len(labels) == 1 else f"{shorten(labels[0])} and {len(labels) - 1} more"
+
+
 def shorten_value(value: object, most: int = 60) -> str:
     """A value as code shows it, cut to a few words.
 

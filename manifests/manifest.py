@@ -89,14 +89,22 @@ def head_of_sealed(content: bytes) -> bytes | None:
     ----------
     content : the file's bytes
     """
-    seal = _SEAL.fullmatch(content, len(content) - _SEAL_LENGTH) if len(content) > _SEAL_LENGTH else None
     before = _BEFORE_CLIPS.search(content)
     after = content.rfind(_AFTER_CLIPS)
-    if seal is None or before is None or after < before.end():
-        return None
-    if sha256_of([memoryview(content)[: seal.start()], b"}"]) != seal[1].decode():
+    if before is None or after < before.end() or not is_sealed(content):
         return None
     return content[: before.start()] + content[after + len("}]") :]
+
+
+def is_sealed(content: bytes) -> bool:
+    """Whether a manifest's bytes are those that its seal was made of.
+
+    Parameters
+    ----------
+    content : the file's bytes
+    """
+    seal = _SEAL.fullmatch(content, len(content) - _SEAL_LENGTH) if len(content) > _SEAL_LENGTH else None
+    return seal is not None and sha256_of([memoryview(content)[: seal.start()], b"}"]) == seal[1].decode()
 
 
 def manifest_damage(content: bytes) -> str | None:

@@ -1,6 +1,6 @@
 """Scenario grids: a YAML file of blocks whose product is a list of scenarios."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from catalogs.grids.faults import read_form
 from catalogs.grids.form import GridFile
 from catalogs.grids.selection import CALIBRATION, facts_of, split_of
 from catalogs.scenario import UNKNOWN_WEATHER, Scenario, range_problems, scenario_problems
-from catalogs.sentences import cap_problems, shorten
+from catalogs.sentences import cap_problems, name_some, shorten
 from tasks.errors import InputError
 
 __all__ = ["FaultyGrid", "Grid", "GridFile", "expand_grid", "load_grid"]
@@ -87,6 +87,8 @@ def expand_grid(settings: GridFile, place: str) -> Grid:
     problems: dict[str, list[str]] = {problem: ["base"] for problem in range_problems(Scenario(**base))}
     scenarios, tags, left_out = [], [], 0
     labels: set[str] = set()
+    used: set[int] = set()
+    is_known = True
     for combination in list_combinations(settings):
         label = "/".join(level for level, _ in combination)
         merged: dict[str, Any] = dict(base)
@@ -94,8 +96,11 @@ def expand_grid(settings: GridFile, place: str) -> Grid:
             merged |= partial
         scenario = Scenario(**merged)
         unknown = [name for name, value in merged.items() if value != value or value == UNKNOWN_WEATHER]
+        is_known = is_known and not unknown
         facts = facts_of(scenario)
-        if any(condition.holds(facts) for condition in settings.exclude):
+        met = {place for place, condition in enumerate(settings.exclude) if condition.holds(facts)}
+        used |= met
+        if met:
             left_out += 1
             continue
         split = split_of(facts, settings.splits)
@@ -115,11 +120,34 @@ def expand_grid(settings: GridFile, place: str) -> Grid:
     if not scenarios:
         problems["exclude leaves nothing to make"] = ["all"]
     grid = Grid(settings=settings, scenarios=tuple(scenarios), tags=tuple(tags), left_out=left_out)
-    if problems:
-        told = [f"{shorten(place)}: scenario {_name_some(named)}: {rule}" for rule, named in problems.items()]
+    told = [f"{shorten(place)}: scenario {name_some(named)}: {rule}" for rule, named in problems.items()]
+    idle = list(_impossible_conditions(settings))
+    if is_known and not problems and not idle:
+        idle = list(_idle_conditions(settings, used, tags))
+    told += [f"{shorten(place)}: {problem}" for problem in idle]
+    if told:
         raise FaultyGrid(cap_problems(told), grid)
     return grid
 
 
-def _name_some(labels: list[str]) -> str:
-    return shorten(labels[0]) if len(labels) == 1 else f"{shorten(labels[0])} and {len(labels) - 1} more"
+def _impossible_conditions(settings: GridFile) -> Iterator[str]:
+    named = {f"exclude.{number}": condition for number, condition in enumerate(settings.exclude)}
+    for name, condition in (
+        named | {f"splits.{split}": one for split, one in settings.splits.items()}
+    ).items():
+        for problem in condition.list_impossible():
+            yield f"{name}.{problem}"
+
+
+def _idle_conditions(
+    settings: GridFile, used: Collection[int], tags: Sequence[tuple[str, str]]
+) -> Iterator[str]:
+    """Yield a sentence for each split without a clip, and each condition of ``exclude`` that nothing meets: a mistyped
+    number. Where values are drawn, the draw may leave a condition without a clip."""
+    filled = {split for split, _ in tags}
+    for split in settings.splits:
+        if split not in filled:
+            yield f"splits.{split}: gets no clip; correct its condition or those before it, or remove it"
+    for number in range(len(settings.exclude)):
+        if number not in used and settings.latin_hypercube is None:
+            yield f"exclude.{number}: leaves nothing out; correct its condition or remove it"

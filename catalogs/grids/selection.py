@@ -1,13 +1,16 @@
 """Conditions on scenarios: which combinations a grid leaves out, and to which split a clip belongs."""
 
 from collections.abc import Mapping
+from math import isfinite
 from typing import Annotated, Any
 
 from pydantic import Field, RootModel, model_validator
 
 from catalogs.calibrated_range import CALIBRATION_TAGS, calibration_tag, load_calibrated_range
 from catalogs.grids.blocks import Number, Strict
-from catalogs.scenario import SCENARIO_FIELDS, Scenario
+from catalogs.scenario import NUMBERS, SCENARIO_FIELDS, Scenario
+from catalogs.sentences import shorten_value
+from tasks.surface.weather import weather_problem
 
 CALIBRATION = "calibration"
 Value = bool | str | float
@@ -57,6 +60,15 @@ class Condition(RootModel[dict[str, Value | Annotated[list[Value], Field(min_len
         """Whether the facts of a scenario keep every line."""
         return all(_meets(facts[name], wanted) for name, wanted in self.root.items())
 
+    def list_impossible(self) -> list[str]:
+        """A sentence for each value that its field never has: the condition would hold for no scenario."""
+        return [
+            f"{name}: {problem}"
+            for name, wanted in self.root.items()
+            for value in (wanted if isinstance(wanted, list) else [wanted])
+            if (problem := _value_problem(name, value)) is not None
+        ]
+
 
 def facts_of(scenario: Scenario) -> dict[str, Any]:
     """Return the facts that conditions test: the scenario's fields and its place in the calibrated range."""
@@ -66,6 +78,22 @@ def facts_of(scenario: Scenario) -> dict[str, Any]:
 def split_of(facts: Mapping[str, Any], splits: Mapping[str, Condition]) -> str | None:
     """The first split whose condition holds; None if none does."""
     return next((name for name, condition in splits.items() if condition.holds(facts)), None)
+
+
+def _value_problem(name: str, wanted: Any) -> str | None:
+    if isinstance(wanted, Between):
+        if name not in NUMBERS:
+            return "an interval is of numbers, which this is not"
+        falls = wanted.min is not None and wanted.max is not None and wanted.min > wanted.max
+        return f"an interval must ascend; it is {wanted.min:g} to {wanted.max:g}" if falls else None
+    if name in NUMBERS:
+        right = isinstance(wanted, float) and isfinite(wanted)
+        return None if right else f"must be a number or an interval; it is {shorten_value(wanted)}"
+    if name == "weather":
+        return weather_problem(wanted)
+    if name == "hold_speed" and not isinstance(wanted, bool):
+        return f"must be true or false; it is {shorten_value(wanted)}"
+    return None
 
 
 def _meets(value: Any, wanted: Any) -> bool:

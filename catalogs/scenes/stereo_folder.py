@@ -1,5 +1,6 @@
 """A folder with a posed stereo sequence: calib.txt, poses.txt, image_l/*.png and image_r/*.png."""
 
+import re
 import struct
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catalogs.documents import read_content
-from catalogs.sentences import cap_problems, shorten
+from catalogs.sentences import cap_problems, name_some, shorten
 from tasks.errors import InputError
 from tasks.reconstruction.sequence import StereoSequence
 
@@ -27,8 +28,9 @@ def read_stereo_folder(folder: Path) -> StereoSequence:
     """Read a rectified stereo sequence in the layout of the KITTI odometry data.
 
     ``calib.txt`` holds two rows of twelve numbers, the 3x4 projection matrices of the left and right
-    camera [px]; ``poses.txt`` one row of twelve per picture, the 3x4 pose of the left camera in the frame
-    of the sequence [m]; ``image_l`` and ``image_r`` hold the pictures, which pair up in order of name.
+    camera [px], whose origin may be another camera, as of KITTI's colour pair; ``poses.txt`` one row of twelve per
+    picture, the 3x4 pose of the left camera in the frame of the sequence [m]; ``image_l`` and ``image_r`` hold the
+    pictures, which pair up in order of name, the last number of a name being equal on both sides.
 
     Parameters
     ----------
@@ -61,6 +63,11 @@ def read_stereo_folder(folder: Path) -> StereoSequence:
         problems.append(
             f"{folder}: image_l and image_r must pair up; they hold {len(left)} and {len(right)} pictures"
         )
+    elif apart := [f"{a} and {b}" for a, b in zip(left, right, strict=True) if _number(a) != _number(b)]:
+        problems.append(
+            f"{folder}: pictures of image_l and image_r must pair up by the last number of their names;"
+            f" {name_some(apart)} do not: put in what is missing, or rename them"
+        )
     if left and poses is not None and len(left) != len(poses):
         problems.append(
             f"{folder}: poses.txt must have a row per picture of image_l; it has {len(poses)} for {len(left)}"
@@ -85,7 +92,7 @@ def read_stereo_folder(folder: Path) -> StereoSequence:
         left=np.stack(list(left.values())),
         right=np.stack(list(right.values())),
         intrinsics=calibration[0, :, :3].copy(),
-        baseline=float(-calibration[1, 0, 3] / calibration[1, 0, 0]),
+        baseline=float((calibration[0, 0, 3] - calibration[1, 0, 3]) / calibration[1, 0, 0]),
         T_origin_camera=T,
     )
 
@@ -118,8 +125,11 @@ def _read_matrices(path: Path, problems: list[str]) -> NDArray[np.float64] | Non
 
 
 def _calibration_problems(path: Path, P: NDArray[np.float64]) -> list[str]:
-    if len(P) < 2:
-        return [f"{path}: must hold the projection matrices of both cameras; it has {len(P)} row"]
+    if len(P) != 2:
+        return [
+            f"{path}: must hold two rows, the projection matrices of the cameras of image_l and image_r; it has"
+            f" {len(P)} row{'s' if len(P) > 2 else ''}"
+        ]
     problems = []
     for row in (0, 1):
         if not (P[row, 0, 0] > 0 and P[row, 1, 1] > 0):
@@ -159,6 +169,10 @@ def _read_pictures(folder: Path, problems: list[str]) -> dict[str, NDArray[np.ui
         if picture is not None:
             pictures[path.name] = picture
     return pictures
+
+
+def _number(name: str) -> list[str]:
+    return re.findall(r"\d+", name)[-1:]
 
 
 def _read_picture(path: Path, problems: list[str]) -> NDArray[np.uint8] | None:

@@ -79,7 +79,7 @@ def audit_dataset(
     not_remade: list[str] = []
     workers = workers or other_count()
     with open_for_writing(dataset, want_everything) as layout:
-        manifest = read_manifest(layout)
+        manifest = read_manifest(layout, sealed=False)
         signature = signature_findings(layout, key)
         compared = run_as_stage(compare_files)(layout)
         facts = collect_facts(layout, manifest)

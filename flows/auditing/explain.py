@@ -16,6 +16,7 @@ from catalogs.surfaces import load_surface
 from catalogs.variants import warn_of_variant
 from catalogs.vehicles import load_vehicle
 from flows.making.driving import collect_surface_depths, controls_of, hazard_of, surface_of, weather_of
+from flows.making.input_changes import refuse_changed_records
 from flows.making.places import find_scene
 from flows.making.plan import ClipPlan, Plan, read_plan
 from flows.making.traced import refuse_traced
@@ -57,6 +58,7 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
     results = Outputs(out, "explain", "explain.json", "explain.txt")
     layout = open_for_reading(dataset, want_telemetry)
     manifest, plan = read_manifest(layout), read_plan(layout.root)
+    refuse_changed_records(layout, manifest)
     refuse_traced(plan.inputs, dataset, "explain")
     problems: list[str] = []
     planned = None

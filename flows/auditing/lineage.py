@@ -19,20 +19,17 @@ from flows.auditing.driven_lines import (
 from flows.auditing.explain import find_clip, find_route
 from flows.auditing.kept_lines import Line, describe_file, list_lines
 from flows.auditing.lineage_text import format_text
+from flows.making.input_changes import read_kept
 from flows.making.plan import Plan
 from flows.making.traced import refuse_traced
 from flows.reading.answer_files import format_csv
 from flows.running.orchestration import run_as_stage
 from flows.store.address import open_for_reading
-from flows.store.layout import Layout
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
 from flows.store.telemetry import columns_hash
-from manifests.canonical import sha256_of
 from manifests.explain import JUDGING, REACHES, RENDER, kind_of_input, parse_input
-from manifests.records import Manifest
 from tasks.conventions import CHANNELS_BY_NAME, TICK_CHANNELS
-from tasks.errors import InputError
 from tasks.explanation import Step
 from tasks.surface.weather import WEATHERS
 
@@ -82,7 +79,7 @@ def trace_lineage(dataset: str, clip: str, *, out: str | None = None) -> dict[st
     plan = Plan.of(manifest, layout.manifest)
     refuse_traced(plan.inputs, dataset, "lineage")
     planned = find_clip(plan, clip, dataset)
-    kept = _read_kept(layout, manifest)
+    kept = read_kept(layout, manifest["inputs"])
     asked = Asked(
         scenario=planned.scenario, mode=plan.settings.vehicle_mode, variant=plan.settings.variant,
         duration_s=plan.duration_s, route=find_route(plan.scene),
@@ -125,27 +122,6 @@ def trace_lineage(dataset: str, clip: str, *, out: str | None = None) -> dict[st
     results.write("lineage.csv", _write_table(resting))
     results.write("lineage.txt", format_text(result))
     return result
-
-
-def _read_kept(layout: Layout, manifest: Manifest) -> dict[str, bytes]:
-    """The catalogue files that a dataset keeps, by name.
-
-    Raises
-    ------
-    InputError
-        Listing every file that is missing or changed.
-    """
-    files = {name: layout.inputs / name for name in manifest["inputs"]}
-    kept = {name: file.read_bytes() for name, file in files.items() if file.is_file()}
-    problems = [
-        f"{layout}/inputs/{name}: must be as recorded; it is {'changed' if name in kept else 'missing'}: musync repair"
-        " makes it again"
-        for name, digest in manifest["inputs"].items()
-        if name not in kept or sha256_of([kept[name]]) != digest
-    ]
-    if problems:
-        raise InputError(problems)
-    return kept
 
 
 def _driven_row(one: Moved, pictures: bool) -> dict[str, Any]:

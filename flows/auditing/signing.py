@@ -53,7 +53,7 @@ def sign_dataset(dataset: str, *, key: str) -> dict[str, Any]:
     """
     signer = load_signer(read_content(Path(key), "private key", LARGEST_KEY), key)
     with open_for_writing(dataset, _signed_record) as layout:
-        read_manifest(layout)
+        read_manifest(layout, sealed=False)
         with sole_writer(layout):
             try:
                 return _sign_manifest(layout, signer)

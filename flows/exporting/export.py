@@ -12,6 +12,7 @@ from typing import Any
 from flows.exporting.card import CARD, describe_export
 from flows.exporting.dataset import ExportedDataset
 from flows.exporting.formats import FORMAT_NAMES, FORMATS, ExportFormat
+from flows.making.input_changes import refuse_changed_records
 from flows.reading.previews import select_clips
 from flows.reading.suggestions import suggest_names
 from flows.running.progress import progress_bar
@@ -59,6 +60,7 @@ def export_dataset(
     ]
     if problems:
         raise InputError(problems)
+    refuse_changed_records(layout, manifest)
     with write_folder(folder) as partial, progress_bar("clips", len(kept)) as advance:
         exported = ExportedDataset(layout=layout, manifest=manifest, rows=kept, finish=advance)
         writer(exported, partial)

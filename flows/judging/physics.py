@@ -12,13 +12,14 @@ from catalogs.surfaces import load_surface
 from catalogs.variants import warn_of_variant
 from catalogs.vehicles import load_vehicle
 from flows.making.driving import collect_surface_depths, surface_of
+from flows.making.input_changes import refuse_changed_records
 from flows.making.plan import TICK_RATE_HZ, Plan
 from flows.making.traced import refuse_traced
 from flows.running.orchestration import run_as_stage
 from flows.store.address import open_for_reading, want_telemetry
 from flows.store.layout import Layout
 from flows.store.outputs import Outputs
-from flows.store.sealed import read_plan_record, recorded_grid
+from flows.store.sealed import read_manifest, read_plan_record, recorded_grid
 from flows.store.telemetry import read_columns, read_table
 from tasks.conventions import (
     CLIP_CHANNELS,
@@ -88,12 +89,20 @@ def clip_facts(root: Path) -> list[dict[str, Any]]:
     Raises
     ------
     InputError
-        If the table is missing.
+        If the dataset is not finished, or the table, the plan or an input is missing or another than was recorded.
     """
-    path = Layout(root).telemetry / "clips.parquet"
+    layout = Layout(root)
+    manifest = read_manifest(layout)
+    refuse_changed_records(layout, manifest)
+    path = layout.telemetry / "clips.parquet"
     known = [channel.name for channel in (*IDENTITY_CHANNELS, *CLIP_CHANNELS)]
     required = [name for name in known if name not in LATER_CLIP_CHANNELS]
     rows: list[dict[str, Any]] = read_table(path, required=required).to_pylist()
+    if [row["clip_id"] for row in rows] != [clip["clip_id"] for clip in manifest["clips"]]:
+        raise InputError(
+            f"{path}: must have a row of each of the manifest's {len(manifest['clips'])} clips, in order; its"
+            f" {len(rows)} rows are others: musync repair makes the table again"
+        )
     return rows
 
 

@@ -9,8 +9,9 @@ from functools import partial
 
 from catalogs.grids import Grid
 from catalogs.scenes import load_scene
+from catalogs.sentences import name_some
 from flows.making.clip import make_clip, warm_up
-from flows.making.input_changes import frozen_inputs
+from flows.making.input_changes import frozen_inputs, restore_inputs
 from flows.making.places import find_scene
 from flows.making.plan import Plan, hold_plan, make_plan, plan_differences, read_plan
 from flows.making.seal import seal_dataset
@@ -168,6 +169,7 @@ def prepare_dataset(layout: Layout, plan: Plan, inputs: Mapping[str, bytes]) -> 
     remove_left_overs(layout)
     if layout.plan.is_file():
         _refuse_other_plan(layout, plan, inputs)
+        restore_inputs(layout, inputs)
         return
     # what lies there without a plan is what a run began that was stopped
     forget_begun(layout)
@@ -276,11 +278,12 @@ def fan_out(layout: Layout, plan: Plan, indices: list[int], executor: Executor) 
             else:
                 failures[label] = error
                 advance(f"{label} failed")
-    wrong = [
-        problem for error in failures.values() if isinstance(error, InputError) for problem in error.problems
-    ]
+    wrong: dict[str, list[str]] = {}
+    for label, error in failures.items():
+        for problem in error.problems if isinstance(error, InputError) else []:
+            wrong.setdefault(problem, []).append(label)
     if wrong and all(isinstance(error, InputError) for error in failures.values()):
-        raise InputError(list(dict.fromkeys(wrong)))
+        raise InputError([f"clip {name_some(labels)}: {problem}" for problem, labels in wrong.items()])
     if failures:
         first = next(iter(failures.values()))
         names = ", ".join(sorted(failures))

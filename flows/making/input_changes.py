@@ -5,9 +5,11 @@ from pathlib import Path
 from typing import Any
 
 from catalogs.scenes import scene_identity
+from catalogs.sentences import cap_problems
 from flows.making.grid_inputs import READERS, input_sources
 from flows.making.places import find_scene, noted_place
-from flows.store.layout import Layout
+from flows.store.address import send_files
+from flows.store.layout import Layout, write_atomically
 from flows.store.sealed import read_plan_record, recorded_grid
 from manifests.canonical import sha256_of, sha256_of_file
 from manifests.explain import find_input_differences, find_parameter_differences, tools_here
@@ -76,7 +78,67 @@ def recorded_input(
     return None
 
 
+def read_kept(layout: Layout, recorded: Mapping[str, str]) -> dict[str, bytes]:
+    """The catalogue files that a dataset keeps, by name, which are the recorded ones.
+
+    Parameters
+    ----------
+    layout : of the dataset
+    recorded : name to SHA-256, of its manifest or plan
+
+    Raises
+    ------
+    InputError
+        Listing every file that is missing or changed.
+    """
+    kept = frozen_inputs(layout, recorded)
+    problems = [
+        f"{layout}/inputs/{name}: must be as recorded; it is {'changed' if name in kept else 'missing'}: musync repair"
+        " makes it again"
+        for name, digest in recorded.items()
+        if name not in kept or sha256_of([kept[name]]) != digest
+    ]
+    if problems:
+        raise InputError(cap_problems(problems))
+    return kept
+
+
+def refuse_changed_records(layout: Layout, manifest: Manifest) -> None:
+    """Raise `InputError` where a finished dataset's plan or a catalogue file that it keeps is not the recorded one."""
+    read_kept(layout, manifest["inputs"])
+    if not layout.plan.is_file() or sha256_of_file(layout.plan) != manifest["artifacts"].get("plan.json"):
+        raise InputError(f"{layout.plan}: must be as recorded; it is not: musync repair makes it again")
+
+
 def frozen_inputs(layout: Layout, names: Iterable[str]) -> dict[str, bytes]:
     """Return the catalogue files that a dataset keeps, by name, without the missing ones."""
     files = {name: layout.inputs / name for name in names}
     return {name: file.read_bytes() for name, file in files.items() if file.is_file()}
+
+
+def restore_inputs(layout: Layout, inputs: Mapping[str, bytes]) -> None:
+    """Write the catalogue files that an unfinished dataset lacks.
+
+    Parameters
+    ----------
+    layout : of the dataset, held for writing
+    inputs : that its plan stands on, by name
+
+    Raises
+    ------
+    InputError
+        Listing those that are other files now: clips were made with them as they were.
+    """
+    kept = frozen_inputs(layout, inputs)
+    if changed := [name for name in kept if kept[name] != inputs[name]]:
+        raise InputError(
+            [
+                f"{layout}/inputs/{name}: must be the file that the run was planned with; it is changed: remove it, and"
+                " the same command writes it again"
+                for name in changed
+            ]
+        )
+    lost = sorted(inputs.keys() - kept.keys())
+    for name in lost:
+        write_atomically(layout.inputs / name, inputs[name])
+    send_files(layout, [layout.inputs / name for name in lost])

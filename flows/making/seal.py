@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from catalogs.variants import Variant
 from flows.making.gathering import gather_tables
+from flows.making.input_changes import read_kept
 from flows.making.plan import ClipPlan, Plan
 from flows.store.address import fetch_files, remove_files, send_files
 from flows.store.frames import read_clip
@@ -72,6 +73,7 @@ def seal_dataset(layout: Layout, plan: Plan, executor: Executor | None = None) -
         *sorted(layout.frames.rglob("zarr.json")),
     ]
     artifacts = parts | {layout.relative(path): sha256_of_file(path) for path in shared}
+    read_kept(layout, plan.inputs)
     made_on = {"processor": describe_processor(), "git": git_commit(), "environment": environment_bom()}
     quarantined: dict[str, list[str]] = {}
     receipts = _note_quarantined(_read_receipts(layout, plan.clips), quarantined)

@@ -12,7 +12,7 @@ import pyarrow as pa
 from flows.reading.clips import Clip, find_clip
 from flows.reading.connection import connect_sealed, quote_identifier
 from flows.reading.pictures import open_frames_store, open_labelled_frames
-from flows.reading.query import VIEWS, list_columns, refused_query
+from flows.reading.query import VIEWS, list_columns, refuse_several, refused_query
 from flows.reading.suggestions import suggest_names
 from flows.reading.table_files import STORED, explain_unreadable, open_stored_table
 from flows.store.address import open_for_reading, want_telemetry
@@ -117,9 +117,11 @@ class Dataset:
         Raises
         ------
         InputError
-            If it is no query that DuckDB takes, or asks for files and the dataset was not opened with ``allow_files``.
+            If it is no query that DuckDB takes, or asks for files and the dataset was not opened with ``allow_files``,
+            without which it is one statement.
         """
         try:
+            refuse_several(self.connection, query, allow_files=self.allow_files)
             return self.connection.sql(query)
         except duckdb.Error as error:
             raise refused_query(query, error, "musync.open(..., allow_files=True)") from None

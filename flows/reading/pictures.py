@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from catalogs.sentences import shorten
+from catalogs.sentences import cap_problems, shorten
 from flows.store.address import frames_store, open_for_reading
 from flows.store.frame_metadata import check_frames, read_local_metadata
 from flows.store.layout import Layout
@@ -23,7 +23,8 @@ def open_frames_store(layout: Layout, manifest: Mapping[str, Any]) -> Any:
     Raises
     ------
     InputError
-        If the dataset was made without frames, or their metadata are not those that muSync writes.
+        If the dataset was made without frames, a folder lacks some of them, which Zarr would take for black, or their
+        metadata are not those that muSync writes.
     """
     grid = manifest["grid"]
     if not grid.get("pictures", True):
@@ -32,11 +33,23 @@ def open_frames_store(layout: Layout, manifest: Mapping[str, Any]) -> Any:
         open_for_reading(layout.root, lambda name: name.startswith("frames.zarr/"))
         read = read_local_metadata(layout.frames)
         members = [path.name for path in layout.frames.glob("*") if path.is_dir()]
+        _refuse_missing(layout, manifest)
     else:
         objects = Objects(f"{layout.origin}/{layout.frames.name}")
         read, members = objects.read, objects.folders()
     check_frames(read, members, f"{layout}/{layout.frames.name}", len(manifest["clips"]), grid["frames"])
     return frames_store(layout)
+
+
+def _refuse_missing(layout: Layout, manifest: Mapping[str, Any]) -> None:
+    missing = [
+        f"{layout}/{path}: missing, with pictures of clip {clip['label']}: musync repair makes it again"
+        for clip in manifest["clips"]
+        for path in clip["artifacts"]
+        if not (layout.root / path).is_file()
+    ]
+    if missing:
+        raise InputError(cap_problems(missing))
 
 
 def open_labelled_frames(layout: Layout, manifest: Mapping[str, Any]) -> Any:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flows.making.plan import read_plan
+from flows.making.plan import Plan
 from flows.reading.film import write_film
 from flows.running.progress import progress_bar
 from flows.store.address import open_for_reading
@@ -45,7 +45,8 @@ def make_films(
     layout = open_for_reading(dataset)
     if not layout.manifest.is_file():
         raise InputError(f"{dataset}: must be a finished dataset; it has no manifest.json")
-    plan, rows = read_plan(layout.root), read_manifest(layout)["clips"]
+    manifest = read_manifest(layout)
+    plan, rows = Plan.of(manifest, layout.manifest), manifest["clips"]
     if not plan.settings.pictures:
         raise InputError(f"{dataset}: must be a dataset with frames; it was made with --no-frames")
     chosen = select_clips(rows, clips, dataset) if clips else rows

@@ -79,10 +79,7 @@ def query_dataset(
     fetch = _fetch_table if to == "parquet" else _fetch_rows
     with connect_views(dataset, allow_files=allow_files) as connection:
         try:
-            count = len(connection.extract_statements(query))
-            # with files, LOAD and ATTACH come before the question
-            if count == 0 or (count > 1 and not allow_files):
-                raise InputError(f"--- {shorten(query)}: must be one SQL statement; it holds {count}")
+            refuse_several(connection, query, allow_files=allow_files)
             names, rows = run_interruptibly(connection, lambda: fetch(connection, query))
         except duckdb.Error as error:
             raise refused_query(query, error, "--allow-files") from None
@@ -94,6 +91,20 @@ def query_dataset(
     (name,) = file.names
     file.write(name, format_parquet(rows) if to == "parquet" else format_csv(names, rows))
     return {"file": str(file.path(name)), "columns": names, "row_count": len(rows)}
+
+
+def refuse_several(connection: duckdb.DuckDBPyConnection, query: str, *, allow_files: bool) -> None:
+    """Raise `InputError` unless a query is one statement: of several, DuckDB answers the last one alone.
+
+    Parameters
+    ----------
+    connection : that parses it
+    query : as it was asked
+    allow_files : several are taken, as LOAD and ATTACH come before the question
+    """
+    count = len(connection.extract_statements(query))
+    if count == 0 or (count > 1 and not allow_files):
+        raise InputError(f"--- {shorten(query)}: must be one SQL statement; it holds {count}")
 
 
 def _fetch_rows(connection: duckdb.DuckDBPyConnection, query: str) -> tuple[list[str], Any]:

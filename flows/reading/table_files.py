@@ -20,6 +20,7 @@ from fsspec import AbstractFileSystem  # type: ignore[import-untyped]
 
 from catalogs.sentences import shorten, shorten_value
 from flows.store.layout import Layout
+from flows.store.telemetry import CHECKED
 from tasks.errors import InputError
 
 if TYPE_CHECKING:
@@ -73,12 +74,14 @@ def open_stored_table(layout: Layout, manifest: Mapping[str, Any], table: str) -
     try:
         # without the metadata of the whole: libraries read settings for other libraries there
         schema = pq.read_schema(paths[0]).remove_metadata()
-        if table in {"clips", "pairs"}:
-            return dataset.dataset(paths, schema=schema)
-        partitioning = dataset.partitioning(pa.schema([("family", pa.string())]), flavor="hive")
-        return dataset.dataset(
-            paths, schema=schema.append(pa.field("family", pa.string())), partitioning=partitioning
+        checked = dataset.ParquetFileFormat(
+            default_fragment_scan_options=dataset.ParquetFragmentScanOptions(**CHECKED)
         )
+        if table in {"clips", "pairs"}:
+            return dataset.dataset(paths, schema=schema, format=checked)
+        partitioning = dataset.partitioning(pa.schema([("family", pa.string())]), flavor="hive")
+        schema = schema.append(pa.field("family", pa.string()))
+        return dataset.dataset(paths, schema=schema, format=checked, partitioning=partitioning)
     except (pa.ArrowException, OSError) as error:
         raise explain_unreadable(layout, error) from None
 

@@ -18,6 +18,7 @@ from flows.store.arrays import arrays_of
 from flows.store.frame_metadata import check_array, check_frames, read_local_metadata
 from flows.store.frames import read_frames
 from flows.store.layout import Layout
+from flows.store.telemetry import CHECKED
 from manifests.manifest import is_quarantined
 from tasks.errors import InputError
 
@@ -138,6 +139,8 @@ def windows_of(
                  for name in arrays if name not in stored]  # fmt: skip
     if not 1 <= window <= frames:
         problems.append(f"window must lie in 1 to the {frames} frames of a clip; it is {window}")
+    if repeated := sorted({name for name in columns if list(columns).count(name) > 1}):
+        problems.append(f"columns must name each column once; {', '.join(repeated)} stand there twice")
     if stride < 1:
         problems.append(f"stride must be 1 or more; it is {stride}")
     named = {name for row in rows for name in (row["label"], row["clip_id"])}
@@ -210,7 +213,7 @@ def _clip_values(file: Path, columns: Sequence[str], frames: int) -> dict[str, n
         If it does not hold ``frames`` rows of each of its clips, one after the other, with these columns as numbers.
     """
     try:
-        table = pq.read_table(file, columns=["clip_id", *columns], partitioning=None)
+        table = pq.read_table(file, columns=["clip_id", *columns], partitioning=None, **CHECKED)
         numbers = [table[name].to_numpy().astype(np.float32) for name in columns]
         ids = table["clip_id"].to_pylist()
         if odd := [

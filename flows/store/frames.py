@@ -1,7 +1,7 @@
 """Frames as Zarr v3 arrays [clip, frame, y, x(, channel)]: one chunk a frame, one shard a clip.
 
-A shard has one writer. An absent shard reads as fill values, so completeness comes from the receipts and the
-manifest, never from the arrays. Every chunk ends in a CRC-32C, because Blosc alone lets flipped bits through.
+A shard has one writer. Zarr takes an absent shard for fill values, black pictures; here every clip has its shards, and
+one that is absent is damage. Every chunk ends in a CRC-32C, because Blosc alone lets flipped bits through.
 """
 
 from collections.abc import Mapping
@@ -90,13 +90,16 @@ def write_clip(path: Path, index: int, buffers: Mapping[str, np.ndarray]) -> Non
     """Write one clip's whole shard of every array; ``buffers`` maps array name to [frame, y, x(, channel)].
 
     Zarr encodes in memory and `write_atomically` writes, so that a shard is whole and on the disk before the clip's
-    receipt is.
+    receipt is. Pictures of fill values are not stored, unless a shard would have no other.
     """
     for name, values in buffers.items():
         check_array(read_local_metadata(path), name, path)
         metadata = (path / name / "zarr.json").read_bytes()
         files: dict[str, Buffer] = {"zarr.json": default_buffer_prototype().buffer.from_bytes(metadata)}
-        zarr.open_array(MemoryStore(files), mode="r+")[index] = values
+        array = zarr.open_array(MemoryStore(files), mode="r+")
+        array[index] = values
+        if len(files) == 1:
+            array.with_config({"write_empty_chunks": True})[index] = values
         del files["zarr.json"]
         _write_files(path / name, files)
 

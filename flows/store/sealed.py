@@ -1,6 +1,7 @@
 """Reading what a dataset records of itself: the one door for its plan, receipts and manifest."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
@@ -13,41 +14,46 @@ from catalogs.grids.form import BEFORE
 from catalogs.sentences import cap_problems, describe_rules, shorten_value
 from flows.store.arrays import arrays_of
 from flows.store.layout import RECORD, STAGED_TABLES, Layout, read_json
-from manifests.manifest import MANIFEST_FORMAT, head_of_sealed
+from manifests.manifest import MANIFEST_FORMAT, head_of_sealed, is_sealed
 from manifests.records import Manifest, ManifestHead, PlanRecord, Receipt, check_record
 from tasks.errors import InputError
 
 PLAN_FORMAT = "musync-plan/2"
 
 
-def read_manifest(layout: Layout) -> Manifest:
+def read_manifest(layout: Layout, *, sealed: bool = True) -> Manifest:
     """The manifest of a sealed dataset.
+
+    Parameters
+    ----------
+    layout : of the dataset
+    sealed : refuse one that was changed after it was sealed; False for who reports that itself
 
     Raises
     ------
     InputError
-        If the run is unfinished, or the manifest is missing, of another format, or breaks a rule.
+        If the run is unfinished, or the manifest is missing, of another format, breaks a rule, or was changed.
     """
     _refuse_unfinished(layout)
-    return check_manifest(read_json(layout.manifest), layout.manifest)
+    content = read_content(layout.manifest, RECORD, LARGEST_JSON)
+    return _check_content(content, layout.manifest, sealed=sealed)
 
 
 def read_manifest_head(layout: Layout) -> ManifestHead:
     """The manifest of a sealed dataset without its clips, which are neither parsed nor checked.
 
-    That is what a reader of the tables needs. The rest has the same form as with `read_manifest`, and the seal is
-    that of the file's bytes; where it is not, the whole manifest is read and held to its form.
+    That is what a reader of the tables needs. The rest has the same form as with `read_manifest`.
 
     Raises
     ------
     InputError
-        If the run is unfinished, or the manifest is missing, of another format, or breaks a rule.
+        As `read_manifest` raises it.
     """
     _refuse_unfinished(layout)
     content = read_content(layout.manifest, RECORD, LARGEST_JSON)
     head = head_of_sealed(content)
     if head is None:
-        return check_manifest(parse_json(content, layout.manifest, RECORD), layout.manifest)
+        return _check_content(content, layout.manifest, sealed=True)
     parsed = parse_json(head, layout.manifest, RECORD)
     record = check_record(ManifestHead, _of_format(parsed, MANIFEST_FORMAT, layout.manifest), layout.manifest)
     recorded_grid(record["grid"], layout.manifest)
@@ -79,6 +85,16 @@ def check_manifest(content: Any, place: object) -> Manifest:
     """
     manifest = check_record(Manifest, _of_format(content, MANIFEST_FORMAT, place), place)
     recorded_grid(manifest["grid"], place)
+    return manifest
+
+
+def _check_content(content: bytes, place: Path, *, sealed: bool) -> Manifest:
+    manifest = check_manifest(parse_json(content, place, RECORD), place)
+    if sealed and not is_sealed(content):
+        raise InputError(
+            f"{place}: must be as it was sealed; it was changed, so that nothing it records can be relied on:"
+            " put back a copy of it, or generate the grid again into another folder"
+        )
     return manifest
 
 

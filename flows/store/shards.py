@@ -25,7 +25,7 @@ def read_chunks(path: Path, chunks: int, first: int, pictures: np.ndarray, fill_
 
     Parameters
     ----------
-    path : of the shard; without a file all its chunks are fill values
+    path : of the shard
     chunks : in the shard [1]
     first : place of the first chunk [1]
     pictures : contiguous [frame, y, x(, channel)]
@@ -34,13 +34,12 @@ def read_chunks(path: Path, chunks: int, first: int, pictures: np.ndarray, fill_
     Raises
     ------
     ValueError
-        If the shard is damaged.
+        If the shard is missing or damaged.
     """
     try:
         shard = os.open(path, os.O_RDONLY)
     except FileNotFoundError:
-        pictures[...] = fill_value
-        return
+        raise ValueError("the shard is missing") from None
     try:
         places = _read_index(shard, chunks)[first : first + len(pictures)]
         for picture, (offset, length) in zip(pictures, places, strict=True):

@@ -17,6 +17,10 @@ from tasks.errors import InputError
 
 ROW_GROUP_ROWS = 100_000
 SHOWN_COLUMNS = 8
+SEALED = "musync repair makes it again"
+STAGED = "remove it, and the same musync generate command makes its clip again"
+CHECKED: Mapping[str, Any] = {"page_checksum_verification": True}
+"""How pyarrow is to read Parquet: each page is held against the checksum that it was written with."""
 
 
 def labelled_table(columns: Mapping[str, Any], constants: Mapping[str, Any] | None = None) -> pa.Table:
@@ -140,14 +144,15 @@ def read_parts(paths: Iterable[Path]) -> Iterator[pa.Table]:
         If one is missing, or is no table as muSync writes it.
     """
     # without buffers ahead, which a file would hold until it is closed
-    files = [(path, _read_file(path, pq.ParquetFile, path, pre_buffer=False)) for path in paths]
+    options = {"pre_buffer": False, **CHECKED}
+    files = [(path, _read_file(path, pq.ParquetFile, path, remedy=STAGED, **options)) for path in paths]
     encoded = [field.name for field in files[0][1].schema_arrow if pa.types.is_dictionary(field.type)]
     constants = pa.concat_tables(
-        _read_file(path, file.read, encoded, use_threads=False) for path, file in files
+        _read_file(path, file.read, encoded, remedy=STAGED, use_threads=False) for path, file in files
     ).unify_dictionaries()
     common = {name: constants[name].chunk(0).slice(0, 0) for name in encoded}
     for path, file in files:
-        table = _read_file(path, file.read, use_threads=False)
+        table = _read_file(path, file.read, remedy=STAGED, use_threads=False)
         file.close()
         _refuse_columns(table, path)
         for name, empty in common.items():
@@ -172,12 +177,14 @@ def read_table(path: Path, clip_id: str | None = None, required: Iterable[str] =
         If there is no such file, it is no table as muSync writes it, lacks a column, or has no row of the clip.
     """
     filters = None if clip_id is None else [("clip_id", "==", clip_id)]
-    table = _read_file(path, pq.read_table, path, filters=filters)
+    table = _read_file(path, pq.read_table, path, filters=filters, **CHECKED)
     _refuse_columns(table, path, required, clip_id)
     return table
 
 
-def _read_file(path: Path, read: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+def _read_file(
+    path: Path, read: Callable[..., Any], *arguments: Any, remedy: str = SEALED, **options: Any
+) -> Any:
     """Call a reader of Parquet, whose errors become sentences about the file."""
     try:
         return read(*arguments, **options)
@@ -185,7 +192,7 @@ def _read_file(path: Path, read: Callable[..., Any], *arguments: Any, **options:
         raise InputError(f"{path}: no such file; is this a finished muSync dataset?") from None
     except (pa.ArrowException, OSError, ValueError, TypeError) as error:
         raise InputError(
-            f"{path}: must be a Parquet table as muSync writes it; {shorten(error)}: musync repair makes it again"
+            f"{path}: must be a Parquet table as muSync writes it; {shorten(error)}: {remedy}"
         ) from None
 
 

@@ -74,7 +74,7 @@ def reconstruct_street(sequence: StereoSequence, settings: StereoSettings | None
     Raises
     ------
     InputError
-        Too few pictures remain, no road is seen, or the drive is too short.
+        Too few pictures remain, left and right are swapped, no road is seen, or the drive is too short.
     """
     settings = settings or StereoSettings()
     held_out = settings.held_out(len(sequence))
@@ -86,6 +86,7 @@ def reconstruct_street(sequence: StereoSequence, settings: StereoSettings | None
     disparity = np.full(sequence.left.shape[:3], np.nan, dtype=np.float32)
     for i in training:
         disparity[i] = match_stereo(sequence.left[i], sequence.right[i], settings.disparities)
+    _refuse_swapped(sequence, disparity, int(training[0]), settings)
     poses, route = _find_poses_and_route(sequence, disparity, training, settings)
     grey = sequence.left[..., 1]
     exposure = estimate_exposure(
@@ -134,12 +135,31 @@ def reconstruct_street(sequence: StereoSequence, settings: StereoSettings | None
         carriageway_left=cloud.extents[0],
         carriageway_right=cloud.extents[1],
     )
+    scores = score_held_out_frames(scene, sequence, poses, exposure, held_out)
+    if scores and not any(frame.road_share > 0 for frame in scores):
+        raise InputError(
+            f"{sequence.name}: the scene must show a road where the pictures left out of it were taken; it shows none:"
+            " a row of poses must map the left camera's axes to the sequence's frame, in m, in the pictures' order"
+        )
     return Reconstruction(
         scene=scene,
-        held_out=score_held_out_frames(scene, sequence, poses, exposure, held_out),
+        held_out=scores,
         T_world_camera=poses,
         exposure=exposure,
     )
+
+
+def _refuse_swapped(
+    sequence: StereoSequence, disparity: NDArray[np.float32], picture: int, settings: StereoSettings
+) -> None:
+    """Raise `InputError` where more of a picture is confirmed with its left and right exchanged."""
+    exchanged = match_stereo(sequence.right[picture], sequence.left[picture], settings.disparities)
+    here, there = (float(np.isfinite(found).mean()) for found in (disparity[picture], exchanged))
+    if there > here:
+        raise InputError(
+            f"{sequence.name}: the left pictures must be of the left camera; {here:.0%} of picture {picture} has a"
+            f" depth, and {there:.0%} with left and right exchanged: exchange them"
+        )
 
 
 def _find_poses_and_route(

@@ -102,7 +102,8 @@ class Route:
         beyond = ~((s >= 0) & (s <= self.length))
         if beyond.any():
             raise InputError(
-                f"the station must lie on the route, 0 to {self.length:.2f} m; it is {s[beyond][0]:.2f} m"
+                f"the station must lie on the route, 0 to {self.length:.2f} m; it is {s[beyond][0]:.2f} m:"
+                " end or brake the drive sooner, or take a longer route"
             )
         poses = np.zeros((s.size, 4, 4))
         poses[:, :3, 3] = self._position(s.ravel())

@@ -93,11 +93,11 @@ def test_a_grid_that_excludes_everything_is_refused():
 
 def test_a_clip_belongs_to_the_first_split_that_it_keeps():
     grid = grid_of(
-        f"{{{AXES}, splits: {{test: {{calibration: interpolated}}, dev: {{initial_speed_km_h: 60}}, rest: {{}}}}}}"
+        f"{{{AXES}, splits: {{dev: {{initial_speed_km_h: 60}}, wet: {{weather: rain}}, rest: {{}}}}}}"
     )
     assert [(label, split) for (label, _), (split, _) in zip(grid.scenarios, grid.tags, strict=True)] == [
-        ("dry/slow", "rest"), ("dry/fast", "dev"), ("wet/slow", "rest"), ("wet/fast", "dev"),
-        ("flood/slow", "rest"), ("flood/fast", "dev"),
+        ("dry/slow", "rest"), ("dry/fast", "dev"), ("wet/slow", "wet"), ("wet/fast", "dev"),
+        ("flood/slow", "wet"), ("flood/fast", "dev"),
     ]  # fmt: skip
 
 
@@ -110,6 +110,50 @@ def test_a_scenario_without_a_split_is_told():
 def test_a_condition_of_unknown_words_is_refused(condition):
     with pytest.raises(ValueError):
         grid_of(f"{{{AXES}, exclude: [{condition}]}}")
+
+
+@pytest.mark.parametrize(
+    ("condition", "told"),
+    [
+        ("weather: rian", "weather: must be dry, rain, snow or ice; it is 'rian'"),
+        ("weather: [rain, 3]", "weather: must be dry, rain, snow or ice; it is '3.0'"),
+        ("weather: {min: 3}", "weather: an interval is of numbers"),
+        ("precipitation_mm_h: '5'", "precipitation_mm_h: must be a number or an interval; it is '5'"),
+        ("precipitation_mm_h: true", "precipitation_mm_h: must be a number or an interval; it is True"),
+        (
+            "precipitation_mm_h: {min: 30, max: 20}",
+            "precipitation_mm_h: an interval must ascend; it is 30 to 20",
+        ),
+        ("hold_speed: 'yes'", "hold_speed: must be true or false; it is 'yes'"),
+    ],
+)
+def test_a_condition_that_no_scenario_can_meet_is_refused(condition, told):
+    """It left nothing out, and its clips went to the split that takes the rest."""
+    for name, body in (
+        ("exclude.0", f"exclude: [{{{condition}}}]"),
+        ("splits.a", f"splits: {{a: {{{condition}}}, b: {{}}}}"),
+    ):
+        with pytest.raises(InputError) as caught:
+            grid_of(f"{{{AXES}, {body}}}")
+        assert [problem.split(": ", 1)[1] for problem in caught.value.problems if f"{name}.{told}" in problem]
+
+
+@pytest.mark.parametrize(
+    ("body", "told"),
+    [
+        ("exclude: [{precipitation_mm_h: 51}]", r"exclude\.0: leaves nothing out"),
+        ("splits: {val: {initial_speed_km_h: {min: 90}}, train: {}}", r"splits\.val: gets no clip"),
+        ("splits: {train: {}, test: {weather: rain}}", r"splits\.test: gets no clip"),
+    ],
+)
+def test_a_condition_that_no_clip_of_the_grid_meets_is_refused(body, told):
+    with pytest.raises(InputError, match=told):
+        grid_of(f"{{{AXES}, {body}}}")
+
+
+def test_a_draw_may_leave_nothing_out():
+    cube = "latin_hypercube: {count: 3, ranges: {initial_speed_km_h: [30, 70]}}"
+    assert grid_of(f"{{{cube}, exclude: [{{initial_speed_km_h: {{min: 69.999}}}}]}}").left_out == 0
 
 
 def test_the_papers_conditions_have_the_papers_relationship():

@@ -50,6 +50,7 @@ def test_the_papers_scenarios_lie_within_the_limits():
         (replace(BRAKING, brake_onset_s=None, brake_onset_m=1e9), "brake_onset_m must be at most 100000 m"),
         (Scenario(hazard_center_m=1e9), "hazard_center_m must be at most 100000 m"),
         (Scenario(hazard_length_m=1e9, hazard_height_m=0.1), "hazard_length_m must be at most 1000 m"),
+        (Scenario(hazard_length_m=1e-9, hazard_height_m=1.0), "hazard_length_m must be at least 0.1 m"),
         (Scenario(hazard_length_m=3.0, hazard_height_m=-2.0), "hazard_height_m must be at most 1 m"),
     ],
 )

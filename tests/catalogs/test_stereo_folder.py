@@ -47,6 +47,28 @@ def test_rows_with_names_are_read_too(folder: Path) -> None:
     assert read_stereo_folder(folder).baseline == 0.5
 
 
+def test_the_baseline_is_that_between_the_two_cameras_wherever_their_origin_is(folder: Path) -> None:
+    """KITTI's colour cameras are measured from the left grey one: 0.06 m and -0.47 m from it, 0.53 m apart."""
+    (folder / "calib.txt").write_text(
+        LEFT_P.replace("60 0", "60 42", 1) + "\n" + RIGHT_P.replace("-350", "-329")
+    )
+    assert read_stereo_folder(folder).baseline == 0.53
+
+
+def test_a_picture_that_lacks_on_each_side_does_not_shift_the_pairs(folder: Path) -> None:
+    for side, name in (("image_l", "000000"), ("image_r", "000003")):
+        (folder / side / f"{name}.png").unlink()
+    (folder / "poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n" * 3)
+    assert "000001.png and 000000.png and 2 more do not" in problems_of(folder)
+
+
+def test_pairs_may_name_their_cameras(folder: Path) -> None:
+    for side, camera in (("image_l", "cam2"), ("image_r", "cam3")):
+        for path in (folder / side).iterdir():
+            path.rename(path.with_name(f"{camera}_{path.name}"))
+    assert read_stereo_folder(folder).left.shape == (4, 80, 120, 3)
+
+
 def problems_of(folder: Path) -> str:
     with pytest.raises(InputError) as caught:
         read_stereo_folder(folder)
@@ -72,6 +94,7 @@ def test_every_problem_is_named_at_once(folder: Path) -> None:
         ("poses.txt", "2 0 0 0 0 1 0 0 0 0 1 0\n" * 4, "4 are not, the first is row 1"),
         ("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n" * 3, "it has 3 for 4"),
         ("calib.txt", LEFT_P, "it has 1 row"),
+        ("calib.txt", f"P0: {LEFT_P}\nP1: {RIGHT_P}\nP2: {LEFT_P}\nP3: {RIGHT_P}\n", "it has 4 rows"),
         ("calib.txt", f"{LEFT_P}\n{RIGHT_P.replace('700', '701')}", "rows 1 and 2 differ"),
         ("calib.txt", f"{LEFT_P.replace('700', '0')}\n{RIGHT_P}", "focal lengths must be positive"),
     ],

@@ -177,6 +177,19 @@ def test_too_few_pictures_and_too_short_a_drive_are_refused(truth: StereoSet) ->
         reconstruct_street(truth.sequence, replace(SETTINGS, first_station=5.0))
 
 
+def test_left_and_right_exchanged_are_refused(truth: StereoSet) -> None:
+    sequence = replace(truth.sequence, left=truth.sequence.right, right=truth.sequence.left)
+    with pytest.raises(InputError, match="with left and right exchanged: exchange them"):
+        reconstruct_street(sequence)
+
+
+def test_poses_that_map_the_wrong_way_are_refused(truth: StereoSet) -> None:
+    """They made a scene without a road, whose figures were NaN."""
+    wrong = replace(truth.sequence, T_origin_camera=np.linalg.inv(truth.sequence.T_origin_camera))
+    with pytest.raises(InputError, match="a row of poses must map the left camera's axes"):
+        reconstruct_street(wrong)
+
+
 def test_a_real_street_is_shown_within_20_db_and_its_road_within_22(outside_data: Path) -> None:
     folder = outside_data / "measured" / "kitti_street"
     if not folder.is_dir():

@@ -113,6 +113,60 @@ def test_a_run_that_is_killed_while_it_writes_its_plan_goes_on(grid, whole, tmp_
     assert files_of(tmp_path / "data") == whole
 
 
+def stop_before_the_end(grid: str, folder: Path, monkeypatch) -> Layout:
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(flows.making.generate, "seal_dataset", stop)
+    with pytest.raises(KeyboardInterrupt):
+        make(grid, folder)
+    monkeypatch.undo()
+    return Layout(folder)
+
+
+def test_a_run_goes_on_with_the_inputs_it_was_planned_with_and_no_others(grid, whole, tmp_path, monkeypatch):
+    """Clips of two vehicles in one dataset were sealed as one, and verified."""
+    layout = stop_before_the_end(grid, tmp_path / "data", monkeypatch)
+    next(layout.staging.glob("*.json")).unlink()
+    vehicle = layout.inputs / "vehicle.yaml"
+    vehicle.write_text(vehicle.read_text().replace("value: 1200", "value: 2200"))
+    with pytest.raises(
+        InputError, match=r"inputs/vehicle\.yaml: must be the file that the run was planned with"
+    ):
+        make(grid, layout.root)
+    vehicle.unlink()
+    make(grid, layout.root)
+    assert files_of(layout.root) == whole
+
+
+def test_inputs_that_change_while_clips_are_made_are_not_sealed(grid, tmp_path, monkeypatch):
+    real = flows.making.generate.seal_dataset
+
+    def change_and_seal(layout: Layout, *rest: object) -> object:
+        (layout.inputs / "surface.yaml").write_text("{}")
+        return real(layout, *rest)
+
+    monkeypatch.setattr(flows.making.generate, "seal_dataset", change_and_seal)
+    with pytest.raises(InputError, match=r"inputs/surface\.yaml: must be as recorded; it is changed"):
+        make(grid, tmp_path / "data")
+    assert not (tmp_path / "data" / "manifest.json").exists()
+
+
+def test_damaged_rows_of_a_clip_that_is_made_are_not_sealed(grid, whole, tmp_path, monkeypatch):
+    layout = stop_before_the_end(grid, tmp_path / "data", monkeypatch)
+    rows = next(layout.staging.glob("*.ticks.parquet"))
+    content = bytearray(rows.read_bytes())
+    content[len(content) // 4] ^= 1
+    rows.write_bytes(content)
+    with pytest.raises(
+        InputError, match="remove it, and the same musync generate command makes its clip again"
+    ):
+        make(grid, layout.root)
+    rows.unlink()
+    make(grid, layout.root)
+    assert files_of(layout.root) == whole
+
+
 @pytest.mark.parametrize("name", ["inputs", "frames.zarr", "notes.txt", HALF_A_PLAN])
 def test_a_folder_with_a_name_of_ours_but_without_our_mark_is_left_alone(grid, tmp_path, name):
     (tmp_path / "data" / name).mkdir(parents=True)

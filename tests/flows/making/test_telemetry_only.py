@@ -82,3 +82,15 @@ def test_a_plan_is_written_as_json_of_the_whole(bare, tmp_path):
     plan = read_plan(bare.root)
     write_json(tmp_path / "plan.json", plan.as_json())
     assert b"".join(plan.file_pieces()) == (tmp_path / "plan.json").read_bytes() == bare.plan.read_bytes()
+
+
+def test_a_clip_that_drives_off_its_route_is_named(toy_dataset, tmp_path):
+    grid = tmp_path / "far.yaml"
+    text = (toy_dataset.root.parent / "grid.yaml").read_text()
+    grid.write_text(text.replace("flat: {initial_speed_km_h: 40", "flat: {initial_speed_km_h: 300"))
+    with pytest.raises(InputError) as raised:
+        generate_dataset(str(grid), str(tmp_path / "data"), runner="threads", workers=1, pictures=False)
+    assert {problem.split(":")[0] for problem in raised.value.problems} == {
+        "clip dry/flat",
+        "clip snow-3/flat",
+    }

@@ -142,6 +142,16 @@ def test_a_query_that_is_no_sql_is_one_sentence_with_the_views(toy_dataset):
         query_dataset(str(toy_dataset.root), "SELECT nothing FROM nowhere")
 
 
+def test_of_two_statements_none_is_answered_alone(data):
+    with pytest.raises(InputError, match="must be one SQL statement; it holds 2"):
+        data.sql("SELECT 1; SELECT 2")
+
+
+def test_a_column_that_is_asked_for_twice_is_told(data):
+    with pytest.raises(InputError, match="name each column once; speed stand"):
+        data.torch(window=4, columns=["speed", "pitch", "speed"], arrays=[], quarantined=True)
+
+
 def test_a_missing_table_is_told_with_what_to_do(toy_dataset, tmp_path):
     shutil.copytree(toy_dataset.root, tmp_path / "copy")
     (tmp_path / "copy" / "telemetry" / "pairs.parquet").unlink()

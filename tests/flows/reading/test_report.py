@@ -6,16 +6,19 @@ import shutil
 import struct
 import zlib
 from base64 import b64decode
+from typing import Any
 
 import numpy as np
 import pytest
 
 from flows.making.generate import generate_dataset
 from flows.reading.report import make_report, pack_columns
+from flows.store.layout import Layout
 from flows.store.telemetry import read_columns
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tests.browsers import find_barriers, open_chromium
+from tests.flows.reseal import reseal
 
 
 @pytest.fixture(scope="module")
@@ -280,13 +283,14 @@ HOSTILE = [
 
 def test_labels_are_text_in_the_page_whatever_they_hold(browser, toy_dataset, tmp_path):
     shutil.copytree(toy_dataset.root, tmp_path / "data")
-    path = tmp_path / "data" / "manifest.json"
-    manifest = json.loads(path.read_bytes())
-    for clip, label in zip(manifest["clips"], HOSTILE, strict=True):
-        clip["label"] = label
-        clip["verdict"]["reasons"] = [label]
-    manifest["grid"]["name"] = HOSTILE[0]
-    path.write_text(json.dumps(manifest))
+
+    def rename(manifest: dict[str, Any]) -> None:
+        for clip, label in zip(manifest["clips"], HOSTILE, strict=True):
+            clip["label"] = label
+            clip["verdict"]["reasons"] = [label]
+        manifest["grid"]["name"] = HOSTILE[0]
+
+    reseal(Layout(tmp_path / "data"), rename)
     make_report(str(tmp_path / "data"), out=str(tmp_path / "page"))
     assert "</script>" not in (tmp_path / "page" / "data.js").read_text()
     for page in opened(browser, tmp_path / "page"):

@@ -1,0 +1,106 @@
+"""Damage to a finished dataset is told where it is read, and never becomes black pictures or other numbers."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+import musync
+from flows.auditing.explain import explain_frame
+from flows.exporting.export import export_dataset
+from flows.judging.evaluation import evaluate_dataset
+from flows.judging.physics import audit_physics
+from flows.reading.describe import describe_dataset
+from flows.store.layout import Layout
+from flows.store.telemetry import read_table
+from tasks.errors import InputError
+
+
+@pytest.fixture
+def copy(toy_dataset, tmp_path) -> Layout:
+    shutil.copytree(toy_dataset.root, tmp_path / "copy")
+    return Layout(tmp_path / "copy")
+
+
+READ_PICTURES = {
+    "a picture": lambda root: musync.open(root)["dry/flat"].picture(3),
+    "the arrays": lambda root: musync.open(root).frames,
+    "a window": lambda root: musync.open(root).torch(window=4, clips="dry/flat")[0],
+    "an export": lambda root: export_dataset(
+        str(root), "webdataset", out=str(root.with_name("out")), clips=["dry/flat"]
+    ),
+}
+
+
+@pytest.mark.parametrize("reader", READ_PICTURES)
+def test_a_clip_whose_pictures_are_missing_is_no_black_clip(copy, reader):
+    READ_PICTURES[reader](copy.root)
+    shutil.rmtree(copy.root.with_name("out"), ignore_errors=True)
+    copy.frame_shard("rgb", 0).unlink()
+    with pytest.raises(InputError, match=r"missing.* musync repair makes it again"):
+        READ_PICTURES[reader](copy.root)
+
+
+def flip_a_number(path: Path) -> None:
+    """Change a bit of the values of ``speed``: what is compressed unpacks all the same."""
+    file = pq.ParquetFile(path)
+    place = file.schema_arrow.names.index("speed")
+    chunk = file.metadata.row_group(0).column(place)
+    content = bytearray(path.read_bytes())
+    content[chunk.data_page_offset + chunk.total_compressed_size // 2] ^= 1
+    path.write_bytes(content)
+
+
+READ_TABLES = {
+    "of muSync": lambda root, path: read_table(path),
+    "of pyarrow": lambda root, path: musync.open(root).telemetry("frames").to_table(),
+    "of torch": lambda root, path: musync.open(root).torch(
+        window=4, columns="speed", arrays=[], quarantined=True
+    ),
+}
+
+
+@pytest.mark.parametrize("reader", READ_TABLES)
+def test_a_flipped_bit_in_a_table_is_an_error_and_not_a_number(copy, reader):
+    path = copy.telemetry / "frames" / "family=dry" / "part-0000.parquet"
+    READ_TABLES[reader](copy.root, path)
+    flip_a_number(path)
+    with pytest.raises((InputError, OSError), match=r"checksum|CRC"):
+        READ_TABLES[reader](copy.root, path)
+
+
+@pytest.mark.parametrize(
+    "read", [describe_dataset, lambda root: musync.open(root), lambda root: export_dataset(root, "tum")]
+)
+def test_a_manifest_that_was_edited_by_hand_is_not_believed(copy, read):
+    manifest = json.loads(copy.manifest.read_bytes())
+    manifest["grid"]["frame_rate_hz"] = 20
+    copy.manifest.write_text(json.dumps(manifest))
+    with pytest.raises(InputError, match=r"manifest\.json: must be as it was sealed"):
+        read(str(copy.root))
+
+
+USE_INPUTS = {
+    "evaluate": lambda root: evaluate_dataset(root, out=f"{root}-out"),
+    "audit-physics": lambda root: audit_physics(root),
+    "explain": lambda root: explain_frame(root, "dry/flat", 3),
+    "export": lambda root: export_dataset(root, "tum", out=f"{root}-out", clips=["dry/flat"]),
+}
+
+
+@pytest.mark.parametrize("command", USE_INPUTS)
+@pytest.mark.parametrize("name", ["inputs/camera.yaml", "plan.json"])
+def test_a_camera_or_a_rate_that_was_edited_by_hand_is_not_believed(copy, command, name):
+    path = copy.root / name
+    path.write_text(path.read_text().replace("value: 80", "value: 160").replace('_hz": 10', '_hz": 20'))
+    with pytest.raises(InputError, match=f"{name}: must be as recorded"):
+        USE_INPUTS[command](str(copy.root))
+
+
+def test_a_table_of_clips_that_lost_rows_is_not_judged_as_if_it_were_whole(copy):
+    path = copy.telemetry / "clips.parquet"
+    pq.write_table(pq.read_table(path).slice(0, 2), path)
+    with pytest.raises(InputError, match="a row of each of the manifest's 4 clips"):
+        audit_physics(str(copy.root))
