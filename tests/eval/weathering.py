@@ -36,3 +36,22 @@ def with_noise(frames: NDArray[np.uint8], sigma: float, seed: int = 0) -> NDArra
 def faded(frames: NDArray[np.uint8], contrast: float) -> NDArray[np.uint8]:
     """As through fog of one density."""
     return np.rint(190 + (frames - 190.0) * contrast).astype(np.uint8)
+
+
+def veiled(
+    frames: NDArray[np.uint8],
+    depth: NDArray[np.float32],
+    K: NDArray[np.float64],
+    extinction: float,
+    light: float,
+) -> NDArray[np.uint8]:
+    """As through air of that extinction [1/m] and linear light [1], by Koschmieder's law; what has no depth is air."""
+    y, x = np.indices(depth.shape[1:])
+    ray = np.sqrt(1 + ((x - K[0, 2]) / K[0, 0]) ** 2 + ((y - K[1, 2]) / K[1, 1]) ** 2)
+    through = np.exp(-extinction * np.where(np.isfinite(depth), ray * depth, np.inf))[..., None]
+    display = frames / 255
+    linear = np.where(display <= 0.04045, display / 12.92, ((display + 0.055) / 1.055) ** 2.4)
+    seen = linear * through + light * (1 - through)
+    return np.rint(255 * np.where(seen <= 0.0031308, 12.92 * seen, 1.055 * seen ** (1 / 2.4) - 0.055)).astype(
+        np.uint8
+    )

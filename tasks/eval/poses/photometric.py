@@ -1,13 +1,28 @@
 """Pose check by every pixel: Gauss-Newton on grey levels from frame to frame, with rendered depth."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import cv2
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from tasks.eval.poses.air import (
+    LEAST_EXTINCTION,
+    Air,
+    fit_extinction,
+    linear_light,
+    sky_light,
+    take_air_away,
+)
 from tasks.eval.poses.depth_chain import Attempt, invert_depth, place_frames_by_depth, prepare_on_demand
+from tasks.eval.poses.grey_equations import (
+    correlation_from_sums,
+    form_normal_equations,
+    histogram_median,
+    informative_pixels,
+)
+from tasks.eval.poses.links import chained_poses
 from tasks.eval.poses.motion import (
     FrameStep,
     RecoveredMotion,
@@ -15,8 +30,16 @@ from tasks.eval.poses.motion import (
     failed_step,
     integrate_motion,
 )
-from tasks.eval.poses.rigid import Floats, adjoint_matrix, advance_pose, invert_pose
+from tasks.eval.poses.rigid import (
+    Floats,
+    adjoint_matrix,
+    advance_pose,
+    invert_pose,
+    project_points,
+    viewing_rays,
+)
 from tasks.eval.poses.twists import pose_from_twist
+from tasks.eval.poses.warp import bilinear_taps
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,6 +62,9 @@ class PhotometricSettings:
     min_correlation : least correlation of the aligned pictures [1]
     noise_floor : smallest assumed error of a grey level, that of rounding two of them [1]
     block : side of the blocks whose errors count as independent [px]
+    air_spans, air_steps : runs of frames on which the air is measured, and steps of each [1]
+    air_level : finest level of the pictures that it is measured on [1]
+    air_converged : motion of a step there at which a level is done [px]
     """
 
     levels: int = 4
@@ -55,12 +81,17 @@ class PhotometricSettings:
     min_correlation: float = 0.5
     noise_floor: float = 0.5
     block: int = 32
+    air_spans: int = 4
+    air_steps: int = 4
+    air_level: int = 1
+    air_converged: float = 0.03
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Level:
     """One pyramid level: the picture, and its pixels that can be aligned to another picture."""
 
+    level: int
     grey: NDArray[np.float32]
     pixels: NDArray[np.float32]  # [P, 6]: x, y, 1/z, grey level, d/dx, d/dy
     K: Floats
@@ -98,58 +129,108 @@ def recover_motion_photometric(
     """
     check_clip(frames, K, T_rig_camera, depth, unusable, route_rotations)
     chosen = settings or PhotometricSettings()
-    prepared = prepare_on_demand(
-        lambda k: _build_pyramid(frames[k], depth[k], None if unusable is None else unusable[k], K, chosen)
-    )
+    hidden = np.zeros(depth.shape, np.bool_) if unusable is None else unusable
+    greys = np.stack([cv2.cvtColor(frame, cv2.COLOR_RGB2GRAY) for frame in frames])
+    guesses = [advance_pose(way, T_rig_camera) for way in chosen.search_advances]
+    air = _measure_air(greys, depth, hidden, K, guesses, chosen)
+
+    def prepare_frame(k: int) -> list[_Level]:
+        clear = greys[k] if air is None else take_air_away(greys[k], depth[k], K, air)
+        return _build_pyramid(clear, depth[k], hidden[k], K, chosen)
+
     placements = place_frames_by_depth(
         len(frames),
-        prepared,
+        prepare_on_demand(prepare_frame),
         track=lambda earlier, later, guess: _align_pictures(
             earlier[: chosen.track_level + 1], later, guess, chosen
         ),
         search=lambda earlier, later, guess: _align_pictures(earlier, later, guess, chosen),
-        guesses=[advance_pose(way, T_rig_camera) for way in chosen.search_advances],
+        guesses=guesses,
     )
     return integrate_motion("photometric", placements, T_rig_camera, route_rotations)
 
 
-def _build_pyramid(
-    rgb: NDArray[np.uint8],
+def _measure_air(
+    greys: NDArray[np.uint8],
     depth: NDArray[np.float32],
-    hidden: NDArray[np.bool_] | None,
+    hidden: NDArray[np.bool_],
+    K: Floats,
+    guesses: list[Floats],
+    settings: PhotometricSettings,
+) -> Air | None:
+    """Return the air of a clip from a few of its runs of frames, or None where it is clear or cannot be told.
+
+    Smaller pictures suffice: an error of the pose moves greys either way, the veil all of them towards its own. Pixels
+    without a gradient are read too: they tell of the veil and nothing of the pose.
+    """
+    steps = min(settings.air_steps, len(greys) - 1)
+    starts = np.unique(np.linspace(0, len(greys) - 1 - steps, settings.air_spans).astype(int))
+    light = sky_light(greys[starts], depth[starts])
+    if light is None or not steps:
+        return None
+    rough = replace(settings, least_gradient=0.0, converged=settings.air_converged)
+
+    def align(earlier: list[_Level], later: list[_Level], guess: Floats) -> Attempt:
+        return _align_pictures(earlier, later, guess, rough)
+
+    def prepare_frame(k: int) -> list[_Level]:
+        return _build_pyramid(greys[k], depth[k], hidden[k], K, rough, settings.air_level)
+
+    seen = []
+    for start in starts:
+        prepared = [prepare_frame(k) for k in range(start, start + steps + 1)]
+        T_first_last = chained_poses(
+            place_frames_by_depth(steps + 1, prepared.__getitem__, align, align, guesses)
+        )[-1]
+        if np.isfinite(T_first_last).all():
+            seen.append(_compare_light(prepared[0][0], prepared[-1][0], T_first_last))
+    if not seen:
+        return None
+    far, near, nearing = np.concatenate(seen, axis=1)
+    extinction = fit_extinction(far, near, nearing, light)
+    return Air(extinction=extinction, light=light) if extinction >= LEAST_EXTINCTION else None
+
+
+def _compare_light(far: _Level, near: _Level, T_far_near: Floats) -> Floats:
+    """Return the light of surfaces from afar and from nearer by [1], and by how much nearer [m]: float64 [3, N]."""
+    xy, q = near.pixels[:, :2].astype(np.float64), near.pixels[:, 2].astype(np.float64)
+    points = viewing_rays(xy, near.K) / q[:, None]
+    before = points @ T_far_near[:3, :3].T + T_far_near[:3, 3]
+    ahead = before[:, 2] > 0
+    at, weights, inside = bilinear_taps(
+        project_points(np.where(ahead[:, None], before, 1.0), far.K).astype(np.float32), far.grey.shape
+    )
+    shown = ahead & inside
+    grey = (weights * far.grey[at]).sum(axis=0)
+    nearing = np.linalg.norm(before, axis=1) - np.linalg.norm(points, axis=1)
+    return np.stack([linear_light(grey), linear_light(near.pixels[:, 3]), nearing])[:, shown]
+
+
+def _build_pyramid(
+    picture: NDArray[np.number[Any]],
+    depth: NDArray[np.float32],
+    hidden: NDArray[np.bool_],
     K: Floats,
     settings: PhotometricSettings,
+    finest: int = 0,
 ) -> list[_Level]:
-    grey = cv2.GaussianBlur(
-        cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY).astype(np.float32), (0, 0), settings.smoothing
-    )
-    q = invert_depth(depth, hidden)
-    levels = []
-    for level in range(settings.levels):
-        if level and min(grey.shape) < 2 * settings.smallest_side:
-            break
-        if level:
-            # pixel i of the smaller picture is centred on pixel 2 i of the larger one
-            grey, q, K = cv2.pyrDown(grey), q[::2, ::2], np.diag([0.5, 0.5, 1.0]) @ K
-        levels.append(_Level(grey=grey, pixels=_informative_pixels(grey, q, settings), K=K))
-    return levels
-
-
-def _informative_pixels(
-    grey: NDArray[np.float32], q: NDArray[np.float32], settings: PhotometricSettings
-) -> NDArray[np.float32]:
-    gx, gy = np.zeros_like(grey), np.zeros_like(grey)
-    gx[:, 1:-1] = (grey[:, 2:] - grey[:, :-2]) / 2
-    gy[1:-1] = (grey[2:] - grey[:-2]) / 2
-    bend = np.full_like(q, np.inf)
-    bend[1:-1, 1:-1] = np.maximum(
-        np.abs(q[1:-1, 2:] + q[1:-1, :-2] - 2 * q[1:-1, 1:-1]),
-        np.abs(q[2:, 1:-1] + q[:-2, 1:-1] - 2 * q[1:-1, 1:-1]),
-    )
-    useful = (gx * gx + gy * gy >= settings.least_gradient**2) & (bend <= settings.depth_kink * q) & (q > 0)
-    useful[::2, ::2] = useful[1::2, 1::2] = False  # neighbours hold nearly the same: a chequerboard suffices
-    y, x = np.nonzero(useful)
-    return np.stack([x, y, q[y, x], grey[y, x], gx[y, x], gy[y, x]], axis=-1).astype(np.float32)
+    """Return the levels of a picture [H, W], from `finest` on where the pyramid has so many."""
+    grey = cv2.GaussianBlur(picture.astype(np.float32), (0, 0), settings.smoothing)
+    scaled = [(grey, invert_depth(depth, hidden), K)]
+    while len(scaled) < settings.levels and min(scaled[-1][0].shape) >= 2 * settings.smallest_side:
+        grey, q, K = scaled[-1]
+        # pixel i of the smaller picture is centred on pixel 2 i of the larger one
+        scaled.append((cv2.pyrDown(grey), q[::2, ::2], np.diag([0.5, 0.5, 1.0]) @ K))
+    return [
+        _Level(
+            level=level,
+            grey=grey,
+            pixels=informative_pixels(grey, q, settings.least_gradient, settings.depth_kink),
+            K=K,
+        )
+        for level, (grey, q, K) in enumerate(scaled)
+        if level >= min(finest, len(scaled) - 1)
+    ]
 
 
 def _align_pictures(
@@ -160,17 +241,19 @@ def _align_pictures(
     Resampling changes the picture that is resampled, which biases the pose; aligned both ways, the two biases cancel.
     """
     T, scale = T_earlier_later, 20.0
-    for level in range(len(earlier) - 1, -1, -1):
-        a, b = earlier[level], later[level]
+    for a, b in reversed(list(zip(earlier, later, strict=False))):
+        level, least = a.level, max(settings.min_pixels >> (2 * a.level), 12)
         fewest = min(len(a.pixels), len(b.pixels))
-        if fewest < max(settings.min_pixels >> (2 * level), 12):
+        if fewest < least:
             return _failed_attempt(
                 f"{fewest} pixels with depth and contrast, at least {settings.min_pixels} are needed", 0
             )
         per_metre = float(np.median(b.pixels[:, 2]))
         for _ in range(settings.iterations):
-            onto_a = _normal_equations(b.pixels, a.grey, b.K, T, scale, settings.block >> level)
-            onto_b = _normal_equations(a.pixels, b.grey, a.K, invert_pose(T), scale, settings.block >> level)
+            onto_a = form_normal_equations(b.pixels, a.grey, b.K, T, scale, settings.block >> level)
+            onto_b = form_normal_equations(
+                a.pixels, b.grey, a.K, invert_pose(T), scale, settings.block >> level
+            )
             back = -adjoint_matrix(T)
             H = onto_a[0] + back.T @ onto_b[0] @ back
             gradient = onto_a[1] + onto_b[1] @ back
@@ -182,13 +265,13 @@ def _align_pictures(
             if not np.isfinite(twist).all():
                 return _failed_attempt("the alignment diverged", 0)
             T = T @ pose_from_twist(-twist)
-            scale = max(_histogram_median(histogram) * 1.4826, settings.noise_floor)
+            scale = max(histogram_median(histogram) * 1.4826, settings.noise_floor)
             moved = b.K[0, 0] * (np.abs(twist[:3]).max() * per_metre + np.abs(twist[3:]).max())
             if moved < settings.converged:
                 break
     agreeing, possible = int(sums[0]), len(a.pixels) + len(b.pixels)
-    correlation = _correlation_from_sums(sums)
-    if agreeing < max(settings.min_pixels, settings.min_inlier_share * possible):
+    correlation = correlation_from_sums(sums)
+    if agreeing < max(least, settings.min_inlier_share * possible):
         return _failed_attempt(f"{agreeing} of {possible} pixels agree on a pose", agreeing)
     if correlation < settings.min_correlation:
         return _failed_attempt(f"the aligned pictures correlate by {correlation:.2f} only", agreeing)
@@ -201,90 +284,3 @@ def _align_pictures(
 
 def _failed_attempt(reason: str, agreeing: int) -> Attempt:
     return Attempt(step=failed_step(reason, agreeing), quality=0.0)
-
-
-BINS_PER_GREY_LEVEL = 4
-
-
-def _histogram_median(histogram: NDArray[np.int64]) -> float:
-    half = np.searchsorted(np.cumsum(histogram), max(histogram.sum(), 1) / 2)
-    return (float(half) + 0.5) / BINS_PER_GREY_LEVEL
-
-
-def _correlation_from_sums(sums: Floats) -> float:
-    n, a, b, aa, bb, ab = sums
-    if n == 0:
-        return 0.0
-    variance = (aa - a * a / n) * (bb - b * b / n)
-    return float((ab - a * b / n) / np.sqrt(variance)) if variance > 0 else 0.0
-
-
-def _normal_equations(
-    pixels: NDArray[np.float32], source: NDArray[np.float32], K: Floats, T: Floats, scale: float, block: int
-) -> tuple[Floats, Floats, Floats, NDArray[np.int64]]:
-    return _accumulate_normal_equations(
-        pixels,
-        source,
-        K @ T[:3, :3] @ np.linalg.inv(K),
-        K @ T[:3, 3],
-        (K[0, 0], K[1, 1], K[0, 2], K[1, 2]),
-        scale,
-        block,
-    )
-
-
-@numba.njit(cache=True, nogil=True)
-def _accumulate_normal_equations(pixels, source, warp, shift, intrinsics, scale, block):  # type: ignore[no-untyped-def]
-    """Weighted JTJ [6, 6], weighted JTr of each block [B, 6], sums for the correlation of the inliers
-    (n, a, b, aa, bb, ab) and a histogram of the absolute residuals [1]."""
-    fx, fy, cx, cy = intrinsics
-    rows_in, columns_in = source.shape
-    columns = columns_in // block + 1
-    blocks = columns * (rows_in // block + 1)
-    H = np.zeros((6, 6))
-    gradient = np.zeros((blocks, 6))
-    sums = np.zeros(6)
-    histogram = np.zeros(256 * BINS_PER_GREY_LEVEL, np.int64)
-    J = np.empty(6)
-    cut = 1.0 / (4.685 * scale) ** 2
-    for p in range(pixels.shape[0]):
-        x, y, q = pixels[p, 0], pixels[p, 1], pixels[p, 2]
-        Z = warp[2, 0] * x + warp[2, 1] * y + warp[2, 2] + shift[2] * q
-        if Z <= 1e-3:
-            continue
-        u = (warp[0, 0] * x + warp[0, 1] * y + warp[0, 2] + shift[0] * q) / Z
-        v = (warp[1, 0] * x + warp[1, 1] * y + warp[1, 2] + shift[1] * q) / Z
-        if not (u >= 0.0 and v >= 0.0 and u < columns_in - 1 and v < rows_in - 1):
-            continue
-        j, i = int(u), int(v)
-        a, b = u - j, v - i
-        seen = (1 - b) * ((1 - a) * source[i, j] + a * source[i, j + 1]) + b * (
-            (1 - a) * source[i + 1, j] + a * source[i + 1, j + 1]
-        )
-        grey = pixels[p, 3]
-        r = seen - grey
-        histogram[min(int(abs(r) * BINS_PER_GREY_LEVEL), histogram.size - 1)] += 1
-        w = 1.0 - r * r * cut
-        if w <= 0.0:
-            continue
-        w *= w
-        X, Y, gx, gy = (x - cx) / fx, (y - cy) / fy, fx * pixels[p, 4], fy * pixels[p, 5]
-        along = X * gx + Y * gy
-        J[0], J[1], J[2] = q * gx, q * gy, -q * along
-        J[3], J[4], J[5] = -gy - Y * along, gx + X * along, X * gy - Y * gx
-        here = (int(y) // block) * columns + int(x) // block
-        for m in range(6):
-            wj = w * J[m]
-            gradient[here, m] += wj * r
-            for n in range(m, 6):
-                H[m, n] += wj * J[n]
-        sums[0] += 1.0
-        sums[1] += seen
-        sums[2] += grey
-        sums[3] += seen * seen
-        sums[4] += grey * grey
-        sums[5] += seen * grey
-    for m in range(6):
-        for n in range(m):
-            H[m, n] = H[n, m]
-    return H, gradient, sums, histogram
