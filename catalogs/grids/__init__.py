@@ -1,6 +1,6 @@
 """Scenario grids: a YAML file of blocks whose product is a list of scenarios."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -31,6 +31,7 @@ class Grid:
     scenarios : labelled, in order
     tags : of each, its split (empty without splits) and its place in the calibrated range
     left_out : combinations that ``exclude`` took out [1]
+    idle : places of the conditions of ``exclude`` that took out none
     poses : folder of reference traces whose motion the clips show in place of the vehicle's; None for the vehicle
     """
 
@@ -38,6 +39,7 @@ class Grid:
     scenarios: tuple[tuple[str, Scenario], ...]
     tags: tuple[tuple[str, str], ...]
     left_out: int = 0
+    idle: tuple[int, ...] = ()
     poses: Path | None = None
 
 
@@ -75,6 +77,9 @@ def load_grid(source: str | Path) -> Grid:
         except FaultyGrid as faults:
             problems += faults.problems
             grid = faults.grid
+        problems += _find_impossible_conditions(form.settings, path)
+        if grid is not None and not problems:
+            problems = cap_problems(_find_idle_conditions(grid, path))
     if problems or grid is None:
         raise FaultyGrid(problems, grid)
     return grid
@@ -87,8 +92,7 @@ def expand_grid(settings: GridFile, place: str) -> Grid:
     problems: dict[str, list[str]] = {problem: ["base"] for problem in range_problems(Scenario(**base))}
     scenarios, tags, left_out = [], [], 0
     labels: set[str] = set()
-    used: set[int] = set()
-    is_known = True
+    idle = set(range(len(settings.exclude)))
     for combination in list_combinations(settings):
         label = "/".join(level for level, _ in combination)
         merged: dict[str, Any] = dict(base)
@@ -96,10 +100,9 @@ def expand_grid(settings: GridFile, place: str) -> Grid:
             merged |= partial
         scenario = Scenario(**merged)
         unknown = [name for name, value in merged.items() if value != value or value == UNKNOWN_WEATHER]
-        is_known = is_known and not unknown
         facts = facts_of(scenario)
-        met = {place for place, condition in enumerate(settings.exclude) if condition.holds(facts)}
-        used |= met
+        met = {number for number, condition in enumerate(settings.exclude) if condition.holds(facts)}
+        idle -= met
         if met:
             left_out += 1
             continue
@@ -119,35 +122,45 @@ def expand_grid(settings: GridFile, place: str) -> Grid:
             problems.setdefault(problem, []).append(label)
     if not scenarios:
         problems["exclude leaves nothing to make"] = ["all"]
-    grid = Grid(settings=settings, scenarios=tuple(scenarios), tags=tuple(tags), left_out=left_out)
-    told = [f"{shorten(place)}: scenario {name_some(named)}: {rule}" for rule, named in problems.items()]
-    idle = list(_impossible_conditions(settings))
-    if is_known and not problems and not idle:
-        idle = list(_idle_conditions(settings, used, tags))
-    told += [f"{shorten(place)}: {problem}" for problem in idle]
-    if told:
+    grid = Grid(
+        settings=settings,
+        scenarios=tuple(scenarios),
+        tags=tuple(tags),
+        left_out=left_out,
+        idle=tuple(sorted(idle)),
+    )
+    if problems:
+        told = [f"{shorten(place)}: scenario {name_some(named)}: {rule}" for rule, named in problems.items()]
         raise FaultyGrid(cap_problems(told), grid)
     return grid
 
 
-def _impossible_conditions(settings: GridFile) -> Iterator[str]:
-    named = {f"exclude.{number}": condition for number, condition in enumerate(settings.exclude)}
-    for name, condition in (
-        named | {f"splits.{split}": one for split, one in settings.splits.items()}
-    ).items():
-        for problem in condition.list_impossible():
-            yield f"{name}.{problem}"
+def _find_impossible_conditions(settings: GridFile, place: Path) -> list[str]:
+    """Return a sentence for each value of a condition that its field never has."""
+    exclude = {f"exclude.{number}": condition for number, condition in enumerate(settings.exclude)}
+    splits = {f"splits.{name}": condition for name, condition in settings.splits.items()}
+    return [
+        f"{shorten(place)}: {name}.{problem}"
+        for name, condition in (exclude | splits).items()
+        for problem in condition.list_impossible()
+    ]
 
 
-def _idle_conditions(
-    settings: GridFile, used: Collection[int], tags: Sequence[tuple[str, str]]
-) -> Iterator[str]:
-    """Yield a sentence for each split without a clip, and each condition of ``exclude`` that nothing meets: a mistyped
-    number. Where values are drawn, the draw may leave a condition without a clip."""
-    filled = {split for split, _ in tags}
-    for split in settings.splits:
-        if split not in filled:
-            yield f"splits.{split}: gets no clip; correct its condition or those before it, or remove it"
-    for number in range(len(settings.exclude)):
-        if number not in used and settings.latin_hypercube is None:
-            yield f"exclude.{number}: leaves nothing out; correct its condition or remove it"
+def _find_idle_conditions(grid: Grid, place: Path) -> list[str]:
+    """Return a sentence for each split without a clip, and each condition of ``exclude`` that nothing meets.
+
+    Such a number is mistyped. Where values are drawn, the draw may leave a condition without a clip. The grid of a
+    frozen manifest is not asked: it makes what it made.
+    """
+    filled = {split for split, _ in grid.tags}
+    problems = [
+        f"{shorten(place)}: splits.{split}: gets no clip; correct its condition or those before it, or remove it"
+        for split in grid.settings.splits
+        if split not in filled
+    ]
+    if grid.settings.latin_hypercube is None:
+        problems += [
+            f"{shorten(place)}: exclude.{number}: leaves nothing out; correct its condition or remove it"
+            for number in grid.idle
+        ]
+    return problems

@@ -1,6 +1,7 @@
 """The ways to write a grid down, what it leaves out, its splits, and its place in the calibrated range."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from jsonschema import Draft202012Validator
 
 from catalogs.calibrated_range import calibration_tag, load_calibrated_range
 from catalogs.entries import entry_names, find_entry
-from catalogs.grids import GridFile, expand_grid
+from catalogs.grids import GridFile, expand_grid, load_grid
 from catalogs.grids.schema import grid_schema
 from catalogs.scenario import Scenario
 from catalogs.studies import load_conditions
@@ -18,6 +19,12 @@ from tasks.errors import InputError
 
 def grid_of(text: str):
     return expand_grid(GridFile.model_validate(yaml.safe_load(text) | {"name": "t"}), "t")
+
+
+def write_grid(folder: Path, body: str) -> Path:
+    file = folder / "grid.yaml"
+    file.write_text(f"{{name: t, {AXES}, {body}}}")
+    return file
 
 
 def speeds(grid) -> list[tuple[str, float]]:
@@ -127,14 +134,14 @@ def test_a_condition_of_unknown_words_is_refused(condition):
         ("hold_speed: 'yes'", "hold_speed: must be true or false; it is 'yes'"),
     ],
 )
-def test_a_condition_that_no_scenario_can_meet_is_refused(condition, told):
+def test_a_condition_that_no_scenario_can_meet_is_refused(tmp_path, condition, told):
     """It left nothing out, and its clips went to the split that takes the rest."""
     for name, body in (
         ("exclude.0", f"exclude: [{{{condition}}}]"),
         ("splits.a", f"splits: {{a: {{{condition}}}, b: {{}}}}"),
     ):
         with pytest.raises(InputError) as caught:
-            grid_of(f"{{{AXES}, {body}}}")
+            load_grid(write_grid(tmp_path, body))
         assert [problem.split(": ", 1)[1] for problem in caught.value.problems if f"{name}.{told}" in problem]
 
 
@@ -146,14 +153,20 @@ def test_a_condition_that_no_scenario_can_meet_is_refused(condition, told):
         ("splits: {train: {}, test: {weather: rain}}", r"splits\.test: gets no clip"),
     ],
 )
-def test_a_condition_that_no_clip_of_the_grid_meets_is_refused(body, told):
+def test_a_condition_that_no_clip_of_the_grid_meets_is_refused(tmp_path, body, told):
     with pytest.raises(InputError, match=told):
-        grid_of(f"{{{AXES}, {body}}}")
+        load_grid(write_grid(tmp_path, body))
 
 
-def test_a_draw_may_leave_nothing_out():
+def test_the_grid_of_a_frozen_manifest_makes_what_it_made():
+    assert grid_of(f"{{{AXES}, exclude: [{{precipitation_mm_h: 51}}]}}").idle == (0,)
+
+
+def test_a_draw_may_leave_nothing_out(tmp_path):
     cube = "latin_hypercube: {count: 3, ranges: {initial_speed_km_h: [30, 70]}}"
-    assert grid_of(f"{{{cube}, exclude: [{{initial_speed_km_h: {{min: 69.999}}}}]}}").left_out == 0
+    file = tmp_path / "grid.yaml"
+    file.write_text(f"{{name: t, {cube}, exclude: [{{initial_speed_km_h: {{min: 69.999}}}}]}}")
+    assert load_grid(file).left_out == 0
 
 
 def test_the_papers_conditions_have_the_papers_relationship():
