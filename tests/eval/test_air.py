@@ -34,6 +34,9 @@ def test_the_light_of_the_air_is_that_of_the_sky_or_unknown() -> None:
     greys, depth = np.full((20, 30), 40, np.uint8), np.full((20, 30), 9.0, np.float32)
     greys[:10], depth[:10] = 188, np.nan
     assert sky_light(greys, depth) == pytest.approx(0.503, abs=1e-3)  # sRGB 188 is half the light
+    blue_above = greys.copy()
+    blue_above[:5] = 150
+    assert sky_light(blue_above, depth) is None
     depth.ravel()[LEAST_SKY - 1 :] = 9.0
     assert sky_light(greys, depth) is None
 

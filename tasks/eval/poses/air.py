@@ -17,6 +17,9 @@ LEAST_EXTINCTION = 1e-3
 and textures that lose contrast with distance look as much [1/m]."""
 LEAST_SKY = 100
 """Fewest pixels that show the light of the air [px]."""
+LEAST_EVENNESS = 0.8
+"""Least 5th over 95th percentile of the sky's light: a clear sky is uneven (.4 to .6 on our streets), and so is what
+shows through holes of a scene; one of thick air is not (.98) [1]."""
 FIT_PASSES = 10
 """Weighted solutions one after the other [1]."""
 
@@ -47,15 +50,18 @@ def linear_light(grey: NDArray[np.float32]) -> Floats:
 
 
 def sky_light(greys: NDArray[np.uint8], depth: NDArray[np.float32]) -> float | None:
-    """Return the median linear light of what has no depth, the sky; None where too little of it shows.
+    """Return the median linear light of what has no depth, the sky; None where too little of it shows or it is uneven.
 
     Parameters
     ----------
     greys : uint8 [..., H, W] grey levels [1]
     depth : float32 [..., H, W] camera z, NaN where there is nothing [m]
     """
-    sky = greys[~np.isfinite(depth)]
-    return float(LINEAR_LIGHT[int(np.median(sky))]) if len(sky) >= LEAST_SKY else None
+    sky = LINEAR_LIGHT[greys[~np.isfinite(depth)]]
+    if len(sky) < LEAST_SKY:
+        return None
+    dark, middle, bright = np.percentile(sky, [5, 50, 95])
+    return float(middle) if dark >= LEAST_EVENNESS * bright else None
 
 
 def fit_extinction(far: Floats, near: Floats, nearing: Floats, light: float) -> float:
