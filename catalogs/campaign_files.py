@@ -161,7 +161,7 @@ def parse_columns(
             if problems:
                 raise InputError(problems)
             table = parquet.read(columns=found)
-            columns = {name: np.asarray(table[name].to_numpy(), dtype=np.float64) for name in found}
+            columns = {name: _as_floats(table[name].combine_chunks()) for name in found}
             units = {name: _read_unit(schema.field(name)) for name in found}
     except InputError:
         raise
@@ -202,6 +202,12 @@ def _column_problems(schema: pa.Schema, found: Sequence[str], count: int, file: 
     if not 0 <= count <= MOST_SAMPLES:
         problems.append(f"{file} must have at most {MOST_SAMPLES} samples; it has {count}")
     return problems
+
+
+def _as_floats(column: pa.Array) -> NDArray[np.float64]:
+    """Return the numbers of a column, null as NaN; Arrow's own way imports pandas, a sixth of a verdict's start."""
+    numbers = column.to_numpy(zero_copy_only=False) if column.null_count else np.from_dlpack(column)
+    return np.array(numbers, dtype=np.float64)
 
 
 def _read_unit(field: pa.Field) -> str | None:
