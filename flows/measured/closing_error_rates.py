@@ -30,11 +30,18 @@ def tell_error_rates(named: list[str]) -> list[str]:
         }
         wrong = ", ".join(f"{truth} ({count})" for truth, count in others.items()) or "none"
         lines.append(f"{name} in the data: {told}; named where the data held something else: {wrong}")
-    if rates["engine_sha256"] != engine_hash():
-        lines.append(
-            f"counted with engine {rates['engine_sha256'][:12]}; this verdict is of {engine_hash()[:12]}"
-        )
-    return lines
+    return lines + _tell_engine(rates, engine_hash())
+
+
+def _tell_engine(rates: dict[str, Any], engine: str) -> list[str]:
+    """Return a sentence where the counts are not of the engine of this verdict."""
+    if rates["engine_sha256"] == engine:
+        return []
+    told = f"counted with engine {rates['engine_sha256'][:12]}; this verdict is of {engine[:12]}"
+    again = rates.get("repeated_by", {})
+    if again.get("engine_sha256") == engine:
+        told += f", which judged {again['campaigns']} of those campaigns again, with the same digits"
+    return [told]
 
 
 def _share(share: dict[str, Any]) -> str:

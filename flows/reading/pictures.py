@@ -24,7 +24,7 @@ def open_frames_store(layout: Layout, manifest: Mapping[str, Any]) -> Any:
     ------
     InputError
         If the dataset was made without frames, a folder lacks some of them, which Zarr would take for black, or their
-        metadata are not those that muSync writes.
+        metadata are not those that muSync writes. In an object store one that is missing is told when it is read.
     """
     grid = manifest["grid"]
     if not grid.get("pictures", True):
@@ -38,7 +38,7 @@ def open_frames_store(layout: Layout, manifest: Mapping[str, Any]) -> Any:
         objects = Objects(f"{layout.origin}/{layout.frames.name}")
         read, members = objects.read, objects.folders()
     check_frames(read, members, f"{layout}/{layout.frames.name}", len(manifest["clips"]), grid["frames"])
-    return frames_store(layout)
+    return frames_store(layout, (path for clip in manifest["clips"] for path in clip["artifacts"]))
 
 
 def _refuse_missing(layout: Layout, manifest: Mapping[str, Any]) -> None:

@@ -207,11 +207,19 @@ def stored_bytes(layout: Layout) -> int:
     return sum(path.stat().st_size for path in layout.root.rglob("*") if path.is_file())
 
 
-def frames_store(layout: Layout) -> Any:
-    """Return the Zarr store of the frames, which are read from the folder or the object store."""
-    return (
-        layout.frames if layout.origin is None else Objects(f"{layout.origin}/{layout.frames.name}").as_zarr()
-    )
+def frames_store(layout: Layout, recorded: Iterable[str]) -> Any:
+    """Return the Zarr store of the frames, which are read from the folder or the object store.
+
+    Parameters
+    ----------
+    layout : of the dataset
+    recorded : files of the dataset that its manifest records
+    """
+    if layout.origin is None:
+        return layout.frames
+    inside = f"{layout.frames.name}/"
+    names = frozenset(path.removeprefix(inside) for path in recorded if path.startswith(inside))
+    return Objects(f"{layout.origin}/{layout.frames.name}").as_zarr(names)
 
 
 def _describe_unfinished(objects: Objects) -> str:

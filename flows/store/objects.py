@@ -143,11 +143,13 @@ class Objects:
         self._each(bring, names)
         return sorted(absent)
 
-    def as_zarr(self) -> Any:
-        """The objects as a Zarr store that reads each chunk when it is asked for."""
+    def as_zarr(self, recorded: Collection[str]) -> Any:
+        """The objects as a Zarr store that reads a chunk when it is asked for; a recorded one must be there."""
         from zarr.storage import ObjectStore
 
-        return ObjectStore(self._store, read_only=True)
+        from flows.store.recorded_objects import RecordedObjects
+
+        return RecordedObjects(ObjectStore(self._store, read_only=True), recorded, self.address)
 
     def _each(self, function: Callable[[str], Any], names: Collection[str]) -> None:
         with ThreadPoolExecutor(AT_ONCE) as pool:

@@ -33,7 +33,12 @@ def test_it_names_what_was_right_and_what_was_taken_for_the_effect(monkeypatch: 
     assert "brake_lag in the data: 1 refused, 1 right" in page
     assert "named where the data held something else: brake_dead_time (1), nothing (1)" in page
     assert "headwind: not among the effects that were tried" in page
-    assert "counted with engine eeeeeeeeeeee; this verdict is of ffffffffffff" in page
+    assert page.endswith("counted with engine eeeeeeeeeeee; this verdict is of ffffffffffff")
+    rates["repeated_by"] = {"engine_sha256": "f" * 64, "campaigns": 57}
+    page = "; ".join(tell_error_rates(["brake_lag"]))
+    assert page.endswith("which judged 57 of those campaigns again, with the same digits")
+    monkeypatch.setattr(closing_error_rates, "engine_hash", lambda: "e" * 64)
+    assert "engine" not in "; ".join(tell_error_rates(["brake_lag"]))
 
 
 def test_the_counts_that_ship_have_nulls_and_every_truth_as_often() -> None:

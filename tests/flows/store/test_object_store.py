@@ -107,6 +107,19 @@ def test_analysts_read_single_frames_from_the_store_and_windows_from_their_cache
     assert windows[0]["rgb"].shape[0] == 3
 
 
+def test_a_missing_object_is_no_black_picture(stored, machine, toy_dataset):
+    name = next(name for name in Objects(stored).sizes() if name.startswith("frames.zarr/rgb/c/1/"))
+    kept = Objects(stored).read(name)
+    Objects(stored).remove([name])
+    try:
+        data = musync.open(stored)
+        assert np.array_equal(data.frames["rgb"][2, 5], read_clip(toy_dataset.frames, 2, "rgb")[5])
+        with pytest.raises(InputError, match=r"frames\.zarr/rgb/c/1/.*: missing, with pictures of a clip"):
+            data.frames["rgb"][1, 5]
+    finally:
+        Objects(stored).write(name, kept)
+
+
 def test_one_flipped_bit_is_named_and_repaired_and_no_reader_gets_it(stored, machine):
     objects = Objects(stored)
     name = "telemetry/ticks/family=snow/part-0000.parquet"
