@@ -104,7 +104,7 @@ def clear_between_samples(
 
 
 def take_updates(signal: Signal) -> Signal:
-    """Return the samples of a signal that bring a new value, where the logger repeats each for a fixed number of rows.
+    """Return a signal without the rows that repeat a sample, where the logger does so for a fixed number of rows.
 
     A table with one row per 10 ms holds a receiver's 10 Hz as ten equal rows. A coarse sensor repeats values too, but
     not for the same number of rows each time, and by one step of its resolution. An input is left as it is: a command
@@ -130,5 +130,7 @@ def take_updates(signal: Signal) -> Signal:
         updates[i] + np.round(np.arange(n) * holds[i] / n).astype(np.int64)
         for i, n in enumerate(multiples.astype(np.int64))
     ]
-    rows = np.concatenate((*starts, updates[-1:]))
+    before = np.arange(updates[0] - usual, -1, -usual)[::-1]
+    after = np.arange(updates[-1], len(signal.values), usual)
+    rows = np.concatenate((before, *starts, after))
     return Signal(time=signal.time[rows], values=signal.values[rows], unit=signal.unit)
