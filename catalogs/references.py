@@ -99,7 +99,7 @@ class ReferenceCase(BaseModel):
 
     @property
     def control(self) -> str:
-        """What the case varies, as the paper's table of held-out cases groups it: road, weather or brake."""
+        """Variable of the case, as the paper's table of held-out cases groups it: road, weather or brake."""
         return "road" if self.hazard_height_m != 0 else "weather" if self.weather != DRY else "brake"
 
     def controls(self) -> Controls:

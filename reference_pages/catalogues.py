@@ -212,4 +212,4 @@ WRITERS = {
     "reference/catalogues/others.md": write_other_kinds_page,
     "reference/catalogues/rules.md": write_rules_page,
 }
-"""What writes each page, by its path below ``docs/``."""
+"""Function that writes each page, by its path below ``docs/``."""

@@ -133,4 +133,4 @@ def write_module_page(title: str, introduction: str, objects: tuple[str, ...]) -
 
 
 WRITERS = {f"reference/python/{name}.md": partial(write_module_page, *page) for name, page in PAGES.items()}
-"""What writes each page, by its path below ``docs/``."""
+"""Function that writes each page, by its path below ``docs/``."""

@@ -1,4 +1,4 @@
-"""What the documents tell a reader to type exists, and what they link to is there."""
+"""Commands that the documents tell a reader to type exist, and so do the targets of their links."""
 
 import ast
 import importlib

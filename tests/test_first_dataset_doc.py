@@ -24,7 +24,7 @@ TEXT = PAGE.read_text()
 
 @pytest.fixture(scope="module")
 def walked(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """What each command printed, and what the Python did."""
+    """Return the text that each command and the Python printed."""
     folder = tmp_path_factory.mktemp("first")
     grid = yaml.safe_load((SOURCE_ROOT / "catalogs" / "grids" / "demo.yaml").read_text())
     grid["axes"]["road"] = {"flat-braking": grid["axes"]["road"]["flat-braking"]}

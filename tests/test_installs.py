@@ -1,4 +1,4 @@
-"""What `make` installs is one choice within the bounds of pyproject.toml, with hashes, on every Python stated."""
+"""The packages that `make` installs are one choice within pyproject.toml's bounds, with hashes, for every Python."""
 
 import re
 import tomllib

@@ -18,7 +18,7 @@ Reference = Annotated[str, Field(min_length=1, max_length=4096)]
 """Name or file of an entry; 4096 characters are the longest path."""
 
 BEFORE = {"low_speed": "literal", "variant": "full"}
-"""What a record means that lacks a setting; for ``low_speed`` grid files mean another default."""
+"""Value of a setting that a record lacks; for ``low_speed`` grid files mean another default."""
 
 
 class GridFile(Blocks):

@@ -1,4 +1,4 @@
-"""What the paper prints of its vehicle model against CarSim, by split and group of cases."""
+"""The paper's printed agreement of its vehicle model with CarSim, by split and group of cases."""
 
 from functools import cache
 from pathlib import Path

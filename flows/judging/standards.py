@@ -38,7 +38,7 @@ class MeantMotion:
 
 @dataclass(frozen=True, kw_only=True)
 class Standard:
-    """What the motion of each clip is compared with.
+    """Motion that each clip is compared with.
 
     Parameters
     ----------

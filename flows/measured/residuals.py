@@ -1,4 +1,4 @@
-"""What the models of a verdict predict for each measured run, whichever search reached it, and what is left over."""
+"""Predictions of a verdict's models for each measured run, whichever search reached it, and the residuals."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -89,7 +89,7 @@ def _cut_row_groups(tables: Iterable[pa.Table]) -> Iterator[pa.Table]:
 
 
 class _Pieces:
-    """What a Parquet writer has written and nobody has taken yet."""
+    """Bytes that a Parquet writer has written and nobody has taken yet."""
 
     closed = False
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tasks.campaign.channel_validation import frozen_problem, plausibility_problems, signal_problems
 from tasks.campaign.channels import CHANNELS_BY_NAME
 from tasks.campaign.signals import Signal
-from tasks.campaign.slow_channels import fill_between_samples, find_samples
+from tasks.campaign.slow_channels import fill_between_samples, mark_samples
 
 COLUMN_UNITS = {"time": "s", **{name: channel.unit for name, channel in CHANNELS_BY_NAME.items()}}
 LEAST_SAMPLES = 20
@@ -56,7 +56,7 @@ def run_problems(
     for name in COLUMN_UNITS:
         if name == "time" or name not in columns:
             continue
-        own = find_samples(name, columns[name])
+        own = mark_samples(name, columns[name])
         signal = Signal(time=clock[own], values=columns[name][own])
         gaps = signal_problems(signal)
         problems += [f"channel {name} has a gap: it {problem}" for problem in gaps]

@@ -22,7 +22,7 @@ SHORTEST_UNEVEN = 4
 """Samples of a hold from which one sample more or less is the logger's jitter."""
 
 
-def find_samples(name: str, values: NDArray[np.float64]) -> NDArray[np.bool_]:
+def mark_samples(name: str, values: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Return the instants at which a channel has a sample, bool [N]; all of them where the channel is not slow.
 
     Parameters
@@ -44,7 +44,7 @@ def fill_between_samples(name: str, values: NDArray[np.float64]) -> NDArray[np.f
     name : channel
     values : float64 [N], NaN where there is no sample
     """
-    found = find_samples(name, values)
+    found = mark_samples(name, values)
     if found.all():
         return values
     return np.interp(np.arange(len(values)), np.flatnonzero(found), values[found])
@@ -59,7 +59,7 @@ def collect_samples(columns: Mapping[str, NDArray[np.float64]]) -> NDArray[np.bo
     """
     count = len(next(iter(columns.values())))
     everywhere = np.ones(count, dtype=bool)
-    found = [find_samples(name, columns[name]) if name in columns else everywhere for name in CHANNELS]
+    found = [mark_samples(name, columns[name]) if name in columns else everywhere for name in CHANNELS]
     sampled = np.column_stack(found)
     return None if sampled.all() else sampled
 
@@ -75,7 +75,7 @@ def measure_slow_rates(runs: Sequence[Mapping[str, NDArray[np.float64]]], rate: 
     steps: dict[str, list[NDArray[np.int64]]] = {}
     for columns in runs:
         for name, values in columns.items():
-            if not (found := find_samples(name, values)).all():
+            if not (found := mark_samples(name, values)).all():
                 steps.setdefault(name, []).append(np.diff(np.flatnonzero(found)))
     return {name: round(rate / float(np.mean(np.concatenate(own))), 1) for name, own in steps.items()}
 

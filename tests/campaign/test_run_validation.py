@@ -1,4 +1,4 @@
-"""What a vehicle really does beyond the model is no fault of its measurement."""
+"""Motion of a real vehicle that the model lacks is no fault of its measurement."""
 
 from dataclasses import replace
 

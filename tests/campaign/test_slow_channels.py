@@ -9,7 +9,7 @@ from tasks.campaign.signals import ChannelRule, Signal
 from tasks.campaign.slow_channels import (
     collect_samples,
     fill_between_samples,
-    find_samples,
+    mark_samples,
     measure_slow_rates,
     take_updates,
 )
@@ -24,13 +24,13 @@ def keep_every(values: np.ndarray, every: int) -> np.ndarray:
 
 
 def test_a_channel_with_a_value_at_few_instants_is_slow_and_one_that_misses_single_values_has_gaps() -> None:
-    assert find_samples("speed", keep_every(SPEED, 10)).sum() == 60
+    assert mark_samples("speed", keep_every(SPEED, 10)).sum() == 60
     holed = np.where(np.isin(np.arange(600), (7, 300, 301)), np.nan, SPEED)
-    assert find_samples("speed", holed).all()
+    assert mark_samples("speed", holed).all()
 
 
 def test_an_input_must_have_a_value_at_every_instant() -> None:
-    assert find_samples("brake_pressure", keep_every(SPEED, 10)).all()
+    assert mark_samples("brake_pressure", keep_every(SPEED, 10)).all()
 
 
 def test_a_slow_channel_is_linear_between_its_samples() -> None:

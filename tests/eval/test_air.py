@@ -6,11 +6,11 @@ import pytest
 import tasks.eval.poses.photometric as photometric
 from benchmarks.synthetic_street import Clip
 from tasks.conventions import SemanticClass
-from tasks.eval.poses.air import LEAST_SKY, Air, fit_extinction, sky_light, take_air_away
+from tasks.eval.poses.air import LEAST_SKY, Air, fit_extinction, measure_sky_light, take_air_away
 from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.poses.photometric import recover_motion_photometric
 from tests.eval.scoring import pitch_rmse_deg, progress_rmse
-from tests.eval.weathering import veiled
+from tests.eval.weathering import add_veil
 
 LIGHT = 0.88
 
@@ -33,18 +33,18 @@ def test_extinction_is_found_beside_surfaces_that_change_for_other_reasons() -> 
 def test_the_light_of_the_air_is_that_of_the_sky_or_unknown() -> None:
     greys, depth = np.full((20, 30), 40, np.uint8), np.full((20, 30), 9.0, np.float32)
     greys[:10], depth[:10] = 188, np.nan
-    assert sky_light(greys, depth) == pytest.approx(0.503, abs=1e-3)  # sRGB 188 is half the light
+    assert measure_sky_light(greys, depth) == pytest.approx(0.503, abs=1e-3)  # sRGB 188 is half the light
     blue_above = greys.copy()
     blue_above[:5] = 150
-    assert sky_light(blue_above, depth) is None
+    assert measure_sky_light(blue_above, depth) is None
     depth.ravel()[LEAST_SKY - 1 :] = 9.0
-    assert sky_light(greys, depth) is None
+    assert measure_sky_light(greys, depth) is None
 
 
 def test_a_surface_is_as_bright_without_air_at_any_range(hump_clip: Clip) -> None:
     surface = np.full((1, *hump_clip.depth.shape[1:], 3), 90, np.uint8)
     depth, K = hump_clip.depth[:1], hump_clip.K
-    seen = veiled(surface, depth, K, 0.006, LIGHT)[0, ..., 0]
+    seen = add_veil(surface, depth, K, 0.006, LIGHT)[0, ..., 0]
     near = depth[0] < 80
     assert np.ptp(seen[near]) > 30
     clear = take_air_away(seen, depth[0], K, Air(extinction=0.006, light=LIGHT))
@@ -56,7 +56,7 @@ def test_a_surface_is_as_bright_without_air_at_any_range(hump_clip: Clip) -> Non
 def test_veil_that_thins_as_things_come_nearer_is_no_motion(
     full_clip: Clip, extinction: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    frames = veiled(full_clip.frames, full_clip.depth, full_clip.K, extinction, LIGHT)
+    frames = add_veil(full_clip.frames, full_clip.depth, full_clip.K, extinction, LIGHT)
     seen = recover_motion(full_clip, frames)
     assert pitch_rmse_deg(seen, full_clip) < 0.003
     assert progress_rmse(seen, full_clip) < 0.001

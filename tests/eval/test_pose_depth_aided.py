@@ -13,7 +13,7 @@ from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.poses.photometric import recover_motion_photometric
 from tasks.eval.poses.pnp import recover_motion_pnp
 from tests.eval.scoring import pitch_rmse_deg, progress_rmse
-from tests.eval.weathering import faded, jpeg_coded, with_flakes, with_noise
+from tests.eval.weathering import add_flakes, add_noise, code_as_jpeg, fade_pictures
 
 Check = Callable[..., RecoveredMotion]
 CLEAR_DEG = {"pnp": 0.02, "photometric": 0.01}
@@ -83,10 +83,10 @@ def test_weather_and_codec_at_most_double_the_allowance(
     hump_clip: Clip, check: Check, method: str, weather: str
 ) -> None:
     change = {
-        "flakes": with_flakes,
-        "jpeg": lambda f: jpeg_coded(f, 70),
-        "noise": lambda f: with_noise(f, 3.0),
-        "fog": lambda f: faded(f, 0.25),
+        "flakes": add_flakes,
+        "jpeg": lambda f: code_as_jpeg(f, 70),
+        "noise": lambda f: add_noise(f, 3.0),
+        "fog": lambda f: fade_pictures(f, 0.25),
     }[weather]
     cut = replace(hump_clip, pitch=hump_clip.pitch[:14], station=hump_clip.station[:14])
     seen = recover_motion(check, hump_clip, upto=14, frames=change(hump_clip.frames[:14]))
@@ -105,7 +105,7 @@ def test_one_picture_repeated_is_a_car_that_stands_with_particles_or_without(
     assert np.abs(bare.progress).max() < 1e-6 and np.abs(bare.pitch).max() < 1e-6
     assert not bare.failed.any()
     assert np.isnan(bare.normalised_path).all()
-    snowing = recover_motion(check, hump_clip, frames=with_flakes(still), depth=depth, unusable=sky)
+    snowing = recover_motion(check, hump_clip, frames=add_flakes(still), depth=depth, unusable=sky)
     assert np.abs(snowing.progress).max() < 0.01
     assert np.rad2deg(np.abs(snowing.pitch)).max() < 0.02
 
@@ -148,7 +148,7 @@ def test_pictures_of_nothing_common_are_not_given_a_pose(hump_clip: Clip, check:
 def test_the_error_is_within_a_few_of_its_own_uncertainties(hump_clip: Clip, check: Check) -> None:
     clear, noisy = (
         recover_motion(check, hump_clip),
-        recover_motion(check, hump_clip, frames=with_noise(hump_clip.frames, 8.0)),
+        recover_motion(check, hump_clip, frames=add_noise(hump_clip.frames, 8.0)),
     )
     assert (np.abs(clear.pitch - hump_clip.pitch)[1:] < 5 * clear.pitch_std[1:]).all()
     assert (np.abs(clear.progress - hump_clip.station)[1:] < 5 * clear.progress_std[1:]).all()

@@ -10,7 +10,7 @@ from tasks.errors import InputError
 from tasks.eval.poses.essential import recover_motion_essential
 from tasks.eval.poses.motion import RecoveredMotion
 from tests.eval.scoring import normalised_progress_rmse, pitch_rmse_deg
-from tests.eval.weathering import faded, jpeg_coded, with_flakes
+from tests.eval.weathering import add_flakes, code_as_jpeg, fade_pictures
 
 
 def recover_motion(clip: Clip, frames: np.ndarray | None = None) -> RecoveredMotion:
@@ -41,7 +41,11 @@ def test_no_scale_means_no_metres(hump_clip: Clip) -> None:
 
 @pytest.mark.parametrize("weather", ["flakes", "jpeg", "fog"])
 def test_weather_and_codec_at_most_double_the_allowance(full_clip: Clip, weather: str) -> None:
-    change = {"flakes": with_flakes, "jpeg": lambda f: jpeg_coded(f, 70), "fog": lambda f: faded(f, 0.25)}
+    change = {
+        "flakes": add_flakes,
+        "jpeg": lambda f: code_as_jpeg(f, 70),
+        "fog": lambda f: fade_pictures(f, 0.25),
+    }
     seen = recover_motion(full_clip, change[weather](full_clip.frames))
     assert not seen.failed.any()
     assert pitch_rmse_deg(seen, full_clip) < 0.06

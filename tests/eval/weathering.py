@@ -1,11 +1,11 @@
-"""What weather and codecs do to finished frames, without touching the motion in them."""
+"""Weather and codecs over finished frames; the motion in them stays."""
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 
-def with_flakes(frames: NDArray[np.uint8], count: int = 150, seed: int = 0) -> NDArray[np.uint8]:
+def add_flakes(frames: NDArray[np.uint8], count: int = 150, seed: int = 0) -> NDArray[np.uint8]:
     """Bright discs at new places in every frame."""
     rng = np.random.default_rng(seed)
     fallen = frames.copy()
@@ -21,24 +21,24 @@ def with_flakes(frames: NDArray[np.uint8], count: int = 150, seed: int = 0) -> N
     return fallen
 
 
-def jpeg_coded(frames: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
+def code_as_jpeg(frames: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
     """Each frame through lossy block coding."""
     coded = [cv2.imencode(".jpg", f, [cv2.IMWRITE_JPEG_QUALITY, quality])[1] for f in frames]
     return np.stack([cv2.imdecode(c, cv2.IMREAD_COLOR) for c in coded])
 
 
-def with_noise(frames: NDArray[np.uint8], sigma: float, seed: int = 0) -> NDArray[np.uint8]:
+def add_noise(frames: NDArray[np.uint8], sigma: float, seed: int = 0) -> NDArray[np.uint8]:
     """Independent sensor noise [grey levels]."""
     noisy = frames + np.random.default_rng(seed).normal(0, sigma, frames.shape)
     return np.clip(np.rint(noisy), 0, 255).astype(np.uint8)
 
 
-def faded(frames: NDArray[np.uint8], contrast: float) -> NDArray[np.uint8]:
+def fade_pictures(frames: NDArray[np.uint8], contrast: float) -> NDArray[np.uint8]:
     """As through fog of one density."""
     return np.rint(190 + (frames - 190.0) * contrast).astype(np.uint8)
 
 
-def veiled(
+def add_veil(
     frames: NDArray[np.uint8],
     depth: NDArray[np.float32],
     K: NDArray[np.float64],

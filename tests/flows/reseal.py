@@ -1,4 +1,4 @@
-"""What a forger does after changing files: the recorded hashes and the seal made again, as anyone can."""
+"""A forger's last step after changing files: the recorded hashes and the seal made again, as anyone can."""
 
 import json
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""What starts often imports little: a verdict nothing that draws, a worker nothing but what makes clips."""
+"""Processes that start often import little: a verdict nothing that draws, a worker only what makes clips."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""What the fuzzer found, kept: each is a change of a sound document that its loader must refuse in a sentence.
+"""Cases that the fuzzer found: each is a change of a sound document that its loader must refuse in a sentence.
 
 `TEXTS` take a whole file's place. `PLACES` put a value into a tree, `WORDS` replace bytes, `COLUMNS` replace a column
 of Parquet; each names the parser of `benchmarks.fuzzing.parsers` and the file of its sound document.

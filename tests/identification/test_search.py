@@ -1,4 +1,4 @@
-"""What the search stands on: forked runs, numerical doubt, nuisances taken over, experiments, look-alikes."""
+"""Parts of the search: forked runs, numerical doubt, nuisances taken over, experiments, look-alikes."""
 
 import sys
 from dataclasses import replace

@@ -24,7 +24,7 @@ NOTHING = np.zeros(len(EFFECT_TABLE))
 
 
 @pytest.fixture(scope="module")
-def campaign() -> Campaign:
+def slow_campaign() -> Campaign:
     runs = []
     for k in range(4):
         run = measured(plain_run(25.0, 1.2 + 0.3 * k, name=f"run-{k}"), NOTHING, k).run
@@ -44,13 +44,13 @@ def campaign() -> Campaign:
 
 
 @pytest.fixture(scope="module")
-def prepared(campaign: Campaign) -> tuple[Evidence, Fit]:
+def prepared_evidence(slow_campaign: Campaign) -> tuple[Evidence, Fit]:
     effects = tuple(effect for effect in load_effects() if effect.name in ("headwind", "brake_lag"))
-    return prepare_evidence(campaign, VEHICLE, SURFACE, effects, load_decision_rules())
+    return prepare_evidence(slow_campaign, VEHICLE, SURFACE, effects, load_decision_rules())
 
 
-def test_residuals_and_derivatives_are_zero_between_samples(prepared: tuple[Evidence, Fit]) -> None:
-    evidence, null = prepared
+def test_residuals_and_derivatives_are_zero_between_samples(prepared_evidence: tuple[Evidence, Fit]) -> None:
+    evidence, null = prepared_evidence
     noisier = {
         run.model.run.name: RunNoise(rho=run.rho, sigma=2.0 * run.sigma)
         for run in (*evidence.train, *evidence.held_out)
@@ -71,23 +71,25 @@ def test_residuals_and_derivatives_are_zero_between_samples(prepared: tuple[Evid
                 assert (columns[between] == 0.0).all() and (columns[~between] != 0.0).any()
 
 
-def test_the_score_counts_samples_and_no_instants(prepared: tuple[Evidence, Fit]) -> None:
-    evidence, _ = prepared
+def test_the_score_counts_samples_and_no_instants(prepared_evidence: tuple[Evidence, Fit]) -> None:
+    evidence, _ = prepared_evidence
     instants = sum(run.model.samples for run in evidence.train)
     assert evidence.samples == pytest.approx(6 * instants + instants / 10, abs=2)
 
 
-def test_a_model_without_fault_leaves_the_noise_of_its_samples(prepared: tuple[Evidence, Fit]) -> None:
-    evidence, _ = prepared
+def test_a_model_without_fault_leaves_the_noise_of_its_samples(
+    prepared_evidence: tuple[Evidence, Fit],
+) -> None:
+    evidence, _ = prepared_evidence
     for run in evidence.train:
         left = run.compute_residual(NOTHING).reshape(-1, len(CHANNELS))[:, SPEED]
         assert float(np.sum(left**2)) == pytest.approx(len(run.model.find_samples(SPEED)), rel=0.8)
     assert evidence.sensors[1][SPEED] == pytest.approx(NOISE[SPEED], rel=0.6)
 
 
-def test_a_joint_fit_compares_a_slow_channel_at_its_samples(campaign: Campaign) -> None:
+def test_a_joint_fit_compares_a_slow_channel_at_its_samples(slow_campaign: Campaign) -> None:
     rules = load_decision_rules().joint
-    stop = make_stop(campaign.runs[0], VEHICLE, SURFACE, ("speed", "longitudinal_acceleration"), rules)
+    stop = make_stop(slow_campaign.runs[0], VEHICLE, SURFACE, ("speed", "longitudinal_acceleration"), rules)
     numbers = tuple(n for n in load_joint_numbers() if n.name == "pressure_gain")
     (fitted,) = fit_jointly([stop], numbers, [{}])
     assert len(fitted.residuals[0]) == stop.model.samples + len(stop.model.find_samples(SPEED))

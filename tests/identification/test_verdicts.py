@@ -158,7 +158,7 @@ def test_what_stops_of_one_kind_cannot_tell_apart_is_a_set_with_the_run_that_can
 
 
 class TestACarThatIsGrown:
-    """What a vehicle has under ``effects`` and ``forms`` is part of the model that is judged."""
+    """The ``effects`` and ``forms`` of a vehicle are part of the model that is judged."""
 
     GROWN = replace(VEHICLE, name="grown", effects={"lag": 0.08, "drag_area": 0.7})
     FORM = Form(

@@ -1,4 +1,4 @@
-"""What is recorded has one form, and what breaks it does not pass the door."""
+"""A record has one form, and one that breaks it does not pass the door."""
 
 import json
 from copy import deepcopy

@@ -10,7 +10,7 @@ from catalogs.surfaces import load_surface
 from tasks.studies.sensitivity import PrintedFigure, beside_print, latin_hypercube, sensitivity_study
 
 ARCHIVE_SCATTER_M = 0.00137
-"""What the paper states between its own archived and repeated stops."""
+"""The paper's statement of the difference between its own archived and repeated stops."""
 
 
 @pytest.fixture(scope="module")

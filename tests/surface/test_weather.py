@@ -86,6 +86,6 @@ def test_dry_is_the_kind_that_changes_no_picture():
 
 
 def test_no_number_of_the_pavement_is_left_out():
-    """What kinds of weather bring are the fields that a pavement's file does not have."""
+    """Kinds of weather bring the fields that a pavement's file does not have."""
     assert all(value == value for name, value in vars(ASPHALT).items() if name != "bounds")
     assert set(ASPHALT.bounds) <= {field.name for field in fields(SurfaceParameters)}

@@ -1,4 +1,4 @@
-"""What a vehicle adds to the plain model: nothing where it is off, its own signature where it is on, second order."""
+"""Additions of a vehicle to the plain model: nothing where off, its own signature where on, second order."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What lies between command and pads, and the other numbers that a grown vehicle brings into coupled mode."""
+"""The brake line between command and pads, and the other numbers that a grown vehicle brings into coupled mode."""
 
 from dataclasses import replace
 from math import exp

@@ -1,4 +1,4 @@
-"""What the compiled model of an FMU rests on: knots without NumPy, a road under the axles, a late trace."""
+"""Parts of the compiled model of an FMU: knots without NumPy, a road under the axles, a late trace."""
 
 from dataclasses import replace
 

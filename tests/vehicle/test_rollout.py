@@ -1,4 +1,4 @@
-"""What every rollout keeps, in both modes."""
+"""Rules that every rollout keeps, in both modes."""
 
 from math import isnan
 

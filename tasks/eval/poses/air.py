@@ -44,12 +44,12 @@ class Air:
     light: float
 
 
-def linear_light(grey: NDArray[np.float32]) -> Floats:
+def convert_to_linear_light(grey: NDArray[np.float32]) -> Floats:
     """Return the linear light [N] of grey levels [N] between two bytes [1]."""
     return np.interp(grey, np.arange(256), LINEAR_LIGHT)
 
 
-def sky_light(greys: NDArray[np.uint8], depth: NDArray[np.float32]) -> float | None:
+def measure_sky_light(greys: NDArray[np.uint8], depth: NDArray[np.float32]) -> float | None:
     """Return the median linear light of what has no depth, the sky; None where too little of it shows or it is uneven.
 
     Parameters

@@ -10,7 +10,7 @@ BINS_PER_GREY_LEVEL = 4
 
 
 @numba.njit(cache=True, nogil=True)
-def informative_pixels(grey, q, least_gradient, depth_kink):  # type: ignore[no-untyped-def]
+def find_informative_pixels(grey, q, least_gradient, depth_kink):  # type: ignore[no-untyped-def]
     """Return the pixels of a picture that can be aligned to another one.
 
     Neighbours hold nearly the same, so every second one, as on a chequerboard, is left out.
@@ -47,12 +47,14 @@ def informative_pixels(grey, q, least_gradient, depth_kink):  # type: ignore[no-
     return found[:count].copy()
 
 
-def histogram_median(histogram: NDArray[np.int64]) -> float:
+def find_histogram_median(histogram: NDArray[np.int64]) -> float:
+    """Return the median of the absolute residuals that a histogram [256 `BINS_PER_GREY_LEVEL`] counts [1]."""
     half = np.searchsorted(np.cumsum(histogram), max(histogram.sum(), 1) / 2)
     return (float(half) + 0.5) / BINS_PER_GREY_LEVEL
 
 
-def correlation_from_sums(sums: Floats) -> float:
+def compute_correlation(sums: Floats) -> float:
+    """Return the correlation of two samples [1] from the sums n, a, b, aa, bb, ab; 0 where one does not vary."""
     n, a, b, aa, bb, ab = sums
     if n == 0:
         return 0.0
@@ -63,6 +65,22 @@ def correlation_from_sums(sums: Floats) -> float:
 def form_normal_equations(
     pixels: NDArray[np.float32], source: NDArray[np.float32], K: Floats, T: Floats, scale: float, block: int
 ) -> tuple[Floats, Floats, Floats, NDArray[np.int64]]:
+    """Return the normal equations of a small motion that aligns pixels to another picture, with Tukey's weights.
+
+    Parameters
+    ----------
+    pixels : float32 [P, 6] as `find_informative_pixels` returns them
+    source : float32 [H, W] the other picture's grey levels [1]
+    K : float64 [3, 3] intrinsics of both [px]
+    T : float64 [4, 4] from the camera of the pixels to that of the other picture
+    scale : standard deviation of a residual, in grey levels [1]
+    block : side of a block [px]
+
+    Returns
+    -------
+    float64 [6, 6] and [B, 6] weighted J^T J, and J^T r of each of the blocks B of the pixels; float64 [6] sums for
+    `compute_correlation` over the pixels with weight; int64 [256 `BINS_PER_GREY_LEVEL`] count of absolute residuals
+    """
     return _accumulate_normal_equations(
         pixels,
         source,

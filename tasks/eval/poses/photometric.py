@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 from tasks.eval.poses.air import (
     LEAST_EXTINCTION,
     Air,
+    convert_to_linear_light,
     fit_extinction,
-    linear_light,
-    sky_light,
+    measure_sky_light,
     take_air_away,
 )
 from tasks.eval.poses.depth_chain import Attempt, invert_depth, place_frames_by_depth, prepare_on_demand
 from tasks.eval.poses.grey_equations import (
-    correlation_from_sums,
+    compute_correlation,
+    find_histogram_median,
+    find_informative_pixels,
     form_normal_equations,
-    histogram_median,
-    informative_pixels,
 )
 from tasks.eval.poses.links import chained_poses
 from tasks.eval.poses.motion import (
@@ -165,12 +165,12 @@ def _measure_air(
     """
     steps = min(settings.air_steps, len(greys) - 1)
     starts = np.unique(np.linspace(0, len(greys) - 1 - steps, settings.air_spans).astype(int))
-    light = sky_light(greys[starts], depth[starts])
+    light = measure_sky_light(greys[starts], depth[starts])
     if light is None or not steps:
         return None
     rough = replace(settings, least_gradient=0.0, converged=settings.air_converged)
 
-    def align(earlier: list[_Level], later: list[_Level], guess: Floats) -> Attempt:
+    def align_roughly(earlier: list[_Level], later: list[_Level], guess: Floats) -> Attempt:
         return _align_pictures(earlier, later, guess, rough)
 
     def prepare_frame(k: int) -> list[_Level]:
@@ -180,7 +180,7 @@ def _measure_air(
     for start in starts:
         prepared = [prepare_frame(k) for k in range(start, start + steps + 1)]
         T_first_last = chained_poses(
-            place_frames_by_depth(steps + 1, prepared.__getitem__, align, align, guesses)
+            place_frames_by_depth(steps + 1, prepared.__getitem__, align_roughly, align_roughly, guesses)
         )[-1]
         if np.isfinite(T_first_last).all():
             seen.append(_compare_light(prepared[0][0], prepared[-1][0], T_first_last))
@@ -203,7 +203,9 @@ def _compare_light(far: _Level, near: _Level, T_far_near: Floats) -> Floats:
     shown = ahead & inside
     grey = (weights * far.grey[at]).sum(axis=0)
     nearing = np.linalg.norm(before, axis=1) - np.linalg.norm(points, axis=1)
-    return np.stack([linear_light(grey), linear_light(near.pixels[:, 3]), nearing])[:, shown]
+    return np.stack([convert_to_linear_light(grey), convert_to_linear_light(near.pixels[:, 3]), nearing])[
+        :, shown
+    ]
 
 
 def _build_pyramid(
@@ -225,7 +227,7 @@ def _build_pyramid(
         _Level(
             level=level,
             grey=grey,
-            pixels=informative_pixels(grey, q, settings.least_gradient, settings.depth_kink),
+            pixels=find_informative_pixels(grey, q, settings.least_gradient, settings.depth_kink),
             K=K,
         )
         for level, (grey, q, K) in enumerate(scaled)
@@ -265,12 +267,12 @@ def _align_pictures(
             if not np.isfinite(twist).all():
                 return _failed_attempt("the alignment diverged", 0)
             T = T @ pose_from_twist(-twist)
-            scale = max(histogram_median(histogram) * 1.4826, settings.noise_floor)
+            scale = max(find_histogram_median(histogram) * 1.4826, settings.noise_floor)
             moved = b.K[0, 0] * (np.abs(twist[:3]).max() * per_metre + np.abs(twist[3:]).max())
             if moved < settings.converged:
                 break
     agreeing, possible = int(sums[0]), len(a.pixels) + len(b.pixels)
-    correlation = correlation_from_sums(sums)
+    correlation = compute_correlation(sums)
     if agreeing < max(least, settings.min_inlier_share * possible):
         return _failed_attempt(f"{agreeing} of {possible} pixels agree on a pose", agreeing)
     if correlation < settings.min_correlation:

@@ -1,4 +1,4 @@
-"""What a large production takes follows from what a clip takes."""
+"""Time, bytes and money of a large production follow from those of a clip."""
 
 from pathlib import Path
 

@@ -42,7 +42,7 @@ EXPLAINED = {
     "aerodynamic_pitch": ({"aero_pitch": 0.5}, BRAKED | COASTED),
     "aerodynamic_lift": ({"aero_lift": 0.5}, BRAKED | COASTED),
 }  # fmt: skip
-"""What was found, and the clips that it moves."""
+"""Finding, and the clips that it moves."""
 
 
 FORM = found_form("brake_torque", "pressure", "a x", 3.6, -0.4)

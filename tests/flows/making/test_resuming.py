@@ -89,10 +89,10 @@ def test_a_run_that_was_begun_can_be_begun_anew_with_another_grid(grid, tmp_path
     other = tmp_path / "other.yaml"
     other.write_text(Path(grid).read_text().replace("frames: 11", "frames: 5"))
 
-    def stop(*_: object) -> None:
+    def interrupt_run(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(flows.making.generate, "create_frame_arrays", stop)
+    monkeypatch.setattr(flows.making.generate, "create_frame_arrays", interrupt_run)
     with pytest.raises(KeyboardInterrupt):
         make(grid, tmp_path / "data")
     monkeypatch.undo()
@@ -114,10 +114,10 @@ def test_a_run_that_is_killed_while_it_writes_its_plan_goes_on(grid, whole, tmp_
 
 
 def stop_before_the_end(grid: str, folder: Path, monkeypatch) -> Layout:
-    def stop(*_: object) -> None:
+    def interrupt_run(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(flows.making.generate, "seal_dataset", stop)
+    monkeypatch.setattr(flows.making.generate, "seal_dataset", interrupt_run)
     with pytest.raises(KeyboardInterrupt):
         make(grid, folder)
     monkeypatch.undo()

@@ -42,7 +42,7 @@ OF_THE_ROAD = {"retuned_grade"}
 """A grade belongs to the proving ground and not to the vehicle."""
 CHANNELS = ("speed", "wheel_speed_f", "wheel_speed_r", "pitch")
 NOISE = np.array([0.002, 0.03, 0.03, 0.0002])
-"""What a measured campaign could show, of `CHANNELS` [m/s, rad/s, rad/s, rad]."""
+"""Readings of a measured campaign, of `CHANNELS` [m/s, rad/s, rad/s, rad]."""
 ROUNDING = 1e-9
 
 

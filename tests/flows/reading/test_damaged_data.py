@@ -19,7 +19,7 @@ from tasks.errors import InputError
 
 
 @pytest.fixture
-def copy(toy_dataset, tmp_path) -> Layout:
+def dataset_copy(toy_dataset, tmp_path) -> Layout:
     shutil.copytree(toy_dataset.root, tmp_path / "copy")
     return Layout(tmp_path / "copy")
 
@@ -35,12 +35,12 @@ READ_PICTURES = {
 
 
 @pytest.mark.parametrize("reader", READ_PICTURES)
-def test_a_clip_whose_pictures_are_missing_is_no_black_clip(copy, reader):
-    READ_PICTURES[reader](copy.root)
-    shutil.rmtree(copy.root.with_name("out"), ignore_errors=True)
-    copy.frame_shard("rgb", 0).unlink()
+def test_a_clip_whose_pictures_are_missing_is_no_black_clip(dataset_copy, reader):
+    READ_PICTURES[reader](dataset_copy.root)
+    shutil.rmtree(dataset_copy.root.with_name("out"), ignore_errors=True)
+    dataset_copy.frame_shard("rgb", 0).unlink()
     with pytest.raises(InputError, match=r"missing.* musync repair makes it again"):
-        READ_PICTURES[reader](copy.root)
+        READ_PICTURES[reader](dataset_copy.root)
 
 
 def flip_a_number(path: Path) -> None:
@@ -63,23 +63,23 @@ READ_TABLES = {
 
 
 @pytest.mark.parametrize("reader", READ_TABLES)
-def test_a_flipped_bit_in_a_table_is_an_error_and_not_a_number(copy, reader):
-    path = copy.telemetry / "frames" / "family=dry" / "part-0000.parquet"
-    READ_TABLES[reader](copy.root, path)
+def test_a_flipped_bit_in_a_table_is_an_error_and_not_a_number(dataset_copy, reader):
+    path = dataset_copy.telemetry / "frames" / "family=dry" / "part-0000.parquet"
+    READ_TABLES[reader](dataset_copy.root, path)
     flip_a_number(path)
     with pytest.raises((InputError, OSError), match=r"checksum|CRC"):
-        READ_TABLES[reader](copy.root, path)
+        READ_TABLES[reader](dataset_copy.root, path)
 
 
 @pytest.mark.parametrize(
     "read", [describe_dataset, lambda root: musync.open(root), lambda root: export_dataset(root, "tum")]
 )
-def test_a_manifest_that_was_edited_by_hand_is_not_believed(copy, read):
-    manifest = json.loads(copy.manifest.read_bytes())
+def test_a_manifest_that_was_edited_by_hand_is_not_believed(dataset_copy, read):
+    manifest = json.loads(dataset_copy.manifest.read_bytes())
     manifest["grid"]["frame_rate_hz"] = 20
-    copy.manifest.write_text(json.dumps(manifest))
+    dataset_copy.manifest.write_text(json.dumps(manifest))
     with pytest.raises(InputError, match=r"manifest\.json: must be as it was sealed"):
-        read(str(copy.root))
+        read(str(dataset_copy.root))
 
 
 USE_INPUTS = {
@@ -92,15 +92,15 @@ USE_INPUTS = {
 
 @pytest.mark.parametrize("command", USE_INPUTS)
 @pytest.mark.parametrize("name", ["inputs/camera.yaml", "plan.json"])
-def test_a_camera_or_a_rate_that_was_edited_by_hand_is_not_believed(copy, command, name):
-    path = copy.root / name
+def test_a_camera_or_a_rate_that_was_edited_by_hand_is_not_believed(dataset_copy, command, name):
+    path = dataset_copy.root / name
     path.write_text(path.read_text().replace("value: 80", "value: 160").replace('_hz": 10', '_hz": 20'))
     with pytest.raises(InputError, match=f"{name}: must be as recorded"):
-        USE_INPUTS[command](str(copy.root))
+        USE_INPUTS[command](str(dataset_copy.root))
 
 
-def test_a_table_of_clips_that_lost_rows_is_not_judged_as_if_it_were_whole(copy):
-    path = copy.telemetry / "clips.parquet"
+def test_a_table_of_clips_that_lost_rows_is_not_judged_as_if_it_were_whole(dataset_copy):
+    path = dataset_copy.telemetry / "clips.parquet"
     pq.write_table(pq.read_table(path).slice(0, 2), path)
     with pytest.raises(InputError, match="a row of each of the manifest's 4 clips"):
-        audit_physics(str(copy.root))
+        audit_physics(str(dataset_copy.root))

@@ -284,13 +284,13 @@ HOSTILE = [
 def test_labels_are_text_in_the_page_whatever_they_hold(browser, toy_dataset, tmp_path):
     shutil.copytree(toy_dataset.root, tmp_path / "data")
 
-    def rename(manifest: dict[str, Any]) -> None:
+    def rename_clips(manifest: dict[str, Any]) -> None:
         for clip, label in zip(manifest["clips"], HOSTILE, strict=True):
             clip["label"] = label
             clip["verdict"]["reasons"] = [label]
         manifest["grid"]["name"] = HOSTILE[0]
 
-    reseal(Layout(tmp_path / "data"), rename)
+    reseal(Layout(tmp_path / "data"), rename_clips)
     make_report(str(tmp_path / "data"), out=str(tmp_path / "page"))
     assert "</script>" not in (tmp_path / "page" / "data.js").read_text()
     for page in opened(browser, tmp_path / "page"):

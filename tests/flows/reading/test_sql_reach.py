@@ -1,4 +1,4 @@
-"""What a query can reach: the dataset's recorded tables, to read, and nothing else unless it is allowed."""
+"""A query reaches the dataset's recorded tables, to read, and nothing else unless it is allowed."""
 
 import hashlib
 import os

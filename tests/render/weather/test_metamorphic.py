@@ -1,4 +1,4 @@
-"""What must follow in a finished frame when one thing about it changes."""
+"""Changes that must follow in a finished frame when one thing about it changes."""
 
 from dataclasses import replace
 from itertools import pairwise

@@ -1,4 +1,4 @@
-"""What is in the air: distributions, speeds and cross-sections against what was published of them."""
+"""Particles in the air: distributions, speeds and cross-sections against what was published of them."""
 
 from dataclasses import replace
 

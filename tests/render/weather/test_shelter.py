@@ -1,4 +1,4 @@
-"""What hangs above keeps snow off: by Beer's law, and no surface shelters itself."""
+"""Cover above keeps snow off: by Beer's law, and no surface shelters itself."""
 
 from dataclasses import replace
 

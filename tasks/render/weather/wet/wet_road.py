@@ -69,7 +69,7 @@ class RoadFilm:
 
 @dataclass(frozen=True, kw_only=True)
 class LightOnRoad:
-    """What a wet road mirrors beside the picture itself.
+    """Light that a wet road mirrors beside the picture itself.
 
     Parameters
     ----------
