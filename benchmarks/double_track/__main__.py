@@ -8,6 +8,7 @@ import json
 import sys
 from pathlib import Path
 
+from benchmarks.double_track.declared import read_declared
 from benchmarks.double_track.effects import NULLS
 from benchmarks.double_track.judge import CHANNEL_SETS, judge_campaigns
 from benchmarks.double_track.make import make_campaigns
@@ -23,7 +24,7 @@ if __name__ == "__main__":
     )
     parser.add_argument("--sizes", type=int, default=5, help="campaigns of each effect, small to large")
     parser.add_argument("--nulls", type=int, default=NULLS, help="campaigns of the plain car")
-    parser.add_argument("--design", choices=("rich", "poor"), default="rich")
+    parser.add_argument("--design", choices=tuple(read_declared("designs")["designs"]), default="rich")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--minutes", type=float, default=1e9, help="begin no verdict after so long")

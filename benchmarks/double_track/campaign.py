@@ -40,17 +40,30 @@ class MeasuredRun:
     columns: Channels
 
 
-def draw_session(seed: int, name: str, share: float = 1.0) -> dict[str, float]:
+def session_tolerances(design: str) -> dict[str, float]:
+    """Standard deviations of a session's offsets, with the grade, by tolerance.
+
+    Parameters
+    ----------
+    design : of the campaign; its own come before those of all designs
+    """
+    designs = read_declared("designs")
+    own = designs["designs"][design].get("tolerances_1sigma", {})
+    return values_of(designs["tolerances_1sigma"] | own)
+
+
+def draw_session(seed: int, name: str, design: str, share: float = 1.0) -> dict[str, float]:
     """Offsets of a session from the declared tolerances, with the grade, by tolerance.
 
     Parameters
     ----------
-    seed, name : of the campaign
+    seed, name, design : of the campaign
     share : of the tolerances; 0 for a car and a road that are as declared [1]
     """
-    tolerances = values_of(read_declared("designs")["tolerances_1sigma"])
-    rng = keyed_generator(seed, name, "session")
-    return {key: share * sigma * float(rng.standard_normal()) for key, sigma in tolerances.items()}
+    rng = keyed_generator(seed, f"{name} {design}", "session")
+    return {
+        key: share * sigma * float(rng.standard_normal()) for key, sigma in session_tolerances(design).items()
+    }
 
 
 def brake_trace(plan: Mapping[str, Any]) -> NDArray[np.float64]:
@@ -161,14 +174,14 @@ def make_campaign(
     ----------
     folder : to make
     truth : effect of the campaign
-    design : rich or poor
+    design : of designs.yaml
     seed : of all that is drawn
     noisy : with session and run offsets, disturbances and noise
     """
     designs = read_declared("designs")
     plans, train = designs["designs"][design]["runs"], designs["designs"][design]["train"]
     key: tuple[str | int, ...] = (seed, truth.name, design)
-    session = draw_session(seed, f"{truth.name} {design}", float(noisy))
+    session = draw_session(seed, truth.name, design, float(noisy))
     order = keyed_generator(*key, "order").permutation(len(plans))
     either = designs["designs"][design]["both_directions"]
     names = [f"run-{place + 1:02d}" for place in order]
@@ -177,7 +190,7 @@ def make_campaign(
         own = (*key, i)
         direction = 1 if not either or keyed_generator(*own, "direction").random() < 0.5 else -1
         runs.append(measure_run({**plan, "direction": direction}, name, truth, session, own, noisy))
-    _write_campaign(folder, runs, names[:train], names[train:])
+    _write_campaign(folder, design, runs, names[:train], names[train:])
     return {
         "effect": truth.effect, "group": truth.group, "library": truth.library, "values": truth.values,
         "size": truth.size, "sizes": truth.sizes, "same_form": truth.same_form, "form": truth.form, "design": design,
@@ -185,9 +198,11 @@ def make_campaign(
     }  # fmt: skip
 
 
-def _write_campaign(folder: Path, runs: list[MeasuredRun], train: list[str], held_out: list[str]) -> None:
+def _write_campaign(
+    folder: Path, design: str, runs: list[MeasuredRun], train: list[str], held_out: list[str]
+) -> None:
     designs = read_declared("designs")
-    tolerances: dict[str, Any] = values_of(designs["tolerances_1sigma"])
+    tolerances: dict[str, Any] = dict(session_tolerances(design))
     tolerances["run"] = values_of(designs["tolerances_1sigma"]["run"])
     (folder / "runs").mkdir(parents=True, exist_ok=True)
     header = {

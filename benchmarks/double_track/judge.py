@@ -19,6 +19,9 @@ from benchmarks.double_track.outcomes import estimate_of, judge_verdict
 CHANNEL_SETS: dict[str, tuple[str, ...]] = {
     "all": (),
     "no-pitch": ("pitch", "pitch_rate"),
+    "speed-acceleration": (
+        "wheel_speed_front", "wheel_speed_rear", "pitch", "pitch_rate", "vertical_acceleration",
+    ),
     "speed-pressure": (
         "longitudinal_acceleration", "wheel_speed_front", "wheel_speed_rear", "pitch", "pitch_rate",
         "vertical_acceleration",

@@ -23,7 +23,7 @@ def make_campaigns(
     folder : to write into
     asked : names of effects.yaml, or of its groups, or null
     sizes, nulls : campaigns of each effect, and of the plain car
-    design : rich or poor
+    design : of designs.yaml
     seed : of all draws
     workers : processes
     """

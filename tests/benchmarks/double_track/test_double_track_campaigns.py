@@ -71,7 +71,7 @@ def test_noise_and_disturbances_have_the_declared_size_and_memory():
 @pytest.mark.minutes
 def test_a_run_is_the_same_whenever_it_is_driven():
     plan = {"speed": 9.0, "pressure": 1.5, "duration": 2.0}
-    truth, session = Truth(name="null-01"), draw_session(1, "null-01")
+    truth, session = Truth(name="null-01"), draw_session(1, "null-01", "rich")
     first = measure_run(plan, "run-01", truth, session, (1, "null-01", 0), True)
     measure_run(plan, "run-02", truth, session, (1, "null-01", 1), True)
     again = measure_run(plan, "run-01", truth, session, (1, "null-01", 0), True)
