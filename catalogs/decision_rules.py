@@ -18,6 +18,8 @@ class JointRulesEntry(CatalogueEntry):
 
     unknown_gain_tolerance: Level
     fewest_runs: Count
+    foreign_misfit: Level
+    driven_acceleration: Annotated[Scalar, require_quantity("m s-2", above=0)]
     brake_onset_share: Share
     braking_deceleration: Annotated[Scalar, require_quantity("m s-2", above=0)]
     fewest_curve_stops: Count

@@ -67,9 +67,7 @@ def close_loop(
         result["reasons"].append(
             f"the held-out runs of this campaign have been read {earlier} time(s) before: this is no first look"
         )
-    found = trace.verdict
-    if isinstance(trace, JointTrace):
-        found = replace(found, effects=(*found.effects, *trace.calibrated))
+    found = replace(trace.verdict, effects=(*trace.verdict.effects, *trace.calibrated))
     text, missing = grown_vehicle(name, found, _reached_ranges(trace))
     result["vehicle_file"] = None
     if text is not None:
@@ -126,13 +124,13 @@ def tell_search(trace: Trace | JointTrace) -> dict[str, Any]:
     sentence = tell_verdict(
         verdict.effects, rivals, library, verdict.error, verdict.manoeuvre_error, suggested
     )
+    told = {"sentence": sentence, "calibrated": [effect_json(effect, library) for effect in trace.calibrated]}
     if isinstance(trace, Trace):
         residual = compute_residual_rmse((*train, *held_out))
-        return {"search": SEARCHES[0], "sentence": sentence, "residual_rmse": residual}
+        return {"search": SEARCHES[0], **told, "residual_rmse": residual}
     return {
         "search": SEARCHES[1],
-        "sentence": sentence,
-        "calibrated": [effect_json(effect, library) for effect in trace.calibrated],
+        **told,
         "numbers": {
             number.name: {"value": float(value), "standard_error": float(error), "unit": PARAMETERS[number.name].unit}
             for number, value, error in zip(

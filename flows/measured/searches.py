@@ -7,7 +7,8 @@ from catalogs.joint_numbers import load_joint_numbers
 from tasks.campaign.campaign import Campaign
 from tasks.identification.decision.disputes import ForeignCarError
 from tasks.identification.decision.verdict import Trace, find_missing_effects
-from tasks.identification.joint.verdict import JointTrace, judge_jointly, needs_joint_fit
+from tasks.identification.joint.calibration import calibrate_gain, needs_joint_fit
+from tasks.identification.joint.verdict import JointTrace, judge_jointly
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.parameters import Vehicle
@@ -19,7 +20,7 @@ SEARCHES = ("one effect at a time", "joint fit")
 def judge_campaign(
     measured: Campaign, model: Vehicle, road: SurfaceParameters, effects: tuple[Effect, ...]
 ) -> Trace | JointTrace:
-    """Look for one effect at a time where the file knows its car; fit all numbers at once where it does not.
+    """Look for one effect at a time where the car is the model's but for its brake gain; else fit all numbers at once.
 
     Parameters
     ----------
@@ -27,8 +28,9 @@ def judge_campaign(
     model, road : the model that is judged
     effects : library of candidates
     """
-    rules = load_decision_rules()
+    rules, numbers = load_decision_rules(), load_joint_numbers()
     if not needs_joint_fit(measured, rules.joint):
         with suppress(ForeignCarError):
-            return find_missing_effects(measured, model, road, effects, rules)
-    return judge_jointly(measured, model, road, load_joint_numbers(), rules)
+            gain = calibrate_gain(measured, model, road, numbers, rules.joint)
+            return find_missing_effects(measured, model, road, effects, rules, hardly_known=gain)
+    return judge_jointly(measured, model, road, numbers, rules)

@@ -123,7 +123,7 @@ def test_a_second_parameter_at_nothing_is_not_at_its_bound(
     )
     fitted = Fit(
         parts=(creep,), values=np.array(values), session=np.zeros(7), session_sigma=np.ones(7), objective=0.0,
-        by_run=np.zeros(1), covariance=np.eye(2), residuals=(), offsets=(),
+        by_run=np.zeros(1), covariance=np.eye(2), session_error=np.ones(7), residuals=(), offsets=(),
     )  # fmt: skip
     assert fitted.at_bound is at_bound
 

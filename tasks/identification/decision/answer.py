@@ -1,5 +1,6 @@
 """The verdict and its parts: named effects with their parameters, and errors by channel."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -11,6 +12,7 @@ from tasks.identification.decision.correlation import Correlation
 from tasks.identification.decision.experiment import Experiment
 from tasks.identification.decision.intervals import Bounds
 from tasks.identification.inference.disturbance import Disturbance
+from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.slots import Slot
 
 VerdictName = Literal["FOUND", "SET", "UNKNOWN_FORM", "RETUNE", "SENSOR", "NOTHING"]
@@ -125,6 +127,39 @@ class Verdict:
     experiment: Experiment | None
     forked: tuple[str, ...]
     reasons: tuple[str, ...]
+
+
+def make_estimate(effect: Effect, parameter: Parameter, error: float) -> NamedEffect:
+    """Return a number that was fitted beside others in the form in which the verdict reports an effect.
+
+    Parameters
+    ----------
+    effect : of the library, whose first number it is
+    parameter : its estimate
+    error : its standard error [its unit]
+    """
+    sure = parameter.value / error
+    return NamedEffect(
+        name=effect.name, effect_class=effect.effect_class, port=effect.port, variable=effect.variable,
+        parameters=(parameter,), score=sure**2, gain=0.5 * sure**2, inflation=1.0, held_out_gain=0.0,
+        cross_validated_gain=0.0, win_share=1.0,
+    )  # fmt: skip
+
+
+def is_within_tolerance(effect: NamedEffect, tolerances: Mapping[str, float], limit: float) -> bool:
+    """Whether a number of the file is off by no more than its tolerance and its own error allow.
+
+    Parameters
+    ----------
+    effect : the number
+    tolerances : by number [its unit]; an effect that is no number of the file has none
+    limit : tolerances from which a number is wrong [1]
+    """
+    number = effect.parameters[0]
+    if number.name not in tolerances:
+        return False
+    error = 0.25 * (number.ci_high - number.ci_low)
+    return abs(number.value) < limit * float(np.hypot(tolerances[number.name], error))
 
 
 def make_named_effect(candidate: Candidate, share: float, interval: Bounds) -> NamedEffect:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from tasks.identification.decision.answer import (
     make_named_effect,
 )
 from tasks.identification.decision.attribution import Candidate
+from tasks.identification.decision.calibrated import tell_calibrated
 from tasks.identification.decision.correlation import correlate_residual_with_pressure
 from tasks.identification.decision.discovery import search_library_and_forms
 from tasks.identification.decision.disputes import settle_disputes
@@ -49,12 +51,14 @@ class Trace:
     start : the model as it stands, with the runs differentiated about it
     end : the grown model, with the runs differentiated about it; ``start`` where nothing is named
     compared : every named effect beside its alternatives
+    calibrated : numbers that the prediction rests on and that differ from the file by no more than its tolerances
     """
 
     verdict: Verdict
     start: SearchState
     end: SearchState
     compared: tuple[RivalComparison, ...]
+    calibrated: tuple[NamedEffect, ...] = ()
 
 
 def find_missing_effects(
@@ -64,6 +68,7 @@ def find_missing_effects(
     effects: tuple[Effect, ...],
     rules: DecisionRules,
     *,
+    hardly_known: Mapping[str, tuple[float, float]] = MappingProxyType({}),
     progress: Callable[[str], None] = lambda stage: None,
 ) -> Trace:
     """Trace the residual of a campaign to what the model lacks.
@@ -74,6 +79,7 @@ def find_missing_effects(
     vehicle, surface : the model that is judged
     effects : the library of candidates
     rules : by which it is decided
+    hardly_known : numbers of the session that the vehicle's file hardly knows: a first value, and the prior's sigma
     progress : called with the name of each stage as it begins
 
     Returns
@@ -87,7 +93,12 @@ def find_missing_effects(
     """
     progress("derivatives")
     evidence, null = prepare_evidence(
-        campaign, vehicle, surface, tuple(e for e in effects if not _is_fixed(e, vehicle)), rules
+        campaign,
+        vehicle,
+        surface,
+        tuple(e for e in effects if not _is_fixed(e, vehicle) and e.parameters[0].name not in hardly_known),
+        rules,
+        hardly_known,
     )
     reasons: list[str] = []
     progress("search")
@@ -140,6 +151,8 @@ def find_missing_effects(
                 make_named_effect(near_form, 0.0, compute_curvature_interval(near_form)),
             )
         )
+    calibrated, wrong = tell_calibrated(found.base, effects, hardly_known, campaign.tolerances, rules)
+    named += wrong
     kind = _verdict_name(named, near)
     if kind == "SET" and len(near) > len(others):
         reasons.append(
@@ -159,7 +172,7 @@ def find_missing_effects(
         experiment = plan_next_experiment(start.evidence, *pair, vehicle, surface)
     theta, slots = compose_parameters(found.base.parts, found.base.values, np.zeros(len(SESSION)))
     grown = compose_parameters(found.base.parts, found.base.values, found.base.session)
-    sigma, lead = evidence.session_sigma, evidence.train[0]
+    sigma, lead = np.array(campaign.tolerances.session), evidence.train[0]
     pulls = zip(SESSION, start.base.session / sigma, found.base.session / sigma, strict=True)
     verdict = Verdict(
         verdict=kind,
@@ -186,7 +199,10 @@ def find_missing_effects(
         forked=evidence.forked,
         reasons=tuple(reasons),
     )
-    return Trace(verdict=verdict, start=start, end=found, compared=tuple(compared))
+    return Trace(
+        verdict=verdict, start=start, end=found, compared=tuple(compared),
+        calibrated=calibrated if named else (),
+    )  # fmt: skip
 
 
 def find_pair_to_confirm(tried: Sequence[Candidate], null: Fit) -> tuple[Fit, Fit] | None:

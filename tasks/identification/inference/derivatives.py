@@ -31,6 +31,8 @@ from tasks.vehicle.model.simulation import Simulation
 
 SECOND_SHARES = (0.3, 0.6)
 """Shares of the range of an effect's second parameter at which the screen tries it, besides its first value."""
+LARGEST_STEP = 0.02
+"""Largest step of a number of the session: a car that stops sooner stands where the other still brakes [1]."""
 KNOT_STEP = (30.0, 0.01, 30.0)
 """Step of a knot at each disturbed port [N, 1, N m]."""
 Quotient = Callable[..., NDArray[np.float64]]
@@ -84,8 +86,10 @@ def differentiate_run(
             )
             columns.append(compute_quotient(base, step, (slot,), branch=(first, simulated)))
     session = [
-        compute_quotient(_shift_parameter(base, i, 0.5 * s), 0.5 * s)
-        for i, s in zip(SESSION_INDEX, tolerances.session, strict=True)
+        compute_quotient(_shift_parameter(base, i, step), step)
+        for i, step in zip(
+            SESSION_INDEX, np.minimum(0.5 * np.array(tolerances.session), LARGEST_STEP), strict=True
+        )
     ]
     nuisance = whiten_channels(np.stack(columns, axis=-1), rho, sigma, model.sampled)
     evidence = RunEvidence(

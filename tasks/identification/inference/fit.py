@@ -43,6 +43,7 @@ class Fit:
     objective : sum over runs of the marginalised misfit, plus the session's prior term
     by_run : float64 [R] misfit of each run without the session's prior
     covariance : float64 [K, K] of the parameters, session marginalised
+    session_error : float64 [7] standard deviations of the session's nuisances, parameters marginalised
     residuals : whitened residual of each run at the fit
     offsets : float64 [D] each, the run's own offsets about which its residual is linearised
     """
@@ -54,6 +55,7 @@ class Fit:
     objective: float
     by_run: NDArray[np.float64]
     covariance: NDArray[np.float64]
+    session_error: NDArray[np.float64]
     residuals: tuple[NDArray[np.float64], ...]
     offsets: tuple[NDArray[np.float64], ...]
 
@@ -166,11 +168,12 @@ def fit_hypotheses(
             break
     # scaled first: in their own units the information matrix is too ill-conditioned for double precision
     size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    inverse = np.linalg.pinv(normal / np.outer(size, size)) / np.outer(size, size)
-    covariance = np.asarray(inverse[:k, :k], dtype=np.float64)
+    inverse = np.asarray(
+        np.linalg.pinv(normal / np.outer(size, size)) / np.outer(size, size), dtype=np.float64
+    )
     return Fit(
         parts=parts, values=x, session=s, session_sigma=session_sigma, objective=objective,
-        by_run=collect_misfits(points), covariance=covariance,
+        by_run=collect_misfits(points), covariance=inverse[:k, :k], session_error=np.sqrt(np.diag(inverse)[k:]),
         residuals=tuple(
             run.add_offsets(point.residual, point.offsets) for run, point in zip(evidence, points, strict=True)
         ),

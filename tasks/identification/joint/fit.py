@@ -211,7 +211,7 @@ def _without_offsets(numbers: NDArray[np.float64], offsets: NDArray[np.float64])
 
 
 def misfit_scales(fitted: JointFit, stops: Sequence[Stop]) -> NDArray[np.float64]:
-    """Return the size of each channel's misfit by its residuals, robustly; float64 [7] [the channel's unit].
+    """Return the size of a misfit that counts one, by each channel's residuals; float64 [7] [the channel's unit].
 
     Noise and what the model does not know count together: no channel weighs more than the model can follow it.
 
@@ -220,7 +220,22 @@ def misfit_scales(fitted: JointFit, stops: Sequence[Stop]) -> NDArray[np.float64
     fitted : a first fit
     stops : its runs
     """
-    scales = fitted.scales.copy()
+    least = np.array([0.2 * SCALES.get(name, 0.0) for name in CHANNELS])
+    misfit = measure_misfit(fitted, stops)
+    return np.where(np.isfinite(misfit), np.maximum(misfit, least), fitted.scales)
+
+
+def measure_misfit(fitted: JointFit, stops: Sequence[Stop]) -> NDArray[np.float64]:
+    """Return the robust standard deviation of each channel's residuals, float64 [7] [the channel's unit].
+
+    NaN where a channel is not compared.
+
+    Parameters
+    ----------
+    fitted : a fit
+    stops : its runs
+    """
+    misfit = np.full(len(CHANNELS), np.nan)
     for name in FITTED:
         place = CHANNELS.index(name)
         left = [
@@ -231,5 +246,5 @@ def misfit_scales(fitted: JointFit, stops: Sequence[Stop]) -> NDArray[np.float64
             if place in stop.channels
         ]
         if left:
-            scales[place] = max(1.4826 * float(np.median(np.abs(np.concatenate(left)))), 0.2 * SCALES[name])
-    return scales
+            misfit[place] = 1.4826 * float(np.median(np.abs(np.concatenate(left))))
+    return misfit

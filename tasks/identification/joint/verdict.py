@@ -7,13 +7,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
-from tasks.identification.decision.answer import NamedEffect, Parameter, Verdict, VerdictName
+from tasks.identification.decision.answer import (
+    NamedEffect,
+    Parameter,
+    Verdict,
+    VerdictName,
+    is_within_tolerance,
+    make_estimate,
+)
 from tasks.identification.inference.disturbance import Disturbance
+from tasks.identification.joint.calibration import fit_first_numbers, is_gain_unknown
 from tasks.identification.joint.elimination import (
     Substitute,
     certain_numbers,
     compute_interval_quantile,
-    count_standard_errors,
     eliminate_uncertain_numbers,
     find_substitutes,
     refit_numbers,
@@ -29,8 +36,6 @@ from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.table import PARAMETERS, build_parameter_vector
 from tasks.vehicle.parameters import Vehicle
 
-FIRST = ("lag", "drag_area", "speed_delay")
-"""Numbers that are free beside those of every car while the best start is looked for."""
 GRIPS = (0.0, 0.2, 0.5)
 """Friction from which the last fits start, where runs saturate the tyres [1]."""
 
@@ -62,22 +67,6 @@ class JointTrace:
     agreeing: tuple[int, int]
 
 
-def needs_joint_fit(campaign: Campaign, rules: JointRules) -> bool:
-    """Whether a campaign says too little, or its vehicle file knows too little, to look for one effect at a time.
-
-    Parameters
-    ----------
-    campaign : measured runs with their tolerances
-    rules : of the joint fit
-    """
-    few = min(len(campaign.train), len(campaign.held_out)) < rules.fewest_runs
-    # only a joint fit knows a throttle, and a brake signal that is no pressure
-    other_inputs = campaign.brake_signal != "brake_pressure" or any(
-        run.throttle is not None for run in campaign.runs
-    )
-    return few or other_inputs or _is_gain_unknown(campaign, rules)
-
-
 def judge_jointly(
     campaign: Campaign,
     vehicle: Vehicle,
@@ -103,7 +92,7 @@ def judge_jointly(
     held_out = tuple(stop for stop in stops if stop.model.run.held_out)
     shown = choose_numbers(numbers, campaign, [stop.model for stop in train], joint)
     progress("starts")
-    starts = suggest_starts(train) if _is_gain_unknown(campaign, joint) else [{}]
+    starts = suggest_starts(train) if is_gain_unknown(campaign, joint) else [{}]
     everything = _fit_everything(train, starts, free_numbers(shown, [stop.model for stop in train], joint))
     progress("elimination")
     settled, agreeing = _settle(train, eliminate_uncertain_numbers(train, everything, joint), starts, joint)
@@ -119,7 +108,9 @@ def judge_jointly(
     substitutes = tuple(find_substitutes(train, fitted, shown, rules.rival_gain_share))
     effects, rivals = _named(fitted, substitutes, joint)
     tolerances = _tolerances(campaign)
-    calibrated = tuple(e for e in effects if _is_within(e, tolerances, joint))
+    calibrated = tuple(
+        e for e in effects if is_within_tolerance(e, tolerances, joint.wrong_number_tolerances)
+    )
     effects = [e for e in effects if e not in calibrated]
     kind = _kind(effects, rivals)
     reasons += tell_what_was_used(campaign, train, agreeing, joint)
@@ -158,18 +149,11 @@ def judge_jointly(
     )
 
 
-def _is_gain_unknown(campaign: Campaign, rules: JointRules) -> bool:
-    """Whether the brake's gain is to be found: the file hardly knows it, or the signal is no pressure."""
-    tolerance = campaign.tolerances.session[SESSION.index("pressure_gain")]
-    return campaign.brake_signal != "brake_pressure" or tolerance >= rules.unknown_gain_tolerance
-
-
 def _fit_everything(
     train: Sequence[Stop], starts: Sequence[Mapping[str, float]], shown: tuple[JointNumber, ...]
 ) -> JointFit:
     """Return the fit of every number: from the best of several starts of the few that matter most."""
-    few = tuple(n for n in shown if not n.removable or n.name in FIRST)
-    best = fit_jointly(train, few, starts)[0]
+    best = fit_first_numbers(train, shown, starts)
     scales = misfit_scales(best, train)
     return fit_jointly(train, shown, [best.by_name], scales=scales, offsets=best.offsets)[0]
 
@@ -211,27 +195,13 @@ def _named(
 def _named_effect(fitted: JointFit, number: JointNumber, rules: JointRules) -> NamedEffect:
     place = fitted.numbers.index(number)
     value, error = float(fitted.values[place]), float(standard_errors(fitted, rules)[place])
-    reach, row = compute_interval_quantile(fitted) * error, PARAMETERS[number.name]
-    sure = float(count_standard_errors(fitted, rules)[place])
-    effect = number.effect
-    return NamedEffect(
-        name=effect.name,
-        effect_class=effect.effect_class,
-        port=effect.port,
-        variable=effect.variable,
-        parameters=(
-            Parameter(
-                name=number.name, value=value, ci_low=max(value - reach, number.lower),
-                ci_high=min(value + reach, number.upper), lower=number.lower, upper=number.upper, unit=row.unit,
-            ),
-        ),
-        score=sure**2,
-        gain=0.5 * sure**2,
-        inflation=1.0,
-        held_out_gain=0.0,
-        cross_validated_gain=0.0,
-        win_share=1.0,
+    reach = compute_interval_quantile(fitted) * error
+    estimate = Parameter(
+        name=number.name, value=value, ci_low=max(value - reach, number.lower),
+        ci_high=min(value + reach, number.upper), lower=number.lower, upper=number.upper,
+        unit=PARAMETERS[number.name].unit,
     )  # fmt: skip
+    return make_estimate(number.effect, estimate, error)
 
 
 def _tolerances(campaign: Campaign) -> dict[str, float]:
@@ -239,15 +209,6 @@ def _tolerances(campaign: Campaign) -> dict[str, float]:
     session = dict(zip(SESSION, campaign.tolerances.session, strict=True))
     names = ("pressure_gain", "wheel_radius")
     return {name: session[name] for name in names} | {"friction": campaign.tolerances.friction}
-
-
-def _is_within(effect: NamedEffect, tolerances: Mapping[str, float], rules: JointRules) -> bool:
-    """Whether a number of the file is off by no more than its tolerance and its own error allow."""
-    number = effect.parameters[0]
-    if number.name not in tolerances:
-        return False
-    error = 0.25 * (number.ci_high - number.ci_low)
-    return abs(number.value) < rules.wrong_number_tolerances * float(np.hypot(tolerances[number.name], error))
 
 
 def _kind(effects: Sequence[NamedEffect], rivals: Sequence[tuple[str, NamedEffect]]) -> VerdictName:

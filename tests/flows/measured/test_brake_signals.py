@@ -11,7 +11,7 @@ from catalogs.campaigns import read_campaign
 from catalogs.decision_rules import load_decision_rules
 from flows.measured.importing import import_measurements
 from tasks.errors import InputError
-from tasks.identification.joint.verdict import needs_joint_fit
+from tasks.identification.joint.calibration import needs_joint_fit
 from tests.campaign.recorded import MAP, braking_columns, log_signal
 
 

@@ -9,18 +9,26 @@ from tasks.identification.decision.disputes import ForeignCarError
 
 
 @pytest.mark.parametrize(
-    ("hardly_known", "foreign", "judge"),
-    [(False, False, "one"), (False, True, "joint"), (True, False, "joint")],
+    ("says_little", "foreign", "judge"),
+    [
+        (False, None, "one"),
+        (False, "find_missing_effects", "joint"),
+        (False, "calibrate_gain", "joint"),
+        (True, None, "joint"),
+    ],
 )
 def test_the_search_is_chosen_by_what_is_known_and_by_whether_the_runs_agree(
-    monkeypatch, hardly_known, foreign, judge
+    monkeypatch, says_little, foreign, judge
 ):
-    def find(*_: object) -> str:
-        if foreign:
-            raise ForeignCarError
-        return "one"
+    def answer_as(name: str, answer: object) -> object:
+        def search(*_: object, **__: object) -> object:
+            if foreign == name:
+                raise ForeignCarError
+            return answer
 
-    monkeypatch.setattr(searches, "needs_joint_fit", lambda *_: hardly_known)
-    monkeypatch.setattr(searches, "find_missing_effects", find)
-    monkeypatch.setattr(searches, "judge_jointly", lambda *_: "joint")
+        return search
+
+    monkeypatch.setattr(searches, "needs_joint_fit", lambda *_: says_little)
+    for name, answer in (("calibrate_gain", {}), ("find_missing_effects", "one"), ("judge_jointly", "joint")):
+        monkeypatch.setattr(searches, name, answer_as(name, answer))
     assert searches.judge_campaign(SimpleNamespace(), SimpleNamespace(), SimpleNamespace(), ()) == judge

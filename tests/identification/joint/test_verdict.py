@@ -9,8 +9,9 @@ import pytest
 from catalogs.decision_rules import load_decision_rules
 from catalogs.joint_numbers import load_joint_numbers
 from tasks.campaign.campaign import CHANNELS, Campaign, Run
+from tasks.identification.joint.calibration import needs_joint_fit
 from tasks.identification.joint.held_out import drop_what_predicts_worse
-from tasks.identification.joint.verdict import JointTrace, judge_jointly, needs_joint_fit
+from tasks.identification.joint.verdict import JointTrace, judge_jointly
 from tasks.identification.rules import DecisionRules
 from tasks.vehicle.effects.table import build_parameter_vector
 from tasks.vehicle.parameters import Vehicle
@@ -147,12 +148,9 @@ def test_speed_and_pressure_alone_name_a_delay_as_a_set():
     assert trace.verdict.error.keys() == {"speed"}
 
 
-def test_a_joint_fit_is_for_few_runs_and_for_files_that_hardly_know_the_car():
+def test_a_joint_fit_is_for_few_runs():
     campaign = campaign_of({})
-    sure = replace(campaign, tolerances=TOLERANCES)
     enough = tuple(replace(run, held_out=i % 2 == 0) for i, run in enumerate(campaign.runs * 2))
-    rules = RULES.joint
-    assert needs_joint_fit(sure, rules) and needs_joint_fit(replace(campaign, runs=enough), rules)
-    assert not needs_joint_fit(replace(sure, runs=enough), rules)
-    assert needs_joint_fit(replace(sure, runs=enough), replace(rules, fewest_runs=5))
-    assert not needs_joint_fit(replace(campaign, runs=enough), replace(rules, unknown_gain_tolerance=0.3))
+    assert needs_joint_fit(campaign, RULES.joint)
+    assert not needs_joint_fit(replace(campaign, runs=enough), RULES.joint)
+    assert needs_joint_fit(replace(campaign, runs=enough), replace(RULES.joint, fewest_runs=5))
