@@ -19,6 +19,7 @@ class JointRulesEntry(CatalogueEntry):
     unknown_gain_tolerance: Level
     fewest_runs: Count
     foreign_misfit: Level
+    noticed_share: Share
     driven_acceleration: Annotated[Scalar, require_quantity("m s-2", above=0)]
     brake_onset_share: Share
     braking_deceleration: Annotated[Scalar, require_quantity("m s-2", above=0)]

@@ -12,8 +12,8 @@ from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
 from tasks.identification.decision.forms import ResidualSpline, fit_residual_splines
 from tasks.identification.decision.verdict import Trace
 from tasks.identification.joint.fit import JointFit
-from tasks.identification.joint.numbers import SMOOTHED, JointNumber
-from tasks.identification.joint.words import SEPARATE
+from tasks.identification.joint.numbers import SMOOTHED
+from tasks.identification.joint.words import find_separating_run
 from tasks.vehicle.effects.ports import PORT_UNITS, VARIABLE_UNITS, format_unit
 
 BINS = 14
@@ -149,16 +149,6 @@ def find_alike_numbers(fitted: JointFit) -> list[dict[str, Any]]:
         if abs(correlation[i, j]) > ALIKE
     ]
     return sorted(pairs, key=lambda pair: -abs(pair["correlation"]))
-
-
-def find_separating_run(numbers: Sequence[JointNumber]) -> str | None:
-    """Return the run that tells numbers apart; None where none is known.
-
-    Parameters
-    ----------
-    numbers : that these runs cannot tell apart
-    """
-    return next((SEPARATE[number.group] for number in numbers if number.group in SEPARATE), None)
 
 
 def format_plain_unit(unit: str) -> str:

@@ -11,7 +11,6 @@ from flows.measured.closing_error_rates import tell_error_rates
 from flows.measured.residuals import predict_runs
 from flows.measured.verdict_figures import (
     find_alike_numbers,
-    find_separating_run,
     format_plain_unit,
     make_brake_curve,
     make_residual_figures,
@@ -21,6 +20,7 @@ from flows.pages import DATASET_PAGE, make_policy, read_plotly
 from tasks.campaign.campaign import Campaign
 from tasks.identification.decision.verdict import Trace
 from tasks.identification.joint.verdict import JointTrace
+from tasks.identification.joint.words import find_separating_run
 
 PAGE = Path(__file__).parent / "verdict_page"
 IMPORT = "musync import-measurements RECORDINGS --map MAP.yaml --out CAMPAIGN"
@@ -120,10 +120,11 @@ def find_next_steps(result: Mapping[str, Any], campaign: Campaign) -> list[tuple
 
 def _find_separations(trace: JointTrace) -> list[str | None]:
     """Return the run that tells each rival from what is named, in the order of the rivals."""
-    named = {effect.name: effect.parameters[0].name for effect in trace.verdict.effects}
+    fits = (trace.fitted, *(substitute.fitted for substitute in trace.substitutes))
+    numbers = {n.effect.name: n for fitted in fits for n in fitted.numbers}
     return [
-        find_separating_run([n for n in trace.fitted.numbers if n.name == named.get(of)])
-        for of, _ in trace.verdict.rivals
+        find_separating_run([numbers[name] for name in (of, rival.name) if name in numbers])
+        for of, rival in trace.verdict.rivals
     ]
 
 

@@ -12,6 +12,8 @@ class JointRules:
     unknown_gain_tolerance : tolerance of the brake gain from which a vehicle file hardly knows its car [1]
     fewest_runs : training or held-out runs below which effects cannot be screened one by one [1]
     foreign_misfit : misfit of a calibrated car over its sensors' noise from which its equations are not the model's [1]
+    noticed_share : share of some channel's held-out error that a name must leave at most, where the gain was not known
+        [1]
     driven_acceleration : mean drive force before the brake, over the mass, from which a car is driven [m s-2]
     brake_onset_share : share of a run's largest pressure from which the driver brakes [1]
     braking_deceleration : deceleration above which a run brakes hard enough to show something of the brake [m s-2]
@@ -34,6 +36,7 @@ class JointRules:
     unknown_gain_tolerance: float
     fewest_runs: int
     foreign_misfit: float
+    noticed_share: float
     driven_acceleration: float
     brake_onset_share: float
     braking_deceleration: float

@@ -1,6 +1,7 @@
 """Every kind of verdict, from whole campaigns of known truth made unlike the model that judges them."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,8 @@ from catalogs.vehicles import load_vehicle
 from tasks.campaign.planned_runs import EXPERIMENTS, RICH, RunPlan, make_planned_run
 from tasks.identification.benchmark import make_synthetic_campaign
 from tasks.identification.decision import discovery
-from tasks.identification.decision.answer import Verdict
+from tasks.identification.decision import verdict as decision
+from tasks.identification.decision.answer import ChannelError, Verdict
 from tasks.identification.decision.disputes import ForeignCarError
 from tasks.identification.decision.verdict import find_missing_effects
 from tasks.identification.inference.forward import predict_channels, prepare_run
@@ -64,6 +66,7 @@ def judged(
     design: tuple[RunPlan, ...] = LEAN,
     rules: DecisionRules = RULES,
     experiments: tuple[tuple[str, RunPlan], ...] = EXPERIMENTS[-1:],
+    hardly_known: dict[str, tuple[float, float]] | None = None,
 ) -> Verdict:
     """The verdict on a campaign; to weigh every planned run takes as long as all that comes before it."""
     slots = OUTSIDE[outside].slots if outside else ()
@@ -73,8 +76,9 @@ def judged(
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("tasks.identification.decision.experiment.EXPERIMENTS", experiments)
         return find_missing_effects(
-            replace(campaign, runs=runs), vehicle, SURFACE, tuple(LIBRARY.values()), rules
-        ).verdict
+            replace(campaign, runs=runs), vehicle, SURFACE, tuple(LIBRARY.values()), rules,
+            hardly_known=hardly_known or {},
+        ).verdict  # fmt: skip
 
 
 def names(verdict: Verdict) -> list[str]:
@@ -90,6 +94,44 @@ def test_a_number_off_beyond_its_tolerance_is_a_retune() -> None:
     assert speed.retuned < 1.1 * speed.after < speed.frozen, (
         "six tolerances are within a re-tuned session's reach"
     )
+
+
+@pytest.mark.minutes
+def test_an_effect_is_found_beside_a_gain_that_the_file_hardly_knows() -> None:
+    verdict = judged(
+        {"pressure_gain": 0.3, "lag": 0.08}, design=LEVEL,
+        hardly_known={"pressure_gain": (0.25, 2.0), "mass": (0.0, 1e-5)},
+    )  # fmt: skip
+    assert (verdict.verdict, names(verdict)) == ("FOUND", ["brake_lag", "retuned_pressure_gain"])
+    (lag,), (gain,) = (effect.parameters for effect in verdict.effects)
+    assert lag.ci_low < 0.08 < lag.ci_high and lag.ci_high - lag.ci_low < 0.02
+    assert gain.ci_low < 0.3 < gain.ci_high and gain.ci_high - gain.ci_low < 0.08
+
+
+@pytest.mark.parametrize(("least", "is_named"), [(None, True), (0.85, False)])
+def test_what_no_held_out_error_feels_is_no_discovery_where_the_gain_was_not_known(
+    monkeypatch: pytest.MonkeyPatch, least: float | None, is_named: bool
+) -> None:
+    error = make_error(0.9)
+    monkeypatch.setattr(decision, "compute_held_out_errors", lambda *_: (make_error(1.0), {}))
+    last = SimpleNamespace(
+        accepted=SimpleNamespace(hypothesis=SimpleNamespace(name="relaxation_length", effect_class="effect")),
+        base=None,
+    )
+    found = SimpleNamespace(evidence=SimpleNamespace(rules=RULES), rounds=[last])
+    start = SimpleNamespace(evidence=None, base=None)
+    objection = decision._object_to_last(found, start, error, least)
+    assert (objection is None) == is_named
+    assert is_named or "makes no difference of 15%" in str(objection)
+
+
+def make_error(after: float) -> dict[str, ChannelError]:
+    return {
+        "speed": ChannelError(
+            frozen=1.0, retuned=1.0, after=after, ci_low=0.0, ci_high=2.0, change_low=-1.0, change_high=1.0, wins=1,
+            worst_run="run", unit="m/s",
+        )
+    }  # fmt: skip
 
 
 def test_a_named_effect_about_which_the_runs_disagree_is_left_to_the_joint_fit() -> None:

@@ -1,4 +1,4 @@
-"""What a calibration procedure consists of: stages, bounds, and when it has converged."""
+"""A calibration procedure: its stages, bounds, and when it has converged."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

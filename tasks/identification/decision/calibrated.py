@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from tasks.campaign.campaign import SESSION, Tolerances
 from tasks.identification.decision.answer import NamedEffect, Parameter, is_within_tolerance, make_estimate
 from tasks.identification.inference.fit import Fit
@@ -32,13 +34,18 @@ def tell_calibrated(
     declared = dict(zip(SESSION, tolerances.session, strict=True))
     limit = rules.joint.wrong_number_tolerances
     within, wrong = list[NamedEffect](), list[NamedEffect]()
+    held = float(
+        np.linalg.norm([declared[n] for n, (_, sigma) in hardly_known.items() if sigma <= declared[n]])
+    )
     free = {name for name, (_, sigma) in hardly_known.items() if sigma > declared[name]}
     for effect in effects:
         row = effect.parameters[0]
         if effect.effect_class != "retune" or row.name not in free:
             continue
         place = SESSION.index(row.name)
-        value, error = float(fitted.session[place]), float(fitted.session_error[place])
+        value = float(fitted.session[place])
+        # what was held may be off by its own tolerance, and the gain makes up for it
+        error = float(np.hypot(fitted.session_error[place], (1.0 + value) * held))
         low, high = value - NORMAL_95 * error, value + NORMAL_95 * error
         estimate = Parameter(
             name=row.name,

@@ -114,7 +114,8 @@ def find_missing_effects(
     progress("held-out error")
     error, manoeuvres = compute_held_out_errors(start.evidence, start.base, found.base)
     tried = list(found.tried)
-    while compared and (objection := _object_to_last(found, start, error)):
+    least = rules.joint.noticed_share if hardly_known else None
+    while compared and (objection := _object_to_last(found, start, error, least)):
         reasons.append(objection)
         last, near_form = found.rounds[-1], None
         tried = [last.accepted, *tried]
@@ -217,10 +218,18 @@ def find_pair_to_confirm(tried: Sequence[Candidate], null: Fit) -> tuple[Fit, Fi
     return None if best is None else (best.fitted, null)
 
 
-def _object_to_last(found: SearchState, start: SearchState, error: Mapping[str, ChannelError]) -> str | None:
+def _object_to_last(
+    found: SearchState, start: SearchState, error: Mapping[str, ChannelError], least: float | None
+) -> str | None:
     """Return why held-out runs contradict what was named last; None if they do not.
 
     The marginal likelihood can buy a fit with disturbances; prediction of unseen runs cannot be bought.
+
+    Parameters
+    ----------
+    found, start : what is named, and the model as it stands
+    error : of what is named, by channel
+    least : share of the error of some channel that a name must leave at most; None takes that of forms, for forms
     """
     rules, last = found.evidence.rules, found.rounds[-1]
     worse = find_worse_channels(error, rules.worse_limit)
@@ -229,12 +238,13 @@ def _object_to_last(found: SearchState, start: SearchState, error: Mapping[str, 
             f"{', '.join(r.accepted.hypothesis.name for r in found.rounds)} would fit, but predicts"
             f" {', '.join(worse)} of the held-out runs worse than the frozen model: not named"
         )
-    if last.accepted.hypothesis.effect_class == "form":
+    if least is not None or last.accepted.hypothesis.effect_class == "form":
+        share = rules.noticed_share if least is None else least
         without, _ = compute_held_out_errors(start.evidence, start.base, last.base)
-        if not is_noticed(error, without, rules.noticed_share):
+        if not is_noticed(error, without, share):
             return (
                 f"{last.accepted.hypothesis.name} would fit, but makes no difference of"
-                f" {1.0 - rules.noticed_share:.0%} to the error of any channel of the held-out runs: not named"
+                f" {1.0 - share:.0%} to the error of any channel of the held-out runs: not named"
             )
     return None
 

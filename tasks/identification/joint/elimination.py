@@ -195,8 +195,8 @@ def find_substitutes(
 ) -> list[Substitute]:
     """Return what explains nearly as much as each named number in its place.
 
-    A number is worth what the fit loses without it. Another of its group that makes good nearly all of that is no
-    worse an explanation on these runs, whatever the likelihood of a model that is not exact says between them.
+    A number is worth what the fit loses without it. Another that makes good nearly all of that is no worse an
+    explanation on these runs, whatever the likelihood of a model that is not exact says between them.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ def find_substitutes(
     left = {n.name for n in fitted.numbers}
     found = []
     for number in fitted.numbers:
-        others = [n for n in everything if n.group == number.group and n.name not in left]
+        others = [n for n in everything if n.removable and n.name not in left]
         if not number.removable or not others:
             continue
         rest = tuple(n for n in fitted.numbers if n is not number)

@@ -78,6 +78,17 @@ def tell_rivals(
         one, other = named[of], rival.parameters[0]
         sentences.append(
             f"these runs cannot tell whether {numbers[one.name].say(one.value)} or"
-            f" {numbers[other.name].say(other.value)}: {SEPARATE[numbers[one.name].group]}"
+            f" {numbers[other.name].say(other.value)}: {find_separating_run([numbers[one.name], numbers[other.name]])}"
         )
     return sentences
+
+
+def find_separating_run(numbers: Sequence[JointNumber]) -> str | None:
+    """Return the run that tells numbers apart, the first of `SEPARATE` for a group of theirs; None where none is known.
+
+    Parameters
+    ----------
+    numbers : that these runs cannot tell apart
+    """
+    groups = {number.group for number in numbers}
+    return next((run for group, run in SEPARATE.items() if group in groups), None)

@@ -34,7 +34,7 @@ STEP = 0.0005
 START = -1
 """Number of steps that puts a drive to its start."""
 DONE, NO_TYRE = 1, 2
-"""What the function returns: it has done its steps, or the vehicle has no tyre family in this weather."""
+"""Value that the function returns: it has done its steps, or the vehicle has no tyre family in this weather."""
 
 _SUBSTEPS = np.int64(1)
 """Steps between samples; of this type, Numba takes the loop that it has compiled for every other run."""

@@ -54,7 +54,7 @@ INPUTS = (
     _define_input("ground_height_r", "m", "road height under the rear axle when the step begins, added to the road feature's"),
     _define_input("ground_slope_r", "1", "road slope under the rear axle, along which the road goes on within the step"),
 )  # fmt: skip
-"""What goes in, in the order of the block."""
+"""Inputs, in the order of the block."""
 
 _BESIDE_TELEMETRY = {
     row.name: row
@@ -79,6 +79,6 @@ def _find_output(name: str) -> EmbeddedVariable:
 
 
 OUTPUTS = tuple(_find_output(name) for name in COLUMNS)
-"""What comes out: the columns of a simulation, those of a dataset's telemetry by their names there."""
+"""Outputs: the columns of a simulation, those of a dataset's telemetry by their names there."""
 PLACE = {row.name: i for i, row in enumerate((*INPUTS, *OUTPUTS))}
 """Place of each variable in the block."""

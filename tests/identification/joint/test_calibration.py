@@ -104,6 +104,5 @@ def test_a_calibrated_gain_is_wrong_beyond_as_many_tolerances_as_the_rules_say(g
     assert not (within if is_wrong else wrong)
     assert told.name == "retuned_pressure_gain"
     (number,) = told.parameters
-    assert (number.ci_low, number.value, number.ci_high) == pytest.approx(
-        (gain - 0.0196, gain, gain + 0.0196)
-    )
+    reach = 1.96 * np.hypot(0.01, 0.01 * (1.0 + gain))  # of the fit, and of the mass that was held
+    assert (number.ci_low, number.value, number.ci_high) == pytest.approx((gain - reach, gain, gain + reach))

@@ -8,11 +8,18 @@ from scipy.stats import t as student
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.joint_numbers import load_joint_numbers
-from tasks.identification.joint.elimination import certain_from, certain_numbers, standard_errors
+from tasks.identification.joint import elimination
+from tasks.identification.joint.elimination import (
+    certain_from,
+    certain_numbers,
+    find_substitutes,
+    standard_errors,
+)
 from tasks.identification.joint.fit import JointFit
 
 RULES = load_decision_rules().joint
-LAG = next(n for n in load_joint_numbers() if n.name == "lag")
+NUMBERS = {number.name: number for number in load_joint_numbers()}
+LAG = NUMBERS["lag"]
 
 
 def fit_of(residuals: list[np.ndarray], value: float = 0.1) -> JointFit:
@@ -48,3 +55,17 @@ def test_a_number_is_certain_from_the_chance_of_a_false_name():
         error = float(standard_errors(fitted, rules)[0])
         assert not certain_numbers(replace(fitted, values=np.array([0.99 * limit * error])), rules)
         assert certain_numbers(replace(fitted, values=np.array([1.01 * limit * error])), rules)
+
+
+def test_whatever_explains_nearly_as_much_is_a_rival_of_whichever_kind(monkeypatch):
+    """An engine's drag passed for a curve of the brake: a rival was looked for among other curves alone."""
+    named = replace(fit_of([np.zeros(100)]), numbers=(NUMBERS["pressure_curve"],), cost=10.0)
+    cost = {"": 110.0, "engine_torque": 24.0, "push_out": 26.0}
+
+    def refit(_stops, fitted, numbers, _start=None):
+        left = {number.name for number in numbers}
+        return replace(fitted, numbers=numbers, cost=min(cost.get(name, 110.0) for name in left or {""}))
+
+    monkeypatch.setattr(elimination, "refit_numbers", refit)
+    found = find_substitutes([], named, list(NUMBERS.values()), 0.85)
+    assert [(one.of, one.name) for one in found] == [("pressure_curve", "engine_torque")]

@@ -23,6 +23,18 @@ def test_a_rival_is_told_in_plain_words_with_the_run_that_separates_the_two():
     )
 
 
+def test_a_resistance_is_told_from_anything_else_by_coasting():
+    curve, engine = (
+        named_effect("pressure_nonlinearity", "pressure_curve", 0.04),
+        named_effect("engine_braking", "engine_torque", 80.0),
+    )
+    for named, rival in ((curve, engine), (engine, curve)):
+        (sentence,) = tell_rivals([named], [(named.name, rival)], load_joint_numbers())
+        assert sentence.endswith(
+            "coast down from the highest speed to 5 m/s with the clutch open, and once in gear"
+        )
+
+
 def test_an_effect_is_said_with_its_first_number_alone_and_the_other_at_its_start() -> None:
     pads = next(effect for effect in load_effects() if effect.name == "pad_friction_speed")
     assert pads.say({"pad_speed": 0.02}) == "the pads lose 2 % of their friction per m/s above 15 m/s"
