@@ -16,7 +16,7 @@ from flows.store.address import open_for_reading
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
 from flows.store.outputs import Outputs
-from flows.store.sealed import read_manifest
+from flows.store.sealed import read_manifest, require_frames
 from flows.store.telemetry import read_columns
 from tasks.errors import InputError
 from tasks.render.traces import TRACES, add_traces
@@ -47,8 +47,7 @@ def make_films(
         raise InputError(f"{dataset}: must be a finished dataset; it has no manifest.json")
     manifest = read_manifest(layout)
     plan, rows = Plan.of(manifest, layout.manifest), manifest["clips"]
-    if not plan.settings.pictures:
-        raise InputError(f"{dataset}: must be a dataset with frames; it was made with --no-frames")
+    require_frames(manifest, dataset)
     chosen = select_clips(rows, clips, dataset) if clips else rows
     names = name_films(rows)
     results = Outputs(out, "preview", *(names[row["clip_id"]] for row in chosen))

@@ -11,7 +11,7 @@ from flows.store.address import open_for_reading
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
 from flows.store.outputs import Outputs
-from flows.store.sealed import read_manifest
+from flows.store.sealed import read_manifest, require_frames
 from flows.store.telemetry import read_columns
 from tasks.errors import InputError
 from tasks.render.contact_sheet import draw_picture_sheet, encode_png
@@ -75,7 +75,10 @@ def _open_finished(datasets: Sequence[str]) -> list[tuple[Layout, Sequence[Mappi
     lacking = [name for name, layout in zip(datasets, layouts, strict=True) if not layout.manifest.is_file()]
     if lacking:
         raise InputError([f"{name}: must be a finished dataset; it has no manifest.json" for name in lacking])
-    return [(layout, read_manifest(layout)["clips"]) for layout in layouts]
+    manifests = [read_manifest(layout) for layout in layouts]
+    for name, manifest in zip(datasets, manifests, strict=True):
+        require_frames(manifest, name)
+    return [(layout, manifest["clips"]) for layout, manifest in zip(layouts, manifests, strict=True)]
 
 
 def _list_weathers(clips: Sequence[Mapping[str, Any]]) -> list[list[Mapping[str, Any]]]:
