@@ -112,5 +112,6 @@ def _draw_pictures(layout: Layout, row: Mapping[str, Any], traces: bool) -> list
     pictures = list(read_clip(layout.frames, row["index"], "rgb"))
     if not traces:
         return pictures
-    columns = read_columns(layout.telemetry / "frames", row["clip_id"], [trace.column for trace in TRACES])
+    names = [trace.column for trace in TRACES]
+    columns = read_columns(layout.telemetry / "frames", row["clip_id"], names, len(pictures))
     return [add_traces(picture, columns, frame) for frame, picture in enumerate(pictures)]
