@@ -20,11 +20,14 @@ WEATHER_FIELDS = ("weather", "precipitation_mm_h", "snow_accumulation_h")
 BEFORE_M, AFTER_M = 5.0, 1.0
 """Way from the front axle to a feature's start, and from its end to the axle, in the outer stills [m]."""
 
+STATION_M = 12.0
+"""Where the weathers are shown if nobody says so [m]."""
+
 Picture = tuple[str, NDArray[np.uint8]]
 
 
 def draw_sheets(
-    dataset: str, out: str, *, station: float = 12.0, beside: Sequence[str] | None = None
+    dataset: str, out: str, *, station: float | None = None, beside: Sequence[str] | None = None
 ) -> dict[str, Any]:
     """Draw what a dataset's grid allows of the two sheets; further datasets add a row of their weathers each.
 
@@ -32,34 +35,33 @@ def draw_sheets(
     ----------
     dataset : a finished dataset
     out : folder for weather.png and hazards.png
-    station : where along the route the weathers are shown [m]
+    station : where along the route the weathers are shown; None takes `STATION_M`, or as far as all clips come [m]
     beside : finished datasets of other streets
 
     Raises
     ------
     InputError
-        A folder holds no finished dataset, the first one's grid has neither two weathers nor a road feature, or
-        another's has one weather only.
+        A folder holds no finished dataset with frames, the first one's grid has neither two weathers nor a road
+        feature, another's has one weather only, or a clip does not come to the station.
     """
     results = Outputs(out, "sheets", "weather.png", "hazards.png")
     (layout, clips), *others = _open_finished([dataset, *(beside or ())])
     hazards = pick_evenly([clip for clip in clips if clip["scenario"]["hazard_height_m"]], PREVIEW_CLIPS)
-    drawn: dict[str, list[list[Picture]]] = {
-        "weather": [
-            [_draw_still(layout, clip, station, clip["label"]) for clip in row]
-            for row in pick_evenly(_list_weathers(clips), PREVIEW_CLIPS)
-        ],
-        "hazards": [_draw_contact(layout, clip, clips) for clip in hazards],
-    }
-    if not any(drawn.values()):
+    weathers = [[(layout, clip) for clip in row] for row in pick_evenly(_list_weathers(clips), PREVIEW_CLIPS)]
+    if not hazards and not weathers:
         raise InputError(f"{dataset}: must have two weathers of one drive, or a road feature; it has neither")
     for name, (street, more_clips) in zip(beside or (), others, strict=True):
-        weathers = _list_weathers(more_clips)
-        if not weathers:
+        more = _list_weathers(more_clips)
+        if not more:
             raise InputError(
                 f"{name}: must have two weathers of one drive, to stand beside {dataset}; it has not"
             )
-        drawn["weather"].append([_draw_still(street, clip, station, clip["label"]) for clip in weathers[0]])
+        weathers.append([(street, clip) for clip in more[0]])
+    place = _choose_station(station, [drive for row in weathers for drive in row])
+    drawn = {
+        "weather": [[_draw_still(*drive, place, drive[1]["label"]) for drive in row] for row in weathers],
+        "hazards": [_draw_contact(layout, clip, clips) for clip in hazards],
+    }
     written = {}
     for name, rows in drawn.items():
         if rows:
@@ -90,6 +92,30 @@ def _list_weathers(clips: Sequence[Mapping[str, Any]]) -> list[list[Mapping[str,
     return [row for row in groups.values() if len(row) > 1]
 
 
+def _choose_station(asked: float | None, drives: Sequence[tuple[Layout, Mapping[str, Any]]]) -> float:
+    """Return the station at which every one of some clips has a frame [m].
+
+    Raises
+    ------
+    InputError
+        If a clip does not come to the one that is asked for.
+    """
+    ways = [
+        read_columns(layout.telemetry / "frames", clip["clip_id"], ["station"])["station"]
+        for layout, clip in drives
+    ]
+    first, last = max((way[0] for way in ways), default=0.0), min((way[-1] for way in ways), default=np.inf)
+    if asked is None:
+        return float(min(STATION_M, last))
+    if not first <= asked <= last and ways:
+        short = drives[int(np.argmin([way[-1] for way in ways]))][1]["label"]
+        raise InputError(
+            f"--station must lie in {first:.1f} to {last:.1f} m, where every clip of the sheet has frames"
+            f" ({short} ends first); it is {asked:g}"
+        )
+    return asked
+
+
 def _draw_contact(
     layout: Layout, clip: Mapping[str, Any], clips: Sequence[Mapping[str, Any]]
 ) -> list[Picture]:
@@ -118,8 +144,10 @@ def is_flat_twin(other: Mapping[str, Any], clip: Mapping[str, Any]) -> bool:
 
 
 def _draw_still(layout: Layout, clip: Mapping[str, Any], station: float, caption: str) -> Picture:
-    """The frame nearest to a station, and a caption with the body's pitch in it."""
+    """The frame nearest to a station, and a caption with the body's pitch in it, and whether the car comes so far."""
     columns = read_columns(layout.telemetry / "frames", clip["clip_id"], ["station", "pitch"])
     frame = int(np.argmin(np.abs(columns["station"] - station)))
     pitch = np.rad2deg(columns["pitch"][frame])
+    if columns["station"][-1] < station:
+        caption = f"{caption}, not reached"
     return f"{caption}  {pitch:.2f} deg", read_clip(layout.frames, clip["index"], "rgb")[frame]
