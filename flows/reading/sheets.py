@@ -42,7 +42,7 @@ def draw_sheets(
     ------
     InputError
         A folder holds no finished dataset with frames, the first one's grid has neither two weathers nor a road
-        feature, another's has one weather only, or a clip does not come to the station.
+        feature, another's has one weather only, or no clip comes to the station.
     """
     results = Outputs(out, "sheets", "weather.png", "hazards.png")
     (layout, clips), *others = _open_finished([dataset, *(beside or ())])
@@ -93,25 +93,23 @@ def _list_weathers(clips: Sequence[Mapping[str, Any]]) -> list[list[Mapping[str,
 
 
 def _choose_station(asked: float | None, drives: Sequence[tuple[Layout, Mapping[str, Any]]]) -> float:
-    """Return the station at which every one of some clips has a frame [m].
+    """Return the station to show [m]: the one asked for, else `STATION_M` or as far as all clips come.
 
     Raises
     ------
     InputError
-        If a clip does not come to the one that is asked for.
+        If no clip comes to the one that is asked for.
     """
     ways = [
         read_columns(layout.telemetry / "frames", clip["clip_id"], ["station"])["station"]
         for layout, clip in drives
     ]
-    first, last = max((way[0] for way in ways), default=0.0), min((way[-1] for way in ways), default=np.inf)
     if asked is None:
-        return float(min(STATION_M, last))
-    if not first <= asked <= last and ways:
-        short = drives[int(np.argmin([way[-1] for way in ways]))][1]["label"]
+        return float(min([STATION_M, *(way[-1] for way in ways)]))
+    if ways and not any(way[0] <= asked <= way[-1] for way in ways):
+        first, last = min(way[0] for way in ways), max(way[-1] for way in ways)
         raise InputError(
-            f"--station must lie in {first:.1f} to {last:.1f} m, where every clip of the sheet has frames"
-            f" ({short} ends first); it is {asked:g}"
+            f"--station must lie in {first:.1f} to {last:.1f} m, where a clip of the sheet has frames; it is {asked:g}"
         )
     return asked
 
