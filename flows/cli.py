@@ -2,6 +2,7 @@
 
 import os
 import sys
+from collections.abc import Callable
 
 from flows.parser import build_parser
 from flows.running.failures import INTERRUPTED, explain_end
@@ -17,10 +18,20 @@ def main() -> None:
     """Entry point: exit codes 0 done, 1 a check failed, 2 the input is wrong, 3 something broke, 130 interrupted."""
     for name, value in QUIET.items():
         os.environ.setdefault(name, value)
+    run_to_end(app)
+
+
+def run_to_end(run: Callable[[], object]) -> None:
+    """Run a program of this project, whose failures become the exit codes and sentences of ``musync``.
+
+    Parameters
+    ----------
+    run : what ``musync`` or ``python -m benchmarks.NAME`` does
+    """
     for stream in (sys.stdout, sys.stderr):
         stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]  # a terminal that knows ASCII only
     try:
-        app()
+        run()
     except SystemExit as end:
         if end.code != INTERRUPTED:
             raise

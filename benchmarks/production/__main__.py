@@ -12,9 +12,12 @@ from benchmarks.production.plan import ClipCosts, plan_production
 from benchmarks.production.requests import count_requests
 from benchmarks.production.scheduling import CALLS, WORKERS, measure_scheduling
 from catalogs.grids.form import MOST_CLIPS
+from flows.cli import run_to_end
 from flows.store.layout import Layout
 
-if __name__ == "__main__":
+
+def print_plan() -> None:
+    """Read the command line, and print what the production takes."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--clips", type=int, default=1_000_000)
     parser.add_argument("--workers", type=int, default=500)
@@ -28,3 +31,7 @@ if __name__ == "__main__":
         costs = replace(costs, scheduler_cpu_s=found["cpu_ms_per_call"] / 1e3)
     for name, value, unit in plan_production(asked.clips, asked.workers, MOST_CLIPS, costs):
         print(f"{name:36} {value:12,.1f} {unit}")
+
+
+if __name__ == "__main__":
+    run_to_end(print_plan)

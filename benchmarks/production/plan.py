@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from math import ceil
 
 from flows.running.runner import IN_FLIGHT
+from tasks.errors import InputError
 
 Row = tuple[str, float, str]
 """Name, value and unit."""
@@ -66,7 +67,17 @@ def plan_production(
     clips, workers : of the production [1]
     most_clips : of one grid [1]
     costs, prices : None takes the defaults
+
+    Raises
+    ------
+    InputError
+        If there is no clip, no worker, or a clip takes no time.
     """
+    asked = {"--clips": clips, "--workers": workers, "--cpu-s": (costs or ClipCosts()).cpu_s}
+    if wrong := [
+        f"{name} must be more than 0; it is {value:g}" for name, value in asked.items() if not value > 0
+    ]:
+        raise InputError(wrong)
     c, p = costs or ClipCosts(), prices or Prices()
     work_s = clips * (c.cpu_s + c.gather_cpu_s)
     making_s, driver_s = work_s / workers, clips * (c.driver_cpu_s + c.scheduler_cpu_s)

@@ -14,7 +14,7 @@ from flows.making.generate import create_frame_arrays, fan_out, open_workers
 from flows.making.input_changes import input_changes
 from flows.making.plan import Plan, read_plan
 from flows.running.orchestration import run_as_stage
-from flows.running.runner import RunnerName
+from flows.running.runner import RunnerName, check_runner
 from flows.store.address import open_for_writing, want_everything
 from flows.store.arrays import arrays_of
 from flows.store.frames import read_clip
@@ -68,10 +68,12 @@ def audit_dataset(
     Raises
     ------
     InputError
-        If the folder is no sealed dataset of this format, the share is not in [0, 1], or the key is none.
+        If the folder is no sealed dataset of this format, the share is not in [0, 1], the key is none, or there is no
+        such runner.
     """
     if not 0 <= share <= 1:
         raise InputError(f"--share must lie in 0 to 1; it is {share:g}")
+    check_runner(runner, scheduler)
     results = Outputs(out, "audit", "audit.html", "audit.json", "audit.txt")
     started = tell_time()
     changes: list[dict[str, Any]] = []

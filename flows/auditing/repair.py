@@ -15,7 +15,7 @@ from flows.making.input_changes import recorded_input
 from flows.making.plan import Plan, read_plan
 from flows.making.seal import clips_table, pairs_table, preview_sheet
 from flows.running.orchestration import run_as_stage
-from flows.running.runner import RunnerName
+from flows.running.runner import RunnerName, check_runner
 from flows.store.address import open_for_writing, send_files, want_everything
 from flows.store.layout import STAGED_TABLES, Layout, write_atomically, write_json
 from flows.store.lock import sole_writer
@@ -60,8 +60,10 @@ def repair_dataset(
     Raises
     ------
     InputError
-        The manifest itself is damaged, or inputs that clips follow from cannot be found any more.
+        The manifest itself is damaged, inputs that clips follow from cannot be found any more, or there is no such
+        runner.
     """
+    check_runner(runner, scheduler)
     results = Outputs(out, "repair", "repair.json")
     with open_for_writing(dataset, want_everything) as layout:
         result = _repair_locked(layout, runner, workers, scheduler)

@@ -245,7 +245,13 @@ COMMANDS = (
         options=(
             DATASET,
             define_option("out", str, "Folder for weather.png and hazards.png."),
-            define_option("station", float, "Station on the route where the weathers are shown [m].", 12.0),
+            define_option(
+                "station",
+                float | None,
+                "Station on the route where the weathers are shown [m].",
+                None,
+                shown_default="12, or as far as every clip comes",
+            ),
             define_option(
                 "beside",
                 list[str] | None,

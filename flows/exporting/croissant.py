@@ -18,7 +18,6 @@ import pyarrow.parquet as pq
 
 from catalogs.variants import warn_of_variant
 from flows.exporting.dataset import ExportedDataset
-from flows.exporting.whole_dataset import require_every_clip
 from flows.store.layout import write_json
 from tasks.conventions import CHANNELS_BY_NAME
 
@@ -47,13 +46,7 @@ def write_croissant(dataset: ExportedDataset, folder: Path) -> None:
     ----------
     dataset : with frames or without, all of its clips: the files are copied whole
     folder : empty
-
-    Raises
-    ------
-    InputError
-        If some of the clips are left out.
     """
-    require_every_clip(dataset, "croissant")
     tables = sorted(name for name in dataset.manifest["artifacts"] if name.endswith(".parquet"))
     files, records = [], []
     for name in tables:

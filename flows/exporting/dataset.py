@@ -38,7 +38,7 @@ class ExportedClip:
     record : what the manifest says of it
     ticks_file, frames_file : Parquet files with its rows
     camera : that saw it
-    pictures : whether it has frames
+    plan : that it was made by
     """
 
     layout: Layout
@@ -46,7 +46,7 @@ class ExportedClip:
     ticks_file: str
     frames_file: str
     camera: Camera
-    pictures: bool
+    plan: Plan
 
     @property
     def label(self) -> str:
@@ -57,6 +57,11 @@ class ExportedClip:
     def clip_id(self) -> str:
         """Content id."""
         return str(self.record["clip_id"])
+
+    @property
+    def pictures(self) -> bool:
+        """Whether it has frames."""
+        return self.plan.settings.pictures
 
     @property
     def name(self) -> str:
@@ -71,12 +76,13 @@ class ExportedClip:
     @cached_property
     def ticks(self) -> Columns:
         """Columns of the tick table."""
-        return self._read(self.ticks_file, TICK_COLUMNS)
+        return self._read(self.ticks_file, TICK_COLUMNS, self.plan.ticks)
 
     @cached_property
     def frames(self) -> Columns:
         """Columns of the frame table: the telemetry of each frame's tick, and ``T_world_rig`` [F, 16]."""
-        return self._read(self.frames_file, (*(channel.name for channel in FRAME_CHANNELS), *TICK_COLUMNS))
+        names = (*(channel.name for channel in FRAME_CHANNELS), *TICK_COLUMNS)
+        return self._read(self.frames_file, names, self.plan.settings.frames)
 
     @property
     def T_world_rig(self) -> NDArray[np.float64]:
@@ -101,8 +107,8 @@ class ExportedClip:
         """
         return {name: to_json_value(self.frames[name][frame]) for name in ("frame", "tick", *TICK_COLUMNS)}
 
-    def _read(self, file: str, required: Sequence[str]) -> Columns:
-        return read_columns(self.layout.root / file, self.clip_id, required)
+    def _read(self, file: str, required: Sequence[str], rows: int) -> Columns:
+        return read_columns(self.layout.root / file, self.clip_id, required, rows)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,7 +175,7 @@ class ExportedDataset:
                 ticks_file=files["ticks"][row["clip_id"]],
                 frames_file=files["frames"][row["clip_id"]],
                 camera=self.camera,
-                pictures=self.plan.settings.pictures,
+                plan=self.plan,
             )
             self.finish(row["label"])
 

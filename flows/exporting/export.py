@@ -35,7 +35,7 @@ def export_dataset(
     dataset : a finished dataset
     to : name of the format
     out : folder, new or empty; None takes ``DATASET-FORMAT`` beside the dataset
-    clips : labels or ids; None takes all that are not in quarantine
+    clips : labels or ids; None takes all that are not in quarantine, and all for a format of whole files
 
     Returns
     -------
@@ -52,12 +52,19 @@ def export_dataset(
     layout = open_for_reading(dataset)
     manifest = read_manifest(layout)
     rows: Sequence[Mapping[str, Any]] = manifest["clips"]
-    kept, left_out = (select_clips(rows, clips, dataset), []) if clips else part_quarantined(rows)
+    kept, left_out = (list(rows), []) if chosen.whole else part_quarantined(rows)
+    if clips:
+        kept, left_out = select_clips(rows, clips, dataset), []
     folder = choose_folder(dataset, to, out)
     problems = [
         *([] if kept else [f"{dataset}: every clip is in quarantine; name clips with --clip to export them"]),
         *_picture_problems(chosen, manifest, dataset),
     ]
+    if chosen.whole and len(kept) < len(rows):
+        problems.append(
+            f"{dataset}: --to {to} copies the dataset's own files and takes all {len(rows)} clips;"
+            f" {len(kept)} are asked for: leave --clip out"
+        )
     if problems:
         raise InputError(problems)
     refuse_changed_records(layout, manifest)

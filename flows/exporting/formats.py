@@ -14,6 +14,7 @@ class ExportFormat:
     files : what lies in the folder
     reader : package whose reader opens it, as a test does value by value; empty where Python has none
     pictures : whether it needs a dataset with frames
+    whole : whether it copies the dataset's own files, and so takes all of its clips, those in quarantine too
     package : module that the writer imports and a plain installation lacks; empty where it needs none
     """
 
@@ -22,6 +23,7 @@ class ExportFormat:
     files: str
     reader: str
     pictures: bool = False
+    whole: bool = False
     package: str = ""
 
 
@@ -84,12 +86,14 @@ FORMATS: tuple[ExportFormat, ...] = (
         writer="croissant:write_croissant",
         files="croissant.json, telemetry/",
         reader="mlcroissant",
+        whole=True,
     ),
     ExportFormat(
         name="ro-crate",
         writer="rocrate:write_rocrate",
         files="ro-crate-metadata.json, prov.json, telemetry/, inputs/",
         reader="roc-validator, prov",
+        whole=True,
     ),
 )
 FORMAT_NAMES = tuple(row.name for row in FORMATS)

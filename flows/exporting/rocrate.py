@@ -15,7 +15,6 @@ from typing import Any
 
 from catalogs.variants import warn_of_variant
 from flows.exporting.dataset import ExportedDataset
-from flows.exporting.whole_dataset import require_every_clip
 from flows.store.layout import write_json
 from manifests.canonical import sha256_of_file
 
@@ -36,13 +35,7 @@ def write_rocrate(dataset: ExportedDataset, folder: Path) -> None:
     ----------
     dataset : with frames or without, all of its clips
     folder : empty
-
-    Raises
-    ------
-    InputError
-        If some of the clips are left out.
     """
-    require_every_clip(dataset, "ro-crate")
     inputs = sorted(f"inputs/{name}" for name in dataset.manifest["inputs"])
     tables = sorted(name for name in dataset.manifest["artifacts"] if name.endswith(".parquet"))
     names = ["manifest.json", "plan.json", *inputs, *tables]

@@ -19,7 +19,9 @@ from flows.making.plan import TICK_RATE_HZ, Plan, read_plan
 from flows.making.traced import refuse_traced
 from flows.running.orchestration import run_as_stage
 from flows.store.address import open_for_reading
+from flows.store.layout import Layout
 from flows.store.outputs import Outputs
+from flows.store.sealed import read_manifest, require_frames
 from tasks.errors import InputError
 from tasks.eval.negative_controls import (
     Claim,
@@ -65,11 +67,12 @@ def run_controls(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If the folder is no finished dataset, or holds fewer than two clips.
+        If the folder is no finished dataset with frames, or holds fewer than two clips.
     """
     results = Outputs(out, "controls", "controls.json", "controls.svg")
     root = open_for_reading(dataset).root
     refuse_traced(read_plan(root).inputs, dataset, "controls")
+    require_frames(read_manifest(Layout(root)), dataset)
     facts = clip_facts(root)
     if len(facts) < 2:
         raise InputError(f"{root}: negative controls need at least two clips; there are {len(facts)}.")

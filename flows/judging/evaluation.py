@@ -15,13 +15,12 @@ from flows.judging.learned_rows import learned_rows
 from flows.judging.motion_rows import EventWindow, motion_rows
 from flows.judging.physics import clip_facts
 from flows.judging.road_edit_rows import road_edit_rows
-from flows.judging.standards import own_telemetry, reference_traces
+from flows.judging.standards import find_reference_cases, own_telemetry, reference_traces
 from flows.judging.trajectories import trajectory_files
 from flows.running.orchestration import run_as_stage
 from flows.store.address import open_for_reading
-from flows.store.layout import Layout
 from flows.store.outputs import Outputs
-from flows.store.sealed import read_manifest
+from flows.store.sealed import read_manifest, require_frames
 from flows.store.telemetry import write_parquet
 from tasks.errors import InputError
 from tasks.eval.severity import severity_agreement
@@ -67,20 +66,27 @@ def evaluate_dataset(
     Raises
     ------
     InputError
-        If the folder is no finished dataset, or a trajectory, a checkpoint or a reference cannot be used.
+        If the folder is no finished dataset with frames, or a trajectory, a checkpoint or a reference cannot be used.
     """
     if event_window not in get_args(EventWindow):
         raise InputError(f"event_window must be {' or '.join(get_args(EventWindow))}; it is {event_window}")
+    if metric and trajectories is None:
+        raise InputError(
+            "--metric speaks of the lengths in --trajectories, and there are none: give their folder too"
+        )
     results = Outputs(out, "evaluate", "evaluation.json", "evaluation.parquet", "evaluation.html")
-    root = open_for_reading(dataset).root
+    layout = open_for_reading(dataset)
+    manifest, root = read_manifest(layout), layout.root
+    require_frames(manifest, layout)
     judges = load_judges(learned)
     facts = clip_facts(root)
     told = trajectory_files(Path(trajectories), [row["clip_id"] for row in facts]) if trajectories else {}
+    cases = find_reference_cases(facts, Path(reference)) if reference is not None else None
     view = View(root=root, crf=crf)
     clips = [run_as_stage(judge_clip)(view, row, told.get(row["clip_id"]), metric=metric) for row in facts]
     standards = [own_telemetry(clips)]
-    if reference is not None:
-        standards.append(reference_traces(clips, Path(reference)))
+    if cases is not None:
+        standards.append(reference_traces(clips, cases))
     rows = [row for standard in standards for row in motion_rows(clips, standard, event_window)]
     rows += [*severity_rows(clips), *quality_rows(clips)]
     rows += run_as_stage(road_edit_rows)(view, clips)
@@ -88,7 +94,7 @@ def evaluate_dataset(
     rows += [figure_row(name, "-", "-", None, "1", note=note) for name, note in NOT_RUN.items()]
     rows += list(mean_rows(rows, clips))
     codec = "lossless" if crf is None else f"H.264 crf {crf}"
-    run_id = read_manifest(Layout(root))["run_id"]
+    run_id = manifest["run_id"]
     result = {
         "run_id": run_id, "codec": codec, "clips": len(clips), "rows": rows
     }  # fmt: skip

@@ -126,17 +126,26 @@ def drive_facts(root: Path, plan: Plan) -> dict[str, dict[str, Any]]:
     }
 
 
-def clip_columns(root: Path, table: str, facts: dict[str, Any]) -> dict[str, np.ndarray]:
+def clip_columns(
+    root: Path, table: str, facts: dict[str, Any], rows: int | None = None
+) -> dict[str, np.ndarray]:
     """One clip's columns of the tick or the frame table.
+
+    Parameters
+    ----------
+    root : of the dataset
+    table : ``ticks`` or ``frames``
+    facts : the clip's row
+    rows : how many there must be; None takes two or more [1]
 
     Raises
     ------
     InputError
-        If the clip or one of the table's columns is not there.
+        If the clip or one of the table's columns is not there, or it has another number of rows.
     """
     folder = Layout(root).telemetry / table
     channels = TICK_CHANNELS if table == "ticks" else (*FRAME_CHANNELS, *TICK_CHANNELS)
-    columns = read_columns(folder, facts["clip_id"], [channel.name for channel in channels])
+    columns = read_columns(folder, facts["clip_id"], [channel.name for channel in channels], rows)
     if len(columns["t_ns"]) < 2:
         raise InputError(f"{folder}: a clip must have two rows or more; {facts['clip_id']} has one")
     return columns

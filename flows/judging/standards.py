@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catalogs.reference_match import find_case
-from catalogs.references import read_reference
+from catalogs.references import Traces, read_reference
 from catalogs.scenario import SCENARIO_FIELDS, Scenario
 from flows.judging.judged_clip import JudgedClip
 from tasks.errors import InputError
@@ -66,15 +66,26 @@ def own_telemetry(clips: Sequence[JudgedClip]) -> Standard:
     return Standard(suffix="", motions=motions, absent={})
 
 
-def reference_traces(clips: Sequence[JudgedClip], folder: Path) -> Standard:
-    """Return the reference trace whose conditions a clip has, sampled at the clip's frames and not shifted.
-
-    After the end of a trace its station is held if the car stood by then; its pitch is not, for a car that has just
-    stopped rocks back.
+@dataclass(frozen=True, kw_only=True)
+class ReferenceCases:
+    """The reference trace of each clip that has one.
 
     Parameters
     ----------
-    clips : as their judges saw them
+    traces : name of the case and its columns, by clip id
+    absent : why a clip has none, by clip id
+    """
+
+    traces: Mapping[str, tuple[str, Traces]]
+    absent: Mapping[str, str]
+
+
+def find_reference_cases(rows: Sequence[Mapping[str, Any]], folder: Path) -> ReferenceCases:
+    """Return the reference case whose conditions each clip has; no picture is needed for it.
+
+    Parameters
+    ----------
+    rows : of the clip table
     folder : of reference traces
 
     Raises
@@ -83,18 +94,40 @@ def reference_traces(clips: Sequence[JudgedClip], folder: Path) -> Standard:
         If the folder cannot be read, or has the conditions of no clip.
     """
     reference = read_reference(folder)
-    traces = {case.case: columns for case, columns in reference}
-    motions, absent = {}, {}
+    columns = {case.case: columns for case, columns in reference}
+    traces, absent = {}, {}
+    for row in rows:
+        try:
+            name = find_case([case for case, _ in reference], _scenario_of(row), row["surface_friction"]).case
+        except InputError as error:
+            absent[row["clip_id"]] = "; ".join(error.problems)
+            continue
+        traces[row["clip_id"]] = name, columns[name]
+    if not traces:
+        raise InputError(
+            [f"{folder}: no clip of the dataset has a reference case"]
+            + [f"{folder}: clip {row['label']}: {absent[row['clip_id']]}" for row in rows[:3]]
+        )
+    return ReferenceCases(traces=traces, absent=absent)
+
+
+def reference_traces(clips: Sequence[JudgedClip], cases: ReferenceCases) -> Standard:
+    """Return each clip's reference trace, sampled at the clip's frames and not shifted.
+
+    After the end of a trace its station is held if the car stood by then; its pitch is not, for a car that has just
+    stopped rocks back.
+
+    Parameters
+    ----------
+    clips : as their judges saw them
+    cases : of `find_reference_cases`
+    """
+    motions = {}
     for clip in clips:
         key, times = clip.facts["clip_id"], clip.times
-        try:
-            case = find_case(
-                [case for case, _ in reference], _scenario_of(clip), clip.facts["surface_friction"]
-            ).case
-        except InputError as error:
-            absent[key] = "; ".join(error.problems)
+        if key not in cases.traces:
             continue
-        trace = traces[case]
+        case, trace = cases.traces[key]
         time, stands = trace["time"], trace["speed"][-1] <= ENDS_STANDING
         known = (times >= time[0] - 1e-9) & (times <= time[-1] + 1e-9)
         station = np.interp(times, time, trace["station"])
@@ -104,12 +137,7 @@ def reference_traces(clips: Sequence[JudgedClip], folder: Path) -> Standard:
             name=case,
             end=np.inf if known.all() else float(time[-1]),
         )
-    if not motions:
-        raise InputError(
-            [f"{folder}: no clip of the dataset has a reference case"]
-            + [f"{folder}: clip {clip.facts['label']}: {absent[clip.facts['clip_id']]}" for clip in clips[:3]]
-        )
-    return Standard(suffix="_reference", motions=motions, absent=absent)
+    return Standard(suffix="_reference", motions=motions, absent=cases.absent)
 
 
 def opening_of(clip: JudgedClip, meant: MeantMotion) -> float:
@@ -127,8 +155,8 @@ def opening_of(clip: JudgedClip, meant: MeantMotion) -> float:
     return float(np.interp(edge, meant.station[known], clip.times[known]))
 
 
-def _scenario_of(clip: JudgedClip) -> Scenario:
+def _scenario_of(row: Mapping[str, Any]) -> Scenario:
     """The scenario of a clip from its row, in which null and NaN both mean that there is no value."""
-    values: dict[str, Any] = {name: clip.facts[name] for name in SCENARIO_FIELDS}
+    values: dict[str, Any] = {name: row[name] for name in SCENARIO_FIELDS}
     known: dict[str, Any] = {name: None if value != value else value for name, value in values.items()}
     return Scenario(**known)

@@ -18,7 +18,7 @@ from flows.making.seal import seal_dataset
 from flows.running.failures import ClipsFailed, disk_full_sentence
 from flows.running.orchestration import run_as_stage
 from flows.running.progress import progress_bar
-from flows.running.runner import RunnerChoice, choose_runner, open_executor, run_unordered
+from flows.running.runner import RunnerChoice, check_runner, choose_runner, open_executor, run_unordered
 from flows.store.address import (
     forget_begun,
     open_for_reading,
@@ -104,7 +104,8 @@ def generate_dataset(
     Raises
     ------
     InputError
-        For a faulty grid, a folder that holds something else, or traces that do not show what the grid asks for.
+        For a faulty grid, a runner that does not exist, a folder that holds something else, or traces that do not show
+        what the grid asks for.
     ClipsFailed
         If clips failed, and not for want of an input; run the same command again to make just those.
     """
@@ -113,6 +114,7 @@ def generate_dataset(
     quarantined: dict[str, list[str]] | None = None
     with open_for_writing(out, want_progress) as layout:
         plan, inputs = make_plan(grid, select_backend(backend).name, vehicle, pictures=pictures)
+        check_runner(choose_runner(runner, plan.settings.pictures, scheduler), scheduler)
         _refuse_other_content(layout)
         if layout.manifest.is_file():
             _refuse_other_plan(layout, plan, inputs)

@@ -62,6 +62,11 @@ class Plan:
         """Length of the telemetry of every clip, from the first frame on [s]."""
         return self.settings.telemetry_s
 
+    @property
+    def ticks(self) -> int:
+        """Rows of every clip in the tick table, the first frame's among them [1]."""
+        return round(self.duration_s * TICK_RATE_HZ) + 1
+
     def as_json(self) -> dict[str, Any]:
         return self.head_as_json() | {"clips": [clip.as_json() for clip in self.clips]}
 

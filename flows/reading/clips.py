@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from catalogs.sentences import shorten
+from flows.reading.arguments import is_whole
 from flows.reading.suggestions import suggest_names
 from tasks.errors import InputError
 
@@ -75,7 +76,7 @@ class Clip:
         """
         rgb: Any = self.dataset.frames["rgb"]
         chosen = rgb.shape[1] // 2 if frame is None else frame
-        if not 0 <= chosen < rgb.shape[1]:
+        if not (is_whole(chosen) and 0 <= chosen < rgb.shape[1]):
             raise InputError(f"frame {frame}: must be one of the {rgb.shape[1]} frames of the clip, from 0")
         try:
             picture: NDArray[np.uint8] = rgb[self.record["index"], chosen]

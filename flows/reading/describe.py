@@ -6,7 +6,7 @@ from typing import Any
 from catalogs.cameras import load_camera
 from catalogs.grids import load_grid
 from catalogs.variants import warn_of_variant
-from flows.making.plan import TICK_RATE_HZ, make_plan
+from flows.making.plan import make_plan
 from flows.store.address import open_for_reading, stored_bytes, want_manifest
 from flows.store.sealed import read_manifest, recorded_grid
 
@@ -68,7 +68,7 @@ def validate_grid(grid: str) -> dict[str, Any]:
         load_grid(grid).settings.camera
     )  # of a file the plan records the name, without its folder
     frames = len(plan.clips) * settings.frames if settings.pictures else 0
-    ticks = len(plan.clips) * (int(plan.duration_s * TICK_RATE_HZ) + 1)
+    ticks = len(plan.clips) * plan.ticks
     pixels = frames * camera.width * camera.height
     per_pixel = BYTES_PER_PIXEL + (BYTES_OF_LABELS_PER_PIXEL if settings.labels else 0)
     seconds = CPU_SECONDS_PER_CLIP * len(plan.clips) + CPU_SECONDS_PER_MEGAPIXEL * pixels / 1e6

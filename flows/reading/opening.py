@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import duckdb
 import pyarrow as pa
 
+from flows.reading.arguments import list_names
 from flows.reading.clips import Clip, find_clip
 from flows.reading.connection import connect_sealed, quote_identifier
 from flows.reading.pictures import open_frames_store, open_labelled_frames
@@ -185,12 +186,12 @@ class Dataset:
 
     def _quote_columns(self, table: str, columns: str | Sequence[str]) -> list[str]:
         """Columns of a view as SQL takes them; DuckDB does not mind the case of a name."""
-        asked = _list_names(columns)
+        asked = list_names("columns", columns)
         if not asked:
             raise InputError(f"columns of {table}: must name one or more; None takes all")
         known = self.sql(f"SELECT * FROM {table}").columns
         folded = {name.casefold() for name in known}
-        wrong = [name for name in asked if not isinstance(name, str) or name.casefold() not in folded]
+        wrong = [name for name in asked if name.casefold() not in folded]
         if wrong:
             raise suggest_names(f"{table}: column", wrong, known, "data.schema()")
         return [quote_identifier(name) for name in asked]
@@ -255,22 +256,17 @@ class Dataset:
         """
         from flows.reading.windows import windows_of
 
-        columns, arrays = _list_names(columns), _list_names(arrays)
+        columns, arrays = list_names("columns", columns), list_names("arrays", arrays)
         folders = tuple(f"frames.zarr/{array}/" for array in arrays)
         # workers read the files of these arrays often: they have to be here, and no links
         open_for_reading(self.origin or self.root, lambda name: name.startswith(folders))
-        chosen = None if clips is None else _list_names(clips)
+        chosen = None if clips is None else list_names("clips", clips)
         step = window if stride is None else stride
         return windows_of(self._layout, self.manifest, window, step, columns, arrays, chosen, quarantined)
 
     def schema(self) -> dict[str, Any]:
         """Columns of every view with unit, paper symbol, CF standard name and description."""
         return list_columns()
-
-
-def _list_names(names: str | Sequence[str]) -> list[str]:
-    """Return the names as a list; a single one may be given by itself."""
-    return [names] if isinstance(names, str) else list(names)
 
 
 def open(dataset: str | Path, *, allow_files: bool = False) -> Dataset:

@@ -8,6 +8,7 @@ from flows.store.address import frames_store, open_for_reading
 from flows.store.frame_metadata import check_frames, read_local_metadata
 from flows.store.layout import Layout
 from flows.store.objects import Objects
+from flows.store.sealed import require_frames
 from tasks.conventions import CHANNELS_BY_NAME
 from tasks.errors import InputError
 
@@ -27,8 +28,7 @@ def open_frames_store(layout: Layout, manifest: Mapping[str, Any]) -> Any:
         metadata are not those that muSync writes. In an object store one that is missing is told when it is read.
     """
     grid = manifest["grid"]
-    if not grid.get("pictures", True):
-        raise InputError(f"{layout}: the dataset was made without frames")
+    require_frames(manifest, layout)
     if layout.origin is None:
         open_for_reading(layout.root, lambda name: name.startswith("frames.zarr/"))
         read = read_local_metadata(layout.frames)

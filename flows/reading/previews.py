@@ -16,7 +16,7 @@ from flows.store.address import open_for_reading
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
 from flows.store.outputs import Outputs
-from flows.store.sealed import read_manifest
+from flows.store.sealed import read_manifest, require_frames
 from flows.store.telemetry import read_columns
 from tasks.errors import InputError
 from tasks.render.traces import TRACES, add_traces
@@ -47,8 +47,7 @@ def make_films(
         raise InputError(f"{dataset}: must be a finished dataset; it has no manifest.json")
     manifest = read_manifest(layout)
     plan, rows = Plan.of(manifest, layout.manifest), manifest["clips"]
-    if not plan.settings.pictures:
-        raise InputError(f"{dataset}: must be a dataset with frames; it was made with --no-frames")
+    require_frames(manifest, dataset)
     chosen = select_clips(rows, clips, dataset) if clips else rows
     names = name_films(rows)
     results = Outputs(out, "preview", *(names[row["clip_id"]] for row in chosen))
@@ -113,5 +112,6 @@ def _draw_pictures(layout: Layout, row: Mapping[str, Any], traces: bool) -> list
     pictures = list(read_clip(layout.frames, row["index"], "rgb"))
     if not traces:
         return pictures
-    columns = read_columns(layout.telemetry / "frames", row["clip_id"], [trace.column for trace in TRACES])
+    names = [trace.column for trace in TRACES]
+    columns = read_columns(layout.telemetry / "frames", row["clip_id"], names, len(pictures))
     return [add_traces(picture, columns, frame) for frame, picture in enumerate(pictures)]

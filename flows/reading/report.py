@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from catalogs.cameras import load_camera
 from catalogs.variants import warn_of_variant
-from flows.making.plan import TICK_RATE_HZ
+from flows.making.input_changes import refuse_changed_records
+from flows.making.plan import TICK_RATE_HZ, Plan
 from flows.making.seal import pick_evenly
 from flows.pages import DATASET_PAGE, read_plotly
 from flows.reading.film import write_film
@@ -59,11 +60,13 @@ def make_report(dataset: str, *, out: str | None = None, clips: list[str] | None
     Raises
     ------
     InputError
-        The folder holds no finished dataset, a clip is not in it, or the page's folder holds other files.
+        The folder holds no finished dataset, its camera, plan or a table is not as recorded, a clip is not in it, or
+        the page's folder holds other files.
     """
     layout = open_for_reading(dataset)
     manifest = read_manifest(layout)
-    rows = manifest["clips"]
+    refuse_changed_records(layout, manifest)
+    rows, ticks = manifest["clips"], Plan.of(manifest, layout.manifest).ticks
     brought = select_clips(rows, clips, dataset) if clips else pick_evenly(rows, TRACED_CLIPS)
     folder = _choose_folder(layout, out)
     pictures = manifest["grid"].get("pictures", True)
@@ -78,7 +81,7 @@ def make_report(dataset: str, *, out: str | None = None, clips: list[str] | None
     ]
     page = Outputs(folder, COMMAND, *fixed, *of_clips)
     with page.alone():
-        made = _write_clips(layout, manifest, brought, page, pictures)
+        made = _write_clips(layout, manifest, brought, page, pictures, ticks)
         for name, content in fixed.items():
             page.write(name, content)
         page.remove_others(OF_A_CLIP.fullmatch)
@@ -171,15 +174,16 @@ def _write_clips(
     brought: Sequence[Mapping[str, Any]],
     page: Outputs,
     pictures: bool,
+    ticks: int,
 ) -> int:
     """Write the telemetry and make the missing films of some clips, on all processors; how many films were made."""
     filmed = {row["clip_id"] for row in brought if pictures and not page.path(_film_name(row)).is_file()}
     jobs = (
-        (layout, row, manifest["grid"]["frame_rate_hz"] if row["clip_id"] in filmed else None)
+        (layout, row, ticks, manifest["grid"]["frame_rate_hz"] if row["clip_id"] in filmed else None)
         for row in brought
     )
     with progress_bar("report", len(brought)) as advance, open_executor("threads") as executor:
-        for (_, row, _), future in run_unordered(executor, _make_clip_files, jobs):
+        for (_, row, *_), future in run_unordered(executor, _make_clip_files, jobs):
             for name, content in future.result().items():
                 page.write(name, content)
             advance(row["label"])
@@ -187,11 +191,12 @@ def _write_clips(
 
 
 def _make_clip_files(
-    layout: Layout, row: Mapping[str, Any], frame_rate_hz: float | None
+    layout: Layout, row: Mapping[str, Any], rows: int, frame_rate_hz: float | None
 ) -> dict[str, str | bytes | memoryview]:
     """Return the content of a clip's files by name: its telemetry, and its film where it has a frame rate."""
     clip_id, names = row["clip_id"], [channel.name for channel in TICK_CHANNELS]
-    ticks = read_columns(layout.telemetry / "ticks" / f"family={row['scenario']['weather']}", clip_id, names)
+    folder = layout.telemetry / "ticks" / f"family={row['scenario']['weather']}"
+    ticks = read_columns(folder, clip_id, names, rows)
     packed = _format_script(pack_columns(ticks, names))
     files: dict[str, str | bytes | memoryview] = {
         _traces_name(row): f"clipArrived({_format_script(clip_id)}, {packed});\n"

@@ -11,7 +11,7 @@ from flows.store.address import open_for_reading
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
 from flows.store.outputs import Outputs
-from flows.store.sealed import read_manifest
+from flows.store.sealed import read_manifest, require_frames
 from flows.store.telemetry import read_columns
 from tasks.errors import InputError
 from tasks.render.contact_sheet import draw_picture_sheet, encode_png
@@ -20,11 +20,14 @@ WEATHER_FIELDS = ("weather", "precipitation_mm_h", "snow_accumulation_h")
 BEFORE_M, AFTER_M = 5.0, 1.0
 """Way from the front axle to a feature's start, and from its end to the axle, in the outer stills [m]."""
 
+STATION_M = 12.0
+"""Where the weathers are shown if nobody says so [m]."""
+
 Picture = tuple[str, NDArray[np.uint8]]
 
 
 def draw_sheets(
-    dataset: str, out: str, *, station: float = 12.0, beside: Sequence[str] | None = None
+    dataset: str, out: str, *, station: float | None = None, beside: Sequence[str] | None = None
 ) -> dict[str, Any]:
     """Draw what a dataset's grid allows of the two sheets; further datasets add a row of their weathers each.
 
@@ -32,34 +35,33 @@ def draw_sheets(
     ----------
     dataset : a finished dataset
     out : folder for weather.png and hazards.png
-    station : where along the route the weathers are shown [m]
+    station : where along the route the weathers are shown; None takes `STATION_M`, or as far as all clips come [m]
     beside : finished datasets of other streets
 
     Raises
     ------
     InputError
-        A folder holds no finished dataset, the first one's grid has neither two weathers nor a road feature, or
-        another's has one weather only.
+        A folder holds no finished dataset with frames, the first one's grid has neither two weathers nor a road
+        feature, another's has one weather only, or no clip comes to the station.
     """
     results = Outputs(out, "sheets", "weather.png", "hazards.png")
     (layout, clips), *others = _open_finished([dataset, *(beside or ())])
     hazards = pick_evenly([clip for clip in clips if clip["scenario"]["hazard_height_m"]], PREVIEW_CLIPS)
-    drawn: dict[str, list[list[Picture]]] = {
-        "weather": [
-            [_draw_still(layout, clip, station, clip["label"]) for clip in row]
-            for row in pick_evenly(_list_weathers(clips), PREVIEW_CLIPS)
-        ],
-        "hazards": [_draw_contact(layout, clip, clips) for clip in hazards],
-    }
-    if not any(drawn.values()):
+    weathers = [[(layout, clip) for clip in row] for row in pick_evenly(_list_weathers(clips), PREVIEW_CLIPS)]
+    if not hazards and not weathers:
         raise InputError(f"{dataset}: must have two weathers of one drive, or a road feature; it has neither")
     for name, (street, more_clips) in zip(beside or (), others, strict=True):
-        weathers = _list_weathers(more_clips)
-        if not weathers:
+        more = _list_weathers(more_clips)
+        if not more:
             raise InputError(
                 f"{name}: must have two weathers of one drive, to stand beside {dataset}; it has not"
             )
-        drawn["weather"].append([_draw_still(street, clip, station, clip["label"]) for clip in weathers[0]])
+        weathers.append([(street, clip) for clip in more[0]])
+    place = _choose_station(station, [drive for row in weathers for drive in row])
+    drawn = {
+        "weather": [[_draw_still(*drive, place, drive[1]["label"]) for drive in row] for row in weathers],
+        "hazards": [_draw_contact(layout, clip, clips) for clip in hazards],
+    }
     written = {}
     for name, rows in drawn.items():
         if rows:
@@ -75,7 +77,10 @@ def _open_finished(datasets: Sequence[str]) -> list[tuple[Layout, Sequence[Mappi
     lacking = [name for name, layout in zip(datasets, layouts, strict=True) if not layout.manifest.is_file()]
     if lacking:
         raise InputError([f"{name}: must be a finished dataset; it has no manifest.json" for name in lacking])
-    return [(layout, read_manifest(layout)["clips"]) for layout in layouts]
+    manifests = [read_manifest(layout) for layout in layouts]
+    for name, manifest in zip(datasets, manifests, strict=True):
+        require_frames(manifest, name)
+    return [(layout, manifest["clips"]) for layout, manifest in zip(layouts, manifests, strict=True)]
 
 
 def _list_weathers(clips: Sequence[Mapping[str, Any]]) -> list[list[Mapping[str, Any]]]:
@@ -85,6 +90,28 @@ def _list_weathers(clips: Sequence[Mapping[str, Any]]) -> list[list[Mapping[str,
         rest = tuple(value for key, value in sorted(clip["scenario"].items()) if key not in WEATHER_FIELDS)
         groups.setdefault(rest, []).append(clip)
     return [row for row in groups.values() if len(row) > 1]
+
+
+def _choose_station(asked: float | None, drives: Sequence[tuple[Layout, Mapping[str, Any]]]) -> float:
+    """Return the station to show [m]: the one asked for, else `STATION_M` or as far as all clips come.
+
+    Raises
+    ------
+    InputError
+        If no clip comes to the one that is asked for.
+    """
+    ways = [
+        read_columns(layout.telemetry / "frames", clip["clip_id"], ["station"])["station"]
+        for layout, clip in drives
+    ]
+    if asked is None:
+        return float(min([STATION_M, *(way[-1] for way in ways)]))
+    if ways and not any(way[0] <= asked <= way[-1] for way in ways):
+        first, last = min(way[0] for way in ways), max(way[-1] for way in ways)
+        raise InputError(
+            f"--station must lie in {first:.1f} to {last:.1f} m, where a clip of the sheet has frames; it is {asked:g}"
+        )
+    return asked
 
 
 def _draw_contact(
@@ -115,8 +142,10 @@ def is_flat_twin(other: Mapping[str, Any], clip: Mapping[str, Any]) -> bool:
 
 
 def _draw_still(layout: Layout, clip: Mapping[str, Any], station: float, caption: str) -> Picture:
-    """The frame nearest to a station, and a caption with the body's pitch in it."""
+    """The frame nearest to a station, and a caption with the body's pitch in it, and whether the car comes so far."""
     columns = read_columns(layout.telemetry / "frames", clip["clip_id"], ["station", "pitch"])
     frame = int(np.argmin(np.abs(columns["station"] - station)))
     pitch = np.rad2deg(columns["pitch"][frame])
+    if columns["station"][-1] < station:
+        caption = f"{caption}, not reached"
     return f"{caption}  {pitch:.2f} deg", read_clip(layout.frames, clip["index"], "rgb")[frame]

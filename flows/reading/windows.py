@@ -13,6 +13,7 @@ import torch
 from torch.utils.data import Dataset, Sampler
 
 from catalogs.sentences import shorten, shorten_value
+from flows.reading.arguments import is_whole
 from flows.reading.table_files import table_files
 from flows.store.arrays import arrays_of
 from flows.store.frame_metadata import check_array, check_frames, read_local_metadata
@@ -92,9 +93,21 @@ class SeededOrder(Sampler[int]):
     ----------
     length : number of samples [1]
     seed : of the whole training [1]
+
+    Raises
+    ------
+    InputError
+        If one of them is no whole number of 0 or more.
     """
 
     def __init__(self, length: int, seed: int):
+        problems = [
+            f"{name} must be a whole number of 0 or more; it is {shorten_value(value)}"
+            for name, value in (("length", length), ("seed", seed))
+            if not (is_whole(value) and value >= 0)
+        ]
+        if problems:
+            raise InputError(problems)
         self.length, self.seed, self.epoch = length, seed, 0
 
     def set_epoch(self, epoch: int) -> None:
@@ -137,12 +150,14 @@ def windows_of(
     problems = _column_problems(files[0], columns)
     problems += [f"array {name!r}: the dataset has {', '.join(sorted(stored)) or 'no frames'}"
                  for name in arrays if name not in stored]  # fmt: skip
-    if not 1 <= window <= frames:
-        problems.append(f"window must lie in 1 to the {frames} frames of a clip; it is {window}")
+    if not (is_whole(window) and 1 <= window <= frames):
+        problems.append(
+            f"window must be a whole number in 1 to the {frames} frames of a clip; it is {shorten_value(window)}"
+        )
     if repeated := sorted({name for name in columns if list(columns).count(name) > 1}):
         problems.append(f"columns must name each column once; {', '.join(repeated)} stand there twice")
-    if stride < 1:
-        problems.append(f"stride must be 1 or more; it is {stride}")
+    if not (is_whole(stride) and stride >= 1):
+        problems.append(f"stride must be a whole number of 1 or more; it is {shorten_value(stride)}")
     named = {name for row in rows for name in (row["label"], row["clip_id"])}
     problems += [
         f"clip {name!r}: no such label or id in the dataset" for name in sorted(set(clips or ()) - named)

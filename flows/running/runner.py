@@ -10,7 +10,7 @@ from itertools import islice
 from multiprocessing import get_context, parent_process
 from queue import SimpleQueue
 from threading import Thread
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from flows.running.terminal import print_lines
 from tasks.errors import InputError
@@ -53,11 +53,10 @@ def open_executor(
     Raises
     ------
     InputError
-        If a scheduler is named for another runner, none answers at the address, or its workers are not set up like
-        this machine.
+        If there is no such runner, a scheduler is named for another one, none answers at the address, or its workers
+        are not set up like this machine.
     """
-    if scheduler is not None and runner != "dask":
-        raise InputError(f"--scheduler {scheduler} belongs to --runner dask; the runner is {runner}")
+    check_runner(runner, scheduler)
     count = workers or len(os.sched_getaffinity(0))
     for name in ONE_THREAD:
         os.environ.setdefault(name, "1")
@@ -71,6 +70,33 @@ def open_executor(
     else:
         with _dask_client(count, scheduler, warm) as client, client.get_executor(pure=False) as executor:
             yield executor
+
+
+def check_runner(runner: str, scheduler: str | None) -> None:
+    """Raise `InputError` for a runner that does not exist, or a scheduler that it does not take.
+
+    Parameters
+    ----------
+    runner : ``threads``, ``processes`` or ``dask``
+    scheduler : address of a running Dask scheduler
+    """
+    if problems := list_runner_problems(runner, scheduler):
+        raise InputError(problems)
+
+
+def list_runner_problems(runner: str, scheduler: str | None) -> list[str]:
+    """Return a sentence for each rule that a runner and a scheduler break.
+
+    Parameters
+    ----------
+    runner, scheduler : as of `check_runner`
+    """
+    problems = []
+    if runner not in get_args(RunnerName):
+        problems.append(f"--runner must be one of {', '.join(get_args(RunnerName))}; it is {runner}")
+    if scheduler is not None and runner != "dask":
+        problems.append(f"--scheduler {scheduler} belongs to --runner dask; the runner is {runner}")
+    return problems
 
 
 def end_with_parent() -> None:

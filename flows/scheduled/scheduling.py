@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
 from time import process_time
-from typing import Any, get_args
+from typing import Any
 
 from flows.making.generate import generate_dataset
 from flows.making.plan import make_plan
-from flows.running.runner import RunnerName
+from flows.running.runner import RunnerName, list_runner_problems
 from flows.scheduled.failure_report import format_stamp
 from flows.scheduled.notification import EVENTS, WHEN_NONE_IS_NAMED, notify_problem
 from flows.scheduled.prefect_server import prefect_api
@@ -164,10 +164,7 @@ def checked_parameters(
         problems += error.problems
     root = out.rstrip("/") if is_address(out) else str(Path(out).resolve())
     problems += _place_problems(out)
-    if runner not in get_args(RunnerName):
-        problems.append(f"--runner must be one of {', '.join(get_args(RunnerName))}; it is {runner}")
-    if scheduler is not None and runner != "dask":
-        problems.append(f"--scheduler {scheduler} belongs to --runner dask; the runner is {runner}")
+    problems += list_runner_problems(runner, scheduler)
     if scheduler is not None and not re.fullmatch(r"(tcp|tls)://[^/]+:\d+", scheduler):
         problems.append(f"--scheduler must be like tcp://host:8786 or tls://host:8786; it is {scheduler!r}")
     told = notify_problem(notify) if notify is not None else None

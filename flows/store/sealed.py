@@ -60,6 +60,21 @@ def read_manifest_head(layout: Layout) -> ManifestHead:
     return record
 
 
+def require_frames(manifest: Mapping[str, Any], place: object) -> None:
+    """Raise `InputError` for a dataset of telemetry alone.
+
+    Parameters
+    ----------
+    manifest : of the dataset
+    place : what messages call it
+    """
+    if not manifest["grid"].get("pictures", True):
+        raise InputError(
+            f"{place}: the dataset was made without frames (--no-frames), which this needs: generate its grid with them"
+            " into another folder"
+        )
+
+
 def _refuse_unfinished(layout: Layout) -> None:
     if layout.plan.is_file() and not layout.manifest.is_file():
         clips = read_plan_record(layout)["clips"]

@@ -222,10 +222,27 @@ def _refuse_columns(
 
 
 def read_columns(
-    path: Path, clip_id: str | None = None, required: Iterable[str] = ()
+    path: Path, clip_id: str | None = None, required: Iterable[str] = (), rows: int | None = None
 ) -> dict[str, np.ndarray]:
-    """The columns of `read_table` as NumPy arrays."""
-    return table_columns(read_table(path, clip_id, required))
+    """The columns of `read_table` as NumPy arrays.
+
+    Parameters
+    ----------
+    path, clip_id, required : as of `read_table`
+    rows : how many there must be; None takes any number [1]
+
+    Raises
+    ------
+    InputError
+        As `read_table` raises it, or for another number of rows.
+    """
+    table = read_table(path, clip_id, required)
+    if rows is not None and len(table) != rows:
+        raise InputError(
+            f"{path}: must hold {rows} rows of clip {clip_id}; it holds {len(table)}: musync repair makes the table"
+            " again"
+        )
+    return table_columns(table)
 
 
 def table_columns(table: pa.Table) -> dict[str, np.ndarray]:

@@ -22,6 +22,7 @@ from flows.running.progress import progress_bar
 from flows.store.outputs import Outputs
 from tasks.errors import InputError
 from tasks.eval.foreign_video import VideoClaim
+from tasks.eval.video_motion import WINDOWS
 
 COLUMNS = (
     "e_weather", "e_geometry_hump", "e_geometry_depression", "motion_retention", "e_path",
@@ -52,15 +53,16 @@ def judge_video_set(
     Raises
     ------
     InputError
-        For every file that cannot be read, or that no clip of the protocol has.
+        For every file that cannot be read, or that no clip of the protocol has; or for another window.
     """
     results = Outputs(out, "judge-set", "judge-set.json", "judge-set.md")
     chosen = load_video_protocol(protocol)
     smoothing = int(chosen.smoothing_window.value) if window is None else window
+    known = [width or 0 for width in WINDOWS]
+    if smoothing not in known:
+        raise InputError(f"--window must be one of {', '.join(map(str, known))} frames; it is {smoothing}")
     judged = _look_at_set(find_set(Path(folder), chosen), chosen, learned)
     rows = list(run_as_stage(list_figures)(judged))
-    if smoothing not in {row["window"] for row in rows if row["metric"] == "e_weather"} | {0, 5, 7, 9}:
-        raise InputError(f"window must be 0, 5, 7 or 9; it is {smoothing}")
     table = [*measured_table(judged.files, rows, smoothing), *printed_table(chosen)]
     result = {
         "protocol": protocol, "window": smoothing, "models": list(judged.files.models), "table": table,
@@ -194,7 +196,10 @@ def _look_at_set(files: VideoSet, protocol: VideoProtocol, learned: str | None) 
                 seen = look_at_clip(clip, camera, judges, kinds)
                 motions[clip.model, clip.seed, clip.clip, clip.method] = seen
             except InputError as error:
-                problems += [f"{clip.path}: {problem}" for problem in error.problems]
+                problems += [
+                    problem if problem.startswith(str(clip.path)) else f"{clip.path}: {problem}"
+                    for problem in error.problems
+                ]
             advance(f"{clip.model} {clip.clip}")
     if problems:
         raise InputError(cap_problems(problems))

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 import musync
-from benchmarks.learn_friction.__main__ import GRID, paint_grid
+from benchmarks.learn_friction.__main__ import GRID, open_made, paint_grid
 from benchmarks.learn_friction.baselines import describe_command, fit_ridge, predict_by_ridge
 from benchmarks.learn_friction.comparison import PAINTED, compare_predictors, format_errors
 from benchmarks.learn_friction.network import train_network
@@ -22,6 +22,7 @@ from benchmarks.learn_friction.samples import (
 )
 from catalogs.grids import load_grid
 from flows.making.generate import generate_dataset
+from tasks.errors import InputError
 from tests.documents import DOCS, list_blocks
 
 
@@ -160,3 +161,8 @@ def test_the_comparison_judges_the_painted_world_by_what_the_car_does(drawn: Sam
     }
     true, own = float(table[PAINTED][0]), float(table[f"{PAINTED}, by its own labels"][0])
     assert float(table["network"][0]) < true and own < true
+
+
+def test_a_dataset_of_another_grid_is_not_trained_on(toy_dataset):
+    with pytest.raises(InputError, match=r"must be the dataset of benchmarks/learn_friction/grid\.yaml"):
+        open_made(str(toy_dataset.root))

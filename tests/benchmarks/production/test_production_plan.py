@@ -7,6 +7,7 @@ import pytest
 from benchmarks.production.plan import ClipCosts, Prices, plan_production
 from benchmarks.production.scheduling import measure_scheduling
 from flows.store.layout import Layout
+from tasks.errors import InputError
 
 COSTS = ClipCosts(
     cpu_s=9.0, gather_cpu_s=1.0, driver_cpu_s=0.1, scheduler_cpu_s=0.02, frames_bytes=1e6, tables_bytes=1e6,
@@ -47,3 +48,13 @@ def test_workers_of_another_process_are_kept_busy_and_only_scheduler_and_driver_
     found = measure_scheduling(Layout(Path("/shared/sets/x")), workers=4, calls=12, clip_s=1.0)
     assert found["calls"] == 12 and 0.5 < found["busy"] <= 1.0
     assert 0.0 < found["cpu_ms_per_call"] < 200.0
+
+
+def test_no_clips_no_workers_and_clips_that_take_no_time_are_refused_together():
+    with pytest.raises(InputError) as caught:
+        list(plan_production(-5, 0, 10_000, ClipCosts(cpu_s=float("nan"))))
+    assert list(caught.value.problems) == [
+        "--clips must be more than 0; it is -5",
+        "--workers must be more than 0; it is 0",
+        "--cpu-s must be more than 0; it is nan",
+    ]

@@ -23,11 +23,14 @@ from flows.judging.controls import (
     summarise_controls,
 )
 from flows.judging.controls_figure import roc_figure
+from flows.judging.evaluation import evaluate_dataset
 from flows.judging.judged_clip import METHODS, JudgedClip
 from flows.judging.physics import clip_columns, clip_facts
 from flows.making.catalogue import catalogue_of
 from flows.making.generate import generate_dataset
 from flows.making.plan import read_plan
+from flows.reading.previews import make_films
+from flows.reading.sheets import draw_sheets
 from tasks.errors import InputError
 from tasks.eval.negative_controls import Claim
 from tasks.eval.poses.motion import RecoveredMotion
@@ -182,6 +185,7 @@ def test_the_command_fails_and_names_what_could_not_be_tried(
     made = {clip.facts["clip_id"]: clip for clip in clips}
     monkeypatch.setattr(judging_controls, "judge_clip", lambda view, facts: made[facts["clip_id"]])
     monkeypatch.setattr(judging_controls, "run_as_stage", lambda work: work)
+    monkeypatch.setattr(judging_controls, "require_frames", lambda manifest, place: None)
     arguments = ["controls", str(dataset), "--out", str(tmp_path / "out")]
     assert CliRunner().invoke(app, arguments).exit_code == 0
     monkeypatch.setattr(judging_controls, "LEAST_PITCH", 9.0)
@@ -190,6 +194,21 @@ def test_the_command_fails_and_names_what_could_not_be_tried(
     assert result.exit_code == 1 and "sign-flip: not tried" in result.output
     told = json.loads((tmp_path / "out" / "controls.json").read_text())
     assert not told["all_detected"] and {row["metric"] for row in told["rows"]} == set(UNREAD)
+
+
+def test_what_needs_pictures_says_that_the_dataset_was_made_without_and_advises_no_repair(
+    dataset: Path, tmp_path: Path
+) -> None:
+    place, out = str(dataset), str(tmp_path)
+    for run in (
+        lambda: run_controls(place),
+        lambda: evaluate_dataset(place, out=out),
+        lambda: draw_sheets(place, out),
+        lambda: make_films(place, out),
+    ):
+        with pytest.raises(InputError, match=r"made: the dataset was made without frames \(--no-frames\)"):
+            run()
+    assert not any(tmp_path.iterdir())
 
 
 def test_a_folder_that_is_no_dataset_is_refused(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """`musync evaluate` end to end on a toy dataset: every figure is a number with its note, or says why not."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from flows.judging import evaluation
 from flows.judging.evaluation import NOT_RUN, evaluate_dataset
 from flows.judging.physics import clip_columns, clip_facts
 from flows.making.catalogue import catalogue_of
@@ -200,3 +202,21 @@ def test_a_reference_for_no_clip_and_an_unknown_window_are_refused(judged: Path,
     with pytest.raises(InputError, match="event_window must be contact or paper; it is late"):
         evaluate_dataset(made, out=str(tmp_path / "a"), event_window="late")  # type: ignore[arg-type]
     assert not (tmp_path / "a").exists() and traces.is_dir()
+
+
+def test_a_reference_that_cannot_be_used_is_refused_before_a_clip_is_judged(
+    judged: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(evaluation, "judge_clip", None)
+    made, traces = str(judged.parent / "made"), tmp_path / "other"
+    shutil.copytree(judged.parent / "reference", traces)
+    cases = json.loads((traces / "cases.json").read_text())
+    (traces / "cases.json").write_text(json.dumps([case | {"surface_coefficient": 0.5} for case in cases]))
+    with pytest.raises(InputError, match="no clip of the dataset has a reference case"):
+        evaluate_dataset(made, out=str(tmp_path / "out"), reference=str(traces))
+    with pytest.raises(InputError, match=r"nowhere/cases\.json: no such file"):
+        evaluate_dataset(made, out=str(tmp_path / "out"), reference=str(tmp_path / "nowhere"))
+    with pytest.raises(
+        InputError, match="--metric speaks of the lengths in --trajectories, and there are none"
+    ):
+        evaluate_dataset(made, out=str(tmp_path / "out"), metric=True)

@@ -13,6 +13,8 @@ from flows.exporting.export import export_dataset
 from flows.judging.evaluation import evaluate_dataset
 from flows.judging.physics import audit_physics
 from flows.reading.describe import describe_dataset
+from flows.reading.previews import make_films
+from flows.reading.report import make_report
 from flows.store.layout import Layout
 from flows.store.telemetry import read_table
 from tasks.errors import InputError
@@ -87,6 +89,7 @@ USE_INPUTS = {
     "audit-physics": lambda root: audit_physics(root),
     "explain": lambda root: explain_frame(root, "dry/flat", 3),
     "export": lambda root: export_dataset(root, "tum", out=f"{root}-out", clips=["dry/flat"]),
+    "report": lambda root: make_report(root, out=f"{root}-out"),
 }
 
 
@@ -97,6 +100,28 @@ def test_a_camera_or_a_rate_that_was_edited_by_hand_is_not_believed(dataset_copy
     path.write_text(path.read_text().replace("value: 80", "value: 160").replace('_hz": 10', '_hz": 20'))
     with pytest.raises(InputError, match=f"{name}: must be as recorded"):
         USE_INPUTS[command](str(dataset_copy.root))
+
+
+READ_CLIPS = {
+    "evaluate": ("frames", lambda root: evaluate_dataset(root, out=f"{root}-out")),
+    "explain": ("frames", lambda root: explain_frame(root, "dry/flat", 3)),
+    "export": ("frames", lambda root: export_dataset(root, "tum", out=f"{root}-out", clips=["dry/flat"])),
+    "preview": ("frames", lambda root: make_films(root, f"{root}-out", clips=["dry/flat"])),
+    "report": ("ticks", lambda root: make_report(root, out=f"{root}-out", clips=["dry/flat"])),
+}
+
+
+@pytest.mark.parametrize("command", READ_CLIPS)
+def test_a_clip_that_lost_rows_is_not_read_as_a_shorter_one(dataset_copy, command):
+    table, read = READ_CLIPS[command]
+    path = dataset_copy.telemetry / table / "family=dry" / "part-0000.parquet"
+    rows = pq.read_table(path)
+    whole = sum(label == "dry/flat" for label in rows["label"].to_pylist())
+    pq.write_table(rows.slice(3), path)
+    with pytest.raises(
+        InputError, match=f"must hold {whole} rows of clip .*; it holds {whole - 3}: musync repair"
+    ):
+        read(str(dataset_copy.root))
 
 
 def test_a_table_of_clips_that_lost_rows_is_not_judged_as_if_it_were_whole(dataset_copy):

@@ -244,5 +244,30 @@ def test_wrong_arguments_of_windows_are_listed_all_at_once(data):
     assert len(caught.value.problems) == 6
 
 
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ({"window": 2.5}, "window must be a whole number in 1 to the 11 frames of a clip; it is 2.5"),
+        ({"window": "4"}, "window must be a whole number in 1 to the 11 frames of a clip; it is '4'"),
+        ({"window": True}, "window must be a whole number in 1 to the 11 frames of a clip; it is True"),
+        ({"window": 4, "stride": 1.5}, "stride must be a whole number of 1 or more; it is 1.5"),
+        ({"window": 4, "columns": None}, "columns must be a name or a list of names; it is None"),
+        ({"window": 4, "clips": 3}, "clips must be a name or a list of names; it is 3"),
+        ({"window": 4, "clips": [["dry/flat"]]}, r"clips must be a name or a list of names; it is \[\['dry/flat"),
+    ],
+)  # fmt: skip
+def test_windows_of_half_a_frame_and_names_that_are_none_are_one_sentence(data, arguments, told):
+    with pytest.raises(InputError, match=told):
+        data.torch(**{"columns": ["speed"], "quarantined": True} | arguments)
+
+
+def test_an_order_and_a_picture_need_whole_numbers(data):
+    for length, seed, told in ((10.5, 1, "length"), (10, 1.5, "seed"), (10, -1, "seed"), (-1, 1, "length")):
+        with pytest.raises(InputError, match=f"{told} must be a whole number of 0 or more; it is"):
+            musync.SeededOrder(length, seed=seed)
+    with pytest.raises(InputError, match=r"frame 1\.5: must be one of the 11 frames"):
+        data["dry/flat"].picture(1.5)
+
+
 def test_every_tick_channel_is_a_column(data):
     assert {c.name for c in TICK_CHANNELS} <= set(data.telemetry("ticks").schema.names)

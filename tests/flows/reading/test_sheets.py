@@ -3,7 +3,9 @@
 import cv2
 import pytest
 
-from flows.reading.sheets import draw_sheets, is_flat_twin
+from flows.reading.sheets import _draw_still, draw_sheets, is_flat_twin
+from flows.store.sealed import read_manifest
+from flows.store.telemetry import read_columns
 from tasks.errors import InputError
 from tasks.render.contact_sheet import CAPTION, MARGIN, TILE_WIDTH
 
@@ -32,6 +34,19 @@ def test_further_datasets_add_a_row_of_their_weathers_each_and_must_be_finished(
     )
     with pytest.raises(InputError, match=r"one: must be a finished dataset[^$]*two: must be"):
         draw_sheets(made, str(tmp_path / "x"), beside=[str(tmp_path / "one"), str(tmp_path / "two")])
+
+
+def test_a_place_that_no_clip_comes_to_is_refused_and_a_car_that_stops_before_it_is_called_so(
+    toy_dataset, tmp_path
+):
+    clips = read_manifest(toy_dataset)["clips"]
+    ends = [read_columns(toy_dataset.telemetry / "frames", clip["clip_id"])["station"][-1] for clip in clips]
+    for station in (max(ends) + 0.1, -5.0, float("nan")):
+        with pytest.raises(InputError, match=f"--station must lie in 0.0 to {max(ends):.1f} m, where a clip"):
+            draw_sheets(str(toy_dataset.root), str(tmp_path), station=station)
+    assert not any(tmp_path.iterdir())
+    for station, told in ((ends[0] - 0.1, "at  "), (ends[0] + 0.1, "at, not reached  ")):
+        assert _draw_still(toy_dataset, clips[0], station, "at")[0].startswith(told)
 
 
 def test_a_flat_twin_is_the_same_drive_weather_and_seed_without_the_feature():

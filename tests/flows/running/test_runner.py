@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import dask
 import pytest
 
+from flows.making.generate import generate_dataset
 from flows.running.orchestration import run_as_stage
 from flows.running.runner import (
     ALLOCATOR,
@@ -116,6 +117,18 @@ def test_a_running_dask_cluster_is_used_by_its_address(executors):
         pass
     with open_executor("dask", None, address) as executor:
         assert executor.submit(process_id, 0).result() in executors["dask"]._client.run(os.getpid).values()
+
+
+@pytest.mark.parametrize("runner", ["process", "Dask", ""])
+def test_a_runner_that_does_not_exist_is_refused_and_not_taken_for_dask(runner, tmp_path):
+    with (
+        pytest.raises(InputError, match="--runner must be one of threads, processes, dask; it is"),
+        open_executor(runner, 1),
+    ):
+        pass
+    with pytest.raises(InputError, match="--runner must be one of threads, processes, dask; it is"):
+        generate_dataset("demo", str(tmp_path / "new"), runner=runner)
+    assert not any(tmp_path.iterdir()), "nothing is begun"
 
 
 def memory_settings() -> dict[str, str | None]:

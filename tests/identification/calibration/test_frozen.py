@@ -20,6 +20,13 @@ from tasks.errors import InputError
 from tests.flows.measured.findings import found_effect, found_form, grown_file
 
 
+@pytest.mark.parametrize("name", ["", "cars/mine", ".."])
+def test_a_name_that_no_file_can_have_is_refused_before_the_fit(tmp_path, name):
+    with pytest.raises(InputError, match="--name must"):
+        calibrate_on_traces(str(tmp_path / "nowhere"), out=str(tmp_path / "out"), name=name)
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.fixture
 def frozen(vehicle, make_traces, tmp_path):
     traces = make_traces(vehicle, "coupled", ("wet",))
