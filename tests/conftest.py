@@ -1,7 +1,11 @@
-"""Where test data outside the repository lies, one thread for linear algebra, and a small finished dataset."""
+"""What workers compile and in which order, where outside data lies, and a small finished dataset."""
 
 import gc
+import io
 import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stderr
 from pathlib import Path
 
 import pytest
@@ -17,6 +21,42 @@ gc.disable()
 DATA = Path(os.environ.get("MUSYNC_DATA", Path(__file__).resolve().parents[2] / "shared"))
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_collection(session):
+    """Let one worker compile what all tests import while the other compiles the kernels, and then change places.
+
+    Python keeps the bytecode of a file that it imports for the first time, and Numba a kernel's machine code: the
+    worker that comes second reads both. Two workers that start with the same do everything twice.
+    """
+    worker = os.environ.get("PYTEST_XDIST_WORKER")
+    if worker is None:
+        return (yield)
+    shared = Path(session.config.option.basetemp).parent
+    if worker != "gw0":
+        compile_kernels(shared)
+    with FileLock(shared / "collected.lock") as lock:
+        if (shared / "collected").exists():
+            lock.release()  # there is nothing left to compile: all others import at once
+        collected = yield
+        (shared / "collected").touch()
+    if worker == "gw0":
+        compile_kernels(shared)
+    return collected
+
+
+def compile_kernels(shared: Path) -> None:
+    """Compile each of the large kernels that no other worker has compiled or is compiling."""
+    from tests import kernels
+
+    for job in (kernels.compile_rasteriser, kernels.compile_vehicle, kernels.compile_weather):
+        try:
+            (shared / job.__name__).mkdir()
+        except FileExistsError:
+            continue
+        with tempfile.TemporaryDirectory() as folder, own_notes(Path(folder)), redirect_stderr(io.StringIO()):
+            job(Path(folder))
+
+
 def pytest_collection_finish() -> None:
     """From here on garbage is collected, and looked for in what the tests make."""
     gc.freeze()
@@ -28,31 +68,19 @@ def pytest_sessionfinish() -> None:
     gc.unfreeze()
 
 
-@pytest.fixture(scope="session", autouse=True)
-def own_notes_of_places(tmp_path_factory):
-    """Equal scenes of two test processes lie in two places, and a test changes its own: each process notes its own."""
-    folder = tmp_path_factory.mktemp("notes")
+@contextmanager
+def own_notes(folder: Path) -> Iterator[None]:
+    """Keep the notes of where scenes lie in a folder, and not in the user's cache."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("flows.making.places.cache_root", lambda: folder)
         yield
 
 
 @pytest.fixture(scope="session", autouse=True)
-def compiled_kernels(tmp_path_factory):
-    """Two workers compile the large kernels in turn, each other ones first, so that neither does what the other did."""
-    worker = os.environ.get("PYTEST_XDIST_WORKER", "")
-    if not worker:
-        return
-    from tests import kernels
-
-    jobs = [kernels.compile_rasteriser, kernels.compile_vehicle, kernels.compile_weather]
-    first = int(worker.removeprefix("gw")) % len(jobs)
-    for job in jobs[first:] + jobs[:first]:
-        done = tmp_path_factory.getbasetemp().parent / f"{job.__name__}.done"
-        with FileLock(done.with_suffix(".lock")):
-            if not done.exists():
-                job(tmp_path_factory.mktemp("kernels"))
-                done.touch()
+def own_notes_of_places(tmp_path_factory):
+    """Equal scenes of two test processes lie in two places, and a test changes its own: each process notes its own."""
+    with own_notes(tmp_path_factory.mktemp("notes")):
+        yield
 
 
 @pytest.fixture

@@ -24,8 +24,9 @@ def copy(toy_dataset, tmp_path) -> Layout:
 
 
 @pytest.fixture
-def own(tmp_path) -> Layout:
-    """A dataset whose scene and camera are this test's own."""
+def own(tmp_path, monkeypatch) -> Layout:
+    """A dataset whose scene and camera are this test's own, with its own note of where they lie: others are equal."""
+    monkeypatch.setattr("flows.making.places.cache_root", lambda: tmp_path / "notes")
     grid = write_toy_grid(tmp_path, frames=2)
     return generate_dataset(grid, str(tmp_path / "data"), runner="threads", workers=1).layout
 
