@@ -9,7 +9,12 @@ from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
 from tasks.campaign.manoeuvres import MANOEUVRE_UNITS, manoeuvre_errors
 from tasks.identification.decision.answer import ChannelError
 from tasks.identification.decision.held_out import summarise_errors
-from tasks.identification.joint.elimination import certain_numbers, eliminate_uncertain_numbers, refit_numbers
+from tasks.identification.joint.elimination import (
+    Substitute,
+    certain_numbers,
+    eliminate_uncertain_numbers,
+    refit_numbers,
+)
 from tasks.identification.joint.fit import JointFit, lead_offsets
 from tasks.identification.joint.stops import Stop, predict_stop
 from tasks.identification.rules import DecisionRules, JointRules
@@ -48,6 +53,26 @@ def drop_what_predicts_worse(
     )
     return drop_what_predicts_worse(
         train, held_out, eliminate_uncertain_numbers(train, without, rules), rules, reasons
+    )
+
+
+def drop_contradicted_rivals(
+    held_out: Sequence[Stop], fitted: JointFit, rivals: Sequence[Substitute], rules: JointRules
+) -> tuple[Substitute, ...]:
+    """Return the rivals without those that predict the speed of held-out runs much worse than what they stand in for.
+
+    Parameters
+    ----------
+    held_out : the runs
+    fitted : with what is named
+    rivals : what explains the training runs nearly as well
+    rules : of the joint fit
+    """
+    named = _held_out_misfit(held_out, fitted)[0]
+    return tuple(
+        rival
+        for rival in rivals
+        if named >= rules.better_prediction_share * _held_out_misfit(held_out, rival.fitted)[0]
     )
 
 

@@ -27,7 +27,12 @@ from tasks.identification.joint.elimination import (
     standard_errors,
 )
 from tasks.identification.joint.fit import JointFit, fit_jointly, misfit_scales, suggest_starts
-from tasks.identification.joint.held_out import drop_what_predicts_worse, predict_held_out, summarise_held_out
+from tasks.identification.joint.held_out import (
+    drop_contradicted_rivals,
+    drop_what_predicts_worse,
+    predict_held_out,
+    summarise_held_out,
+)
 from tasks.identification.joint.numbers import CALIBRATED, JointNumber, choose_numbers, free_numbers
 from tasks.identification.joint.stops import FITTED, Stop, complete_numbers, make_stop
 from tasks.identification.joint.words import tell_rivals, tell_what_was_used
@@ -105,7 +110,8 @@ def judge_jointly(
     predicted = predict_held_out(held_out, retuned, fitted)
     error, manoeuvres = summarise_held_out(held_out, predicted, rules)
     progress("rivals")
-    substitutes = tuple(find_substitutes(train, fitted, shown, rules.rival_gain_share))
+    as_good = find_substitutes(train, fitted, shown, rules.rival_gain_share)
+    substitutes = drop_contradicted_rivals(held_out, fitted, as_good, joint)
     effects, rivals = _named(fitted, substitutes, joint)
     tolerances = _tolerances(campaign)
     calibrated = tuple(

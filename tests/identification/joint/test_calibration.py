@@ -63,6 +63,15 @@ def test_a_gain_far_from_the_files_is_found_and_refined_beside_the_mass(gain):
     assert null.session[place] == pytest.approx(gain, abs=4.0 * null.session_error[place])
     assert 0.0005 < null.session_error[place] < 0.02
     assert abs(null.session[SESSION.index("mass")]) < 1e-3
+    known, _ = prepare_evidence(
+        replace(campaign, tolerances=TOLERANCES), replace(VEHICLE, brake_gain=(1.0 + gain) * VEHICLE.brake_gain),
+        SURFACE, load_effects()[:1], RULES,
+    )  # fmt: skip
+    for wide, sharp in zip(evidence.train, known.train, strict=True):
+        slope, expected = wide.session[:, place], sharp.session[:, place] / (1.0 + gain)
+        assert slope == pytest.approx(expected, abs=0.05 * np.abs(expected).max()), (
+            "a wide prior is no wide step"
+        )
 
 
 def test_a_car_that_is_driven_until_it_brakes_is_left_to_the_joint_fit():
