@@ -23,6 +23,8 @@ from tasks.eval.label_moves import compare_figures, compare_ticks
 def compare_datasets(a: str, b: str, *, out: str | None = None) -> dict[str, Any]:
     """Compare two finished datasets clip by clip; clips are paired by their scenario.
 
+    Whether clips differ follows from the hashes that the manifests record, and not from the files.
+
     Parameters
     ----------
     a, b : sealed dataset folders
@@ -90,6 +92,7 @@ def format_text(result: Mapping[str, Any]) -> str:
         for name, value in row["labels"].items():
             if value:
                 lines.append(f"  {name}: {value:+.4g}" if "change" in name else f"  {name}: {value:.4g}")
+    lines.append("compared by what the manifests record; musync verify holds the files of each against it")
     return "\n".join(lines) + "\n"
 
 

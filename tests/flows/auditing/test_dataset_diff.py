@@ -70,7 +70,8 @@ def test_the_same_grid_made_twice_is_the_same(datasets: dict[str, str], tmp_path
     result = compare_datasets(datasets["a"], datasets["again"], out=str(tmp_path))
     assert result["same"] and result["clips"] == [] and result["why"] == []
     assert result == json.loads((tmp_path / "diff.json").read_text())
-    assert (tmp_path / "diff.txt").read_text().startswith("0 of 4 clips differ")
+    text = (tmp_path / "diff.txt").read_text()
+    assert text.startswith("0 of 4 clips differ") and "musync verify holds the files" in text
 
 
 def test_a_weaker_brake_moves_only_the_clips_that_brake_and_is_named(datasets: dict[str, str]) -> None:
