@@ -1,4 +1,4 @@
-"""What workers compile and in which order, where outside data lies, and a small finished dataset."""
+"""The order in which workers compile, the place of data outside the repository, and a small finished dataset."""
 
 import gc
 import io

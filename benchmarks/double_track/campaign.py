@@ -40,7 +40,7 @@ class MeasuredRun:
     columns: Channels
 
 
-def session_tolerances(design: str) -> dict[str, float]:
+def collect_tolerances(design: str) -> dict[str, float]:
     """Standard deviations of a session's offsets, with the grade, by tolerance.
 
     Parameters
@@ -62,7 +62,7 @@ def draw_session(seed: int, name: str, design: str, share: float = 1.0) -> dict[
     """
     rng = keyed_generator(seed, f"{name} {design}", "session")
     return {
-        key: share * sigma * float(rng.standard_normal()) for key, sigma in session_tolerances(design).items()
+        key: share * sigma * float(rng.standard_normal()) for key, sigma in collect_tolerances(design).items()
     }
 
 
@@ -202,7 +202,7 @@ def _write_campaign(
     folder: Path, design: str, runs: list[MeasuredRun], train: list[str], held_out: list[str]
 ) -> None:
     designs = read_declared("designs")
-    tolerances: dict[str, Any] = dict(session_tolerances(design))
+    tolerances: dict[str, Any] = dict(collect_tolerances(design))
     tolerances["run"] = values_of(designs["tolerances_1sigma"]["run"])
     (folder / "runs").mkdir(parents=True, exist_ok=True)
     header = {

@@ -73,12 +73,12 @@ def plan_production(
     InputError
         If there is no clip, no worker, or a clip takes no time.
     """
-    asked = {"--clips": clips, "--workers": workers, "--cpu-s": (costs or ClipCosts()).cpu_s}
+    c, p = costs or ClipCosts(), prices or Prices()
+    asked = {"--clips": clips, "--workers": workers, "--cpu-s": c.cpu_s}
     if wrong := [
         f"{name} must be more than 0; it is {value:g}" for name, value in asked.items() if not value > 0
     ]:
         raise InputError(wrong)
-    c, p = costs or ClipCosts(), prices or Prices()
     work_s = clips * (c.cpu_s + c.gather_cpu_s)
     making_s, driver_s = work_s / workers, clips * (c.driver_cpu_s + c.scheduler_cpu_s)
     size = clips * (c.frames_bytes + c.tables_bytes)

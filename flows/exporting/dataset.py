@@ -76,7 +76,7 @@ class ExportedClip:
     @cached_property
     def ticks(self) -> Columns:
         """Columns of the tick table."""
-        return self._read(self.ticks_file, TICK_COLUMNS, self.plan.ticks)
+        return self._read(self.ticks_file, TICK_COLUMNS, self.plan.ticks_per_clip)
 
     @cached_property
     def frames(self) -> Columns:

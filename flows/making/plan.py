@@ -63,7 +63,7 @@ class Plan:
         return self.settings.telemetry_s
 
     @property
-    def ticks(self) -> int:
+    def ticks_per_clip(self) -> int:
         """Rows of every clip in the tick table, the first frame's among them [1]."""
         return round(self.duration_s * TICK_RATE_HZ) + 1
 

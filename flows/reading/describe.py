@@ -68,7 +68,7 @@ def validate_grid(grid: str) -> dict[str, Any]:
         load_grid(grid).settings.camera
     )  # of a file the plan records the name, without its folder
     frames = len(plan.clips) * settings.frames if settings.pictures else 0
-    ticks = len(plan.clips) * plan.ticks
+    ticks = len(plan.clips) * plan.ticks_per_clip
     pixels = frames * camera.width * camera.height
     per_pixel = BYTES_PER_PIXEL + (BYTES_OF_LABELS_PER_PIXEL if settings.labels else 0)
     seconds = CPU_SECONDS_PER_CLIP * len(plan.clips) + CPU_SECONDS_PER_MEGAPIXEL * pixels / 1e6

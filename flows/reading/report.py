@@ -66,7 +66,7 @@ def make_report(dataset: str, *, out: str | None = None, clips: list[str] | None
     layout = open_for_reading(dataset)
     manifest = read_manifest(layout)
     refuse_changed_records(layout, manifest)
-    rows, ticks = manifest["clips"], Plan.of(manifest, layout.manifest).ticks
+    rows, ticks = manifest["clips"], Plan.of(manifest, layout.manifest).ticks_per_clip
     brought = select_clips(rows, clips, dataset) if clips else pick_evenly(rows, TRACED_CLIPS)
     folder = _choose_folder(layout, out)
     pictures = manifest["grid"].get("pictures", True)

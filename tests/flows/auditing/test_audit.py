@@ -24,7 +24,7 @@ def copy(toy_dataset, tmp_path) -> Layout:
 
 
 @pytest.fixture
-def own(tmp_path, monkeypatch) -> Layout:
+def own_dataset(tmp_path, monkeypatch) -> Layout:
     """A dataset whose scene and camera are this test's own, with its own note of where they lie: others are equal."""
     monkeypatch.setattr("flows.making.places.cache_root", lambda: tmp_path / "notes")
     grid = write_toy_grid(tmp_path, frames=2)
@@ -83,30 +83,30 @@ def test_inputs_from_which_nothing_can_be_made_are_damage_and_no_crash(copy):
     assert result["differences"][0].startswith("surface.yaml")
 
 
-def test_a_scene_that_has_changed_since_is_named_as_the_reason(own, tmp_path):
+def test_a_scene_that_has_changed_since_is_named_as_the_reason(own_dataset, tmp_path):
     shutil.rmtree(tmp_path / "scene")
     write_scene(toy_street(seed=2), tmp_path / "scene", {})
     load_scene.cache_clear()  # as if in another process
-    result = audited(own)
+    result = audited(own_dataset)
     assert result["mismatches"][0]["why"] == ["scene"] and result["differences"][0].startswith("scene")
 
 
-def test_a_broken_scene_is_the_inputs_fault_and_one_sentence(own, tmp_path):
+def test_a_broken_scene_is_the_inputs_fault_and_one_sentence(own_dataset, tmp_path):
     file = tmp_path / "scene" / "means.npy"
     np.save(file, np.load(file) + 1)
     load_scene.cache_clear()
     with pytest.raises(InputError, match=r"must have the SHA-256 of scene\.json") as told:
-        audited(own, share=1.0)
+        audited(own_dataset, share=1.0)
     assert len(told.value.problems) == 1
 
 
 def test_another_catalogue_or_code_does_not_go_into_the_same_folder_and_both_values_are_told(
-    own, tmp_path, monkeypatch
+    own_dataset, tmp_path, monkeypatch
 ):
     (tmp_path / "camera.yaml").write_text(TOY_CAMERA.replace("{value: 80", "{value: 81"))
     monkeypatch.setattr("flows.making.plan.code_version", lambda: {"version": "9", "source_sha256": "0" * 64})
     with pytest.raises(InputError) as told:
-        generate_dataset(str(tmp_path / "grid.yaml"), str(own.root), runner="threads")
+        generate_dataset(str(tmp_path / "grid.yaml"), str(own_dataset.root), runner="threads")
     text = str(told.value)
     assert "camera.yaml focal_length.value is 80 there and 81 here" in text
     assert "code version is" in text and "and 9 here" in text and "clips" not in text

@@ -90,10 +90,8 @@ def test_clips_in_quarantine_are_left_out_and_named_unless_asked_for(toy_dataset
     monkeypatch.setattr(module, "is_quarantined", lambda row: True)
     with pytest.raises(InputError, match="every clip is in quarantine"):
         export_dataset(str(toy_dataset.root), "webdataset", out=str(tmp_path / "other"))
-    for name in (
-        "croissant",
-        "ro-crate",
-    ):  # copies of the tables, which say of each clip whether it is in quarantine
+    # copies of the tables, which say of each clip whether it is in quarantine
+    for name in ("croissant", "ro-crate"):
         told = export_dataset(str(toy_dataset.root), name, out=str(tmp_path / name))
         assert (told["clips"], told["left_out"]) == (4, [])
 

@@ -21,12 +21,12 @@ def test_the_search_is_chosen_by_what_is_known_and_by_whether_the_runs_agree(
     monkeypatch, says_little, foreign, judge
 ):
     def answer_as(name: str, answer: object) -> object:
-        def search(*_: object, **__: object) -> object:
+        def answer_or_refuse(*_: object, **__: object) -> object:
             if foreign == name:
                 raise ForeignCarError
             return answer
 
-        return search
+        return answer_or_refuse
 
     monkeypatch.setattr(searches, "needs_joint_fit", lambda *_: says_little)
     for name, answer in (("calibrate_gain", {}), ("find_missing_effects", "one"), ("judge_jointly", "joint")):

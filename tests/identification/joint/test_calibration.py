@@ -44,18 +44,18 @@ def make_campaign(runs: tuple[Run, ...], tolerances=HARDLY) -> Campaign:
     )  # fmt: skip
 
 
-def calibrate(campaign: Campaign) -> dict[str, tuple[float, float]]:
+def calibrate_campaign(campaign: Campaign) -> dict[str, tuple[float, float]]:
     return calibrate_gain(campaign, VEHICLE, SURFACE, load_joint_numbers(), RULES.joint)
 
 
 def test_a_gain_that_the_file_knows_is_left_to_its_tolerance():
-    assert calibrate(make_campaign(make_runs(0.0), TOLERANCES)) == {}
+    assert calibrate_campaign(make_campaign(make_runs(0.0), TOLERANCES)) == {}
 
 
 @pytest.mark.parametrize("gain", [-0.3, 0.4])
 def test_a_gain_far_from_the_files_is_found_and_refined_beside_the_mass(gain):
     campaign = make_campaign(make_runs(gain))
-    hardly_known = calibrate(campaign)
+    hardly_known = calibrate_campaign(campaign)
     assert hardly_known["pressure_gain"][0] == pytest.approx(gain, abs=0.03)
     evidence, null = prepare_evidence(campaign, VEHICLE, SURFACE, load_effects()[:1], RULES, hardly_known)
     place = SESSION.index("pressure_gain")
@@ -84,11 +84,11 @@ def test_a_car_that_is_driven_until_it_brakes_is_left_to_the_joint_fit():
         return replace(run, response=response)
 
     with pytest.raises(ForeignCarError):
-        calibrate(make_campaign(tuple(hold_speed(run) for run in make_runs(0.0))))
+        calibrate_campaign(make_campaign(tuple(hold_speed(run) for run in make_runs(0.0))))
 
 
 def test_a_car_that_no_gain_makes_the_models_is_left_to_the_joint_fit():
-    def shake(run: Run) -> Run:
+    def shake_speed(run: Run) -> Run:
         response = run.response.copy()
         response[:, SPEED] += (
             0.5 * np.sin(4.0 * run.interval * np.arange(len(response))) * (run.pressure > 0.0)
@@ -96,7 +96,7 @@ def test_a_car_that_no_gain_makes_the_models_is_left_to_the_joint_fit():
         return replace(run, response=response)
 
     with pytest.raises(ForeignCarError):
-        calibrate(make_campaign(tuple(shake(run) for run in make_runs(0.0))))
+        calibrate_campaign(make_campaign(tuple(shake_speed(run) for run in make_runs(0.0))))
 
 
 @pytest.mark.parametrize(("gain", "is_wrong"), [(0.5, False), (0.7, True)])

@@ -62,10 +62,10 @@ def test_whatever_explains_nearly_as_much_is_a_rival_of_whichever_kind(monkeypat
     named = replace(fit_of([np.zeros(100)]), numbers=(NUMBERS["pressure_curve"],), cost=10.0)
     cost = {"": 110.0, "engine_torque": 24.0, "push_out": 26.0}
 
-    def refit(_stops, fitted, numbers, _start=None):
+    def look_up_cost(_stops, fitted, numbers, _start=None):
         left = {number.name for number in numbers}
         return replace(fitted, numbers=numbers, cost=min(cost.get(name, 110.0) for name in left or {""}))
 
-    monkeypatch.setattr(elimination, "refit_numbers", refit)
+    monkeypatch.setattr(elimination, "refit_numbers", look_up_cost)
     found = find_substitutes([], named, list(NUMBERS.values()), 0.85)
     assert [(one.of, one.name) for one in found] == [("pressure_curve", "engine_torque")]
