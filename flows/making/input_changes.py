@@ -10,7 +10,7 @@ from flows.making.grid_inputs import READERS, input_sources
 from flows.making.places import find_scene, noted_place
 from flows.store.address import send_files
 from flows.store.layout import Layout, write_atomically
-from flows.store.sealed import read_plan_record, recorded_grid
+from flows.store.sealed import read_plan_record, recorded_grid, refuse_changed_files
 from manifests.canonical import sha256_of, sha256_of_file
 from manifests.explain import find_input_differences, find_parameter_differences, tools_here
 from manifests.records import Manifest
@@ -106,8 +106,7 @@ def read_kept(layout: Layout, recorded: Mapping[str, str]) -> dict[str, bytes]:
 def refuse_changed_records(layout: Layout, manifest: Manifest) -> None:
     """Raise `InputError` where a finished dataset's plan or a catalogue file that it keeps is not the recorded one."""
     read_kept(layout, manifest["inputs"])
-    if not layout.plan.is_file() or sha256_of_file(layout.plan) != manifest["artifacts"].get("plan.json"):
-        raise InputError(f"{layout.plan}: must be as recorded; it is not: musync repair makes it again")
+    refuse_changed_files(layout, {"plan.json": manifest["artifacts"].get("plan.json", "")})
 
 
 def frozen_inputs(layout: Layout, names: Iterable[str]) -> dict[str, bytes]:

@@ -16,7 +16,7 @@ from flows.store.address import open_for_reading
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
 from flows.store.outputs import Outputs
-from flows.store.sealed import read_manifest, require_frames
+from flows.store.sealed import read_manifest, refuse_changed_clips, require_frames
 from flows.store.telemetry import read_columns
 from tasks.errors import InputError
 from tasks.render.traces import TRACES, add_traces
@@ -40,7 +40,7 @@ def make_films(
     Raises
     ------
     InputError
-        The folder holds no finished dataset, or a clip is not in it.
+        The folder holds no finished dataset, a clip is not in it, or what is shown of it is not as recorded.
     """
     layout = open_for_reading(dataset)
     if not layout.manifest.is_file():
@@ -49,6 +49,7 @@ def make_films(
     plan, rows = Plan.of(manifest, layout.manifest), manifest["clips"]
     require_frames(manifest, dataset)
     chosen = select_clips(rows, clips, dataset) if clips else rows
+    refuse_changed_clips(layout, manifest, chosen, "frames")
     names = name_films(rows)
     results = Outputs(out, "preview", *(names[row["clip_id"]] for row in chosen))
     films = []

@@ -26,7 +26,7 @@ from flows.store.address import open_for_reading
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
 from flows.store.outputs import Outputs, read_marker
-from flows.store.sealed import read_manifest, recorded_grid
+from flows.store.sealed import read_manifest, recorded_grid, refuse_changed_clips
 from flows.store.telemetry import read_columns
 from manifests.siblings import iterate_pairs
 from tasks.conventions import TICK_CHANNELS
@@ -68,6 +68,7 @@ def make_report(dataset: str, *, out: str | None = None, clips: list[str] | None
     refuse_changed_records(layout, manifest)
     rows, ticks = manifest["clips"], Plan.of(manifest, layout.manifest).ticks_per_clip
     brought = select_clips(rows, clips, dataset) if clips else pick_evenly(rows, TRACED_CLIPS)
+    refuse_changed_clips(layout, manifest, brought, "ticks")
     folder = _choose_folder(layout, out)
     pictures = manifest["grid"].get("pictures", True)
     data = page_data(manifest, {row["clip_id"] for row in brought}, pictures)

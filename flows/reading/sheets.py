@@ -11,8 +11,9 @@ from flows.store.address import open_for_reading
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
 from flows.store.outputs import Outputs
-from flows.store.sealed import read_manifest, require_frames
+from flows.store.sealed import read_manifest, refuse_changed_clips, require_frames
 from flows.store.telemetry import read_columns
+from manifests.records import Manifest
 from tasks.errors import InputError
 from tasks.render.contact_sheet import draw_picture_sheet, encode_png
 
@@ -42,25 +43,31 @@ def draw_sheets(
     ------
     InputError
         A folder holds no finished dataset with frames, the first one's grid has neither two weathers nor a road
-        feature, another's has one weather only, or no clip comes to the station.
+        feature, another's has one weather only, no clip comes to the station, or what is shown is not as recorded.
     """
     results = Outputs(out, "sheets", "weather.png", "hazards.png")
-    (layout, clips), *others = _open_finished([dataset, *(beside or ())])
-    hazards = pick_evenly([clip for clip in clips if clip["scenario"]["hazard_height_m"]], PREVIEW_CLIPS)
+    (layout, manifest), *others = _open_finished([dataset, *(beside or ())])
+    clips = manifest["clips"]
+    features = pick_evenly([clip for clip in clips if clip["scenario"]["hazard_height_m"]], PREVIEW_CLIPS)
+    hazards = [[clip, *[other for other in clips if is_flat_twin(other, clip)][:1]] for clip in features]
     weathers = [[(layout, clip) for clip in row] for row in pick_evenly(_list_weathers(clips), PREVIEW_CLIPS)]
     if not hazards and not weathers:
         raise InputError(f"{dataset}: must have two weathers of one drive, or a road feature; it has neither")
-    for name, (street, more_clips) in zip(beside or (), others, strict=True):
-        more = _list_weathers(more_clips)
+    for name, (street, record) in zip(beside or (), others, strict=True):
+        more = _list_weathers(record["clips"])
         if not more:
             raise InputError(
                 f"{name}: must have two weathers of one drive, to stand beside {dataset}; it has not"
             )
         weathers.append([(street, clip) for clip in more[0]])
+    for street, record in [(layout, manifest), *others]:
+        shown = [clip for row in weathers for at, clip in row if at is street]
+        shown += [clip for row in hazards for clip in row] if street is layout else []
+        refuse_changed_clips(street, record, shown, "frames")
     place = _choose_station(station, [drive for row in weathers for drive in row])
     drawn = {
         "weather": [[_draw_still(*drive, place, drive[1]["label"]) for drive in row] for row in weathers],
-        "hazards": [_draw_contact(layout, clip, clips) for clip in hazards],
+        "hazards": [_draw_contact(layout, *row) for row in hazards],
     }
     written = {}
     for name, rows in drawn.items():
@@ -71,8 +78,8 @@ def draw_sheets(
     return written
 
 
-def _open_finished(datasets: Sequence[str]) -> list[tuple[Layout, Sequence[Mapping[str, Any]]]]:
-    """Return each dataset with the clips of its manifest; every folder that holds none is told."""
+def _open_finished(datasets: Sequence[str]) -> list[tuple[Layout, Manifest]]:
+    """Return each dataset with its manifest; every folder that holds none is told."""
     layouts = [open_for_reading(dataset) for dataset in datasets]
     lacking = [name for name, layout in zip(datasets, layouts, strict=True) if not layout.manifest.is_file()]
     if lacking:
@@ -80,7 +87,7 @@ def _open_finished(datasets: Sequence[str]) -> list[tuple[Layout, Sequence[Mappi
     manifests = [read_manifest(layout) for layout in layouts]
     for name, manifest in zip(datasets, manifests, strict=True):
         require_frames(manifest, name)
-    return [(layout, manifest["clips"]) for layout, manifest in zip(layouts, manifests, strict=True)]
+    return list(zip(layouts, manifests, strict=True))
 
 
 def _list_weathers(clips: Sequence[Mapping[str, Any]]) -> list[list[Mapping[str, Any]]]:
@@ -114,16 +121,13 @@ def _choose_station(asked: float | None, drives: Sequence[tuple[Layout, Mapping[
     return asked
 
 
-def _draw_contact(
-    layout: Layout, clip: Mapping[str, Any], clips: Sequence[Mapping[str, Any]]
-) -> list[Picture]:
+def _draw_contact(layout: Layout, clip: Mapping[str, Any], *twin: Mapping[str, Any]) -> list[Picture]:
     """Before, at and after contact; beside them the place before contact on the flat twin, where there is one."""
     scenario = clip["scenario"]
     half, center = scenario["hazard_length_m"] / 2, scenario["hazard_center_m"]
     places = {clip["label"]: center - half - BEFORE_M, "contact": center, "after": center + half + AFTER_M}
     stills = [_draw_still(layout, clip, place, caption) for caption, place in places.items()]
-    twins = [other for other in clips if is_flat_twin(other, clip)]
-    return stills + [_draw_still(layout, twin, center - half - BEFORE_M, twin["label"]) for twin in twins[:1]]
+    return stills + [_draw_still(layout, flat, center - half - BEFORE_M, flat["label"]) for flat in twin]
 
 
 def is_flat_twin(other: Mapping[str, Any], clip: Mapping[str, Any]) -> bool:

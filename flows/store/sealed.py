@@ -1,6 +1,6 @@
 """Reading what a dataset records of itself: the one door for its plan, receipts and manifest."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from catalogs.grids.form import BEFORE
 from catalogs.sentences import cap_problems, describe_rules, shorten_value
 from flows.store.arrays import arrays_of
 from flows.store.layout import RECORD, STAGED_TABLES, Layout, read_json
+from manifests.canonical import sha256_of_file
 from manifests.manifest import MANIFEST_FORMAT, head_of_sealed, is_sealed
 from manifests.records import Manifest, ManifestHead, PlanRecord, Receipt, check_record
 from tasks.errors import InputError
@@ -73,6 +74,62 @@ def require_frames(manifest: Mapping[str, Any], place: object) -> None:
             f"{place}: the dataset was made without frames (--no-frames), which this needs: generate its grid with them"
             " into another folder"
         )
+
+
+def refuse_changed_files(layout: Layout, recorded: Mapping[str, str]) -> None:
+    """Hold files of a finished dataset against their recorded hashes, 1.7 GB a second.
+
+    Parameters
+    ----------
+    layout : of the dataset
+    recorded : path in the dataset to SHA-256
+
+    Raises
+    ------
+    InputError
+        Listing every file that is missing or changed.
+    """
+    changed = {
+        name: "changed" if (layout.root / name).is_file() else "missing"
+        for name, digest in recorded.items()
+        if not (layout.root / name).is_file() or sha256_of_file(layout.root / name) != digest
+    }
+    if changed:
+        raise InputError(
+            cap_problems(
+                [
+                    f"{layout}/{name}: must be as recorded; it is {how}: musync repair makes it again"
+                    for name, how in changed.items()
+                ]
+            )
+        )
+
+
+def refuse_changed_clips(
+    layout: Layout, manifest: Mapping[str, Any], clips: Sequence[Mapping[str, Any]], table: str
+) -> None:
+    """Hold the pictures of clips, and the files of one table that may have their rows, against the recorded hashes.
+
+    Parameters
+    ----------
+    layout, manifest : of the dataset
+    clips : records of those that are shown
+    table : ticks or frames
+
+    Raises
+    ------
+    InputError
+        Listing every file that is missing or changed.
+    """
+    families = tuple({f"telemetry/{table}/family={clip['scenario']['weather']}/" for clip in clips})
+    tables = {name: digest for name, digest in manifest["artifacts"].items() if name.startswith(families)}
+    pictures = {
+        name: digest
+        for clip in clips
+        for name, digest in clip["artifacts"].items()
+        if name.startswith("frames.zarr/rgb/")
+    }
+    refuse_changed_files(layout, tables | pictures)
 
 
 def _refuse_unfinished(layout: Layout) -> None:

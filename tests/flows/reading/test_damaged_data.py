@@ -4,6 +4,7 @@ import json
 import shutil
 from pathlib import Path
 
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
 
@@ -15,6 +16,7 @@ from flows.judging.physics import audit_physics
 from flows.reading.describe import describe_dataset
 from flows.reading.previews import make_films
 from flows.reading.report import make_report
+from flows.reading.sheets import draw_sheets
 from flows.store.layout import Layout
 from flows.store.telemetry import read_table
 from tasks.errors import InputError
@@ -106,8 +108,6 @@ READ_CLIPS = {
     "evaluate": ("frames", lambda root: evaluate_dataset(root, out=f"{root}-out")),
     "explain": ("frames", lambda root: explain_frame(root, "dry/flat", 3)),
     "export": ("frames", lambda root: export_dataset(root, "tum", out=f"{root}-out", clips=["dry/flat"])),
-    "preview": ("frames", lambda root: make_films(root, f"{root}-out", clips=["dry/flat"])),
-    "report": ("ticks", lambda root: make_report(root, out=f"{root}-out", clips=["dry/flat"])),
 }
 
 
@@ -129,3 +129,26 @@ def test_a_table_of_clips_that_lost_rows_is_not_judged_as_if_it_were_whole(datas
     pq.write_table(pq.read_table(path).slice(0, 2), path)
     with pytest.raises(InputError, match="a row of each of the manifest's 4 clips"):
         audit_physics(str(dataset_copy.root))
+
+
+SHOW_CLIPS = {
+    "preview": ("frames", lambda root: make_films(root, f"{root}-out", clips=["dry/flat"])),
+    "report": ("ticks", lambda root: make_report(root, out=f"{root}-out", clips=["dry/flat"])),
+    "sheets": ("frames", lambda root: draw_sheets(root, f"{root}-out")),
+}
+
+
+@pytest.mark.parametrize("command", SHOW_CLIPS)
+def test_a_speed_or_a_picture_that_was_edited_by_hand_is_not_shown(dataset_copy, command):
+    table, show = SHOW_CLIPS[command]
+    path = dataset_copy.telemetry / table / "family=dry" / "part-0000.parquet"
+    rows = pq.read_table(path)
+    place = rows.schema.get_field_index("speed")
+    pq.write_table(rows.set_column(place, rows.field(place), pc.multiply(rows["speed"], 2.0)), path)
+    shard = dataset_copy.frame_shard("rgb", 0)
+    shard.write_bytes(shard.read_bytes()[::-1])
+    with pytest.raises(InputError) as told:
+        show(str(dataset_copy.root))
+    for edited in (path, shard):
+        line = f"{edited.relative_to(dataset_copy.root)}: must be as recorded; it is changed: musync repair"
+        assert line in str(told.value)
