@@ -7,6 +7,7 @@ import pytest
 
 from benchmarks.synthetic_street import Clip, drive_clip
 from tasks.errors import InputError
+from tasks.eval.poses import essential
 from tasks.eval.poses.essential import recover_motion_essential
 from tasks.eval.poses.motion import RecoveredMotion
 from tests.eval.scoring import normalised_progress_rmse, pitch_rmse_deg
@@ -95,3 +96,23 @@ def test_a_bend_turns_the_heading_and_not_the_pitch() -> None:
     heading = np.arctan2(seen.T_rig0_rig[:, 1, 0], seen.T_rig0_rig[:, 0, 0])
     np.testing.assert_allclose(heading, clip.station / 80, atol=np.deg2rad(0.1))
     assert np.rad2deg(np.abs(seen.pitch)).max() < 0.06
+
+
+def test_a_step_that_shows_few_depths_is_placed_by_the_known_ones(
+    hump_clip: Clip, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    steps = []
+
+    def lose_most_depths(*geometry: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        depth, later_depth, precision = triangulate(*geometry)
+        steps.append(len(depth))
+        if len(steps) == 6:  # all but twenty points behind the camera, and those ten times too far
+            depth = np.where(np.arange(len(depth)) < 20, 10 * depth, -depth)
+        return depth, later_depth, precision
+
+    triangulate = essential.triangulate_points
+    monkeypatch.setattr(essential, "triangulate_points", lose_most_depths)
+    seen = recover_motion(hump_clip)
+    assert not seen.failed.any()
+    assert pitch_rmse_deg(seen, hump_clip) < 0.06
+    assert normalised_progress_rmse(seen, hump_clip) < 0.01

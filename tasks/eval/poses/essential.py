@@ -227,16 +227,16 @@ def _solve_step(
 
     depth, later_depth, precision = triangulate_points(pairs.rays, pairs.later_rays, R, t)
     precision = np.where((weight > 0) & (depth > 0) & (later_depth > 0), precision, 0.0)
+    if (precision > 0).sum() < max(settings.min_points, settings.min_inlier_share * count):
+        # the car pitches without moving: the baseline is too short for depth, so the known depth is used
+        return _standing_step(key, turn, pairs, K, settings), key
     split = int(pairs.kept.sum())
     length, length_std = 1.0, 0.0
     if (key.precision > 0).any():
         before = key.depth[pairs.kept], key.precision[pairs.kept]
         length, length_std = step_length(*before, depth[:split], precision[:split])
         if np.isnan(length):
-            if (key.precision[pairs.kept] > 0).sum() < settings.min_points:
-                return failed_step("no point links this step's length to the one before", inliers), key
-            # the car pitches without moving: the baseline is too short for depth, so the known depth is used
-            return _standing_step(key, turn, pairs, K, settings), key
+            return failed_step("no point links this step's length to the one before", inliers), key
     placed = replace(
         later,
         depth=_scatter_values(later_depth[split:] * length, pairs.later_kept),
