@@ -23,6 +23,8 @@ INTERVAL = 0.01
 """Between the samples [s]."""
 ONSET, RAMP, DURATION, DISC = 1.0, 0.3, 6.0, 20.0
 """Of a run whose plan says nothing else [s, s, s, K]."""
+LIFT = 0.2
+"""In which a driver lifts the throttle [s]."""
 PULSE_RAMP = 0.06
 """In which the pressure falls and rises again, once a second [s]."""
 SESSION = {
@@ -74,12 +76,42 @@ def brake_trace(plan: Mapping[str, Any]) -> NDArray[np.float64]:
     plan : of the run
     """
     time = np.arange(round(plan.get("duration", DURATION) / INTERVAL)) * INTERVAL
-    pressure = plan.get("pressure", 0.0) * np.clip((time - ONSET) / plan.get("ramp", RAMP), 0.0, 1.0)
+    onset = plan.get("onset", ONSET)
+    pressure = plan.get("pressure", 0.0) * np.clip((time - onset) / plan.get("ramp", RAMP), 0.0, 1.0)
     if "pulses" in plan:
-        phase = np.where(time > ONSET + 0.5, (time - ONSET - 0.5) % 1.0, 1.0)
+        phase = np.where(time > onset + 0.5, (time - onset - 0.5) % 1.0, 1.0)
         down = np.clip(np.minimum(phase, 0.55 - phase) / PULSE_RAMP, 0.0, 1.0)
         pressure = pressure * (1.0 - (1.0 - plan["pulses"]) * down)
     trace: NDArray[np.float64] = pressure
+    return trace
+
+
+def drive_trace(plan: Mapping[str, Any], record: NDArray[np.void], speed: float) -> NDArray[np.float64]:
+    """Torque of the engine at the front wheels, float64 [N] [N m].
+
+    A driver who holds the speed or gains some gives what the car then needs, and lifts before he brakes. Zero where
+    the plan names no driver: the car coasts.
+
+    Parameters
+    ----------
+    plan : of the run; `driver` says how fast he gains speed [m/s2] and how long before the brake he lifts [s]
+    record : the car
+    speed : at the start [m/s]
+    """
+    time = np.arange(round(plan.get("duration", DURATION) / INTERVAL)) * INTERVAL
+    if "driver" not in plan:
+        return np.zeros(len(time))
+    gains, lifts = plan["driver"]
+    car = record[0]
+    weight = car["gravity"] * (car["body_mass"] + car["wheel_mass"].sum())
+    air = speed + car["direction"] * car["wind_speed"]
+    force = 0.5 * car["air_density"] * car["drag_area"] * air * abs(air)
+    force += weight * (car["rolling_coefficient"] + car["rolling_speed"] * speed + car["direction"] * car["grade"])
+    force += weight / car["gravity"] * (car["coast"] + gains)
+    torque = force * car["radius"] + car["pad_drag"] + car["engine_torque"]
+    torque += car["engine_viscous"] * speed / car["radius"]
+    lifted = plan.get("onset", ONSET) - lifts
+    trace: NDArray[np.float64] = torque * np.clip((lifted - time) / LIFT + 1.0, 0.0, 1.0)
     return trace
 
 
@@ -119,8 +151,8 @@ def measure_run(
         effects, Surroundings(surface=surface, direction=direction, grade=session["grade"], hazard=hazard)
     )
     pressure = brake_trace(plan)
-    inputs = _inputs(pressure, truth, key, on)
     speed = plan["speed"] + offset["initial_speed_m_s"]
+    inputs = _inputs(pressure, drive_trace(plan, record, speed), truth, key, on)
     controller = values_of(declared["abs"]) | {"target_slip": surface["target_slip"]}
     states, rates = drive_run(
         record, inputs, start_state(record, speed, plan.get("disc", DISC)), controller, designs["last_speed"]["value"]
@@ -151,7 +183,13 @@ def measure_run(
     )
 
 
-def _inputs(pressure: NDArray[np.float64], truth: Truth, key: tuple[str | int, ...], on: float) -> Inputs:
+def _inputs(
+    pressure: NDArray[np.float64],
+    drive: NDArray[np.float64],
+    truth: Truth,
+    key: tuple[str | int, ...],
+    on: float,
+) -> Inputs:
     time = np.arange(len(pressure), dtype=np.float64) * INTERVAL
     tables = [
         on * draw_smooth(keyed_generator(*key, port), time, entry["sigma"], entry["time"])
@@ -162,7 +200,7 @@ def _inputs(pressure: NDArray[np.float64], truth: Truth, key: tuple[str | int, .
         form = truth.form
         keys = np.array([PORTS.index(form["port"]), VARIABLES.index(form["variable"]), int(form["wet_only"])])
         table = np.array([form["from"], form["to"], *form["at"]], dtype=np.float64)
-    return Inputs(INTERVAL, pressure, tables[0], tables[1], tables[2], keys, table)
+    return Inputs(INTERVAL, pressure, tables[0], tables[1], tables[2], drive, keys, table)
 
 
 def make_campaign(

@@ -44,6 +44,7 @@ class Inputs(NamedTuple):
     interval : between the samples [s]
     pressure : at the master cylinder [MPa]
     force, friction, moment : smooth disturbances [N, 1, N m]
+    drive : of the engine at the front wheels [N m]
     form_keys : int64 [3] port and variable of a form, and 1 if it acts on wet roads only; port -1 for none
     form : float64 [2 + K] lowest and highest value of the variable, then the port's values between
     """
@@ -53,6 +54,7 @@ class Inputs(NamedTuple):
     force: NDArray[np.float64]
     friction: NDArray[np.float64]
     moment: NDArray[np.float64]
+    drive: NDArray[np.float64]
     form_keys: NDArray[np.int64]
     form: NDArray[np.float64]
 
@@ -202,6 +204,7 @@ def find_rates(
         shaft = 0.0
         if axle == 0:
             shaft = 0.5 * (car.engine_torque * turning + car.engine_viscous * omega)
+            shaft -= 0.5 * table_at(time, inputs.interval, inputs.drive)
             rim = car.radius * omega
             if car.creep_force > 0.0 and rim < car.creep_speed:
                 shaft -= 0.5 * car.creep_force * car.radius * (1.0 - rim / car.creep_speed)

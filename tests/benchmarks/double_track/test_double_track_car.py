@@ -49,7 +49,7 @@ def drive(plan, effects=(), abs_on=True, changes=(), weather="dry", rate=0, haza
     time = np.arange(round(duration * 100)) * 0.01
     still = np.zeros(len(time))
     pressure = peak * np.clip((time - 0.3) / 0.2, 0.0, 1.0)
-    inputs = Inputs(0.01, pressure, still, still, still, np.array([-1, 0, 0]), np.zeros(4))
+    inputs = Inputs(0.01, pressure, still, still, still, still, np.array([-1, 0, 0]), np.zeros(4))
     return *drive_run(record, inputs, start_state(record, speed, 20.0), controller, 0.5), record[0]
 
 
