@@ -106,7 +106,9 @@ def drive_trace(plan: Mapping[str, Any], record: NDArray[np.void], speed: float)
     weight = car["gravity"] * (car["body_mass"] + car["wheel_mass"].sum())
     air = speed + car["direction"] * car["wind_speed"]
     force = 0.5 * car["air_density"] * car["drag_area"] * air * abs(air)
-    force += weight * (car["rolling_coefficient"] + car["rolling_speed"] * speed + car["direction"] * car["grade"])
+    force += weight * (
+        car["rolling_coefficient"] + car["rolling_speed"] * speed + car["direction"] * car["grade"]
+    )
     force += weight / car["gravity"] * (car["coast"] + gains)
     torque = force * car["radius"] + car["pad_drag"] + car["engine_torque"]
     torque += car["engine_viscous"] * speed / car["radius"]

@@ -6,8 +6,9 @@ from catalogs.decision_rules import load_decision_rules
 from catalogs.joint_numbers import load_joint_numbers
 from tasks.campaign.campaign import Campaign
 from tasks.identification.decision.disputes import ForeignCarError
-from tasks.identification.decision.verdict import Trace, find_missing_effects
-from tasks.identification.joint.calibration import calibrate_gain, needs_joint_fit
+from tasks.identification.decision.verdict import Trace
+from tasks.identification.joint.calibration import needs_joint_fit
+from tasks.identification.joint.single_effects import find_single_effects
 from tasks.identification.joint.verdict import JointTrace, judge_jointly
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import Effect
@@ -31,6 +32,5 @@ def judge_campaign(
     rules, numbers = load_decision_rules(), load_joint_numbers()
     if not needs_joint_fit(measured, rules.joint):
         with suppress(ForeignCarError):
-            gain = calibrate_gain(measured, model, road, numbers, rules.joint)
-            return find_missing_effects(measured, model, road, effects, rules, hardly_known=gain)
+            return find_single_effects(measured, model, road, effects, numbers, rules)
     return judge_jointly(measured, model, road, numbers, rules)

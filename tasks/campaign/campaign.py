@@ -100,6 +100,22 @@ class Run:
             else np.flatnonzero(self.sampled[:, channel])
         )
 
+    def begin_at(self, first: int) -> "Run":
+        """Return a run on a flat road from a sample on.
+
+        Parameters
+        ----------
+        first : sample that becomes the first
+        """
+        drive, slope, throttle = (
+            None if trace is None else trace[first:]
+            for trace in (self.drive_torque, self.road_slope, self.throttle)
+        )
+        return replace(
+            self, pressure=self.pressure[first:], response=self.response[first:], drive_torque=drive, road_slope=slope,
+            throttle=throttle, sampled=None if self.sampled is None else self.sampled[first:],
+        )  # fmt: skip
+
     def group_channels(self) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
         """Return the channels that share their instants: places in `CHANNELS`, int64 [C], and instants, int64 [M]."""
         groups: dict[bytes, list[int]] = {}

@@ -9,7 +9,7 @@ from tasks.identification.decision.disputes import ForeignCarError
 from tasks.identification.inference.noise import estimate_channel_noise
 from tasks.identification.joint.fit import JointFit, fit_jointly, measure_misfit, suggest_starts
 from tasks.identification.joint.numbers import JointNumber, choose_numbers
-from tasks.identification.joint.stops import OFFSETS, Stop, make_stop
+from tasks.identification.joint.stops import Stop, make_stop
 from tasks.identification.rules import JointRules
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.parameters import Vehicle
@@ -87,8 +87,8 @@ def calibrate_gain(
     Raises
     ------
     ForeignCarError
-        If the runs differ from the calibrated model by much more than their sensors' noise, or a drive force acts
-        before the brake: single effects cannot be told then.
+        If the runs differ from the calibrated model by much more than their sensors' noise: single effects cannot be
+        told then.
     """
     if not is_gain_unknown(campaign, rules):
         return {}
@@ -98,8 +98,7 @@ def calibrate_gain(
     noise = estimate_channel_noise(campaign)[1]
     misfit = measure_misfit(fitted, train)
     seen = np.flatnonzero(np.isfinite(misfit))
-    drive = float(np.mean(fitted.offsets[:, OFFSETS.index("drive")]))
-    if np.any(misfit[seen] > rules.foreign_misfit * noise[seen]) or drive > rules.driven_acceleration:
+    if np.any(misfit[seen] > rules.foreign_misfit * noise[seen]):
         raise ForeignCarError
     gain = next(number for number in shown if number.name == GAIN)
     wheels = any(name.startswith("wheel_speed") for name in campaign.channels)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.campaign import CHANNELS, Run
+from tasks.identification.inference.driver import LIFT, find_brake_onset
 from tasks.identification.inference.forward import (
     RunModel,
     compute_instrument_readings,
@@ -26,8 +27,6 @@ OFFSETS = ("initial_speed", "drive", "acceleration_bias")
 OFFSET_SIGMA = np.array([0.3, 2.0, 0.3])
 """Their priors."""
 OFFSET_LIMIT = np.array([3.0, 8.0, 3.0])
-LIFT = 0.2
-"""Time in which a driver lifts the throttle, centred on the brake where no throttle was measured [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,14 +65,7 @@ def make_stop(
     rules : of the joint fit
     """
     model = prepare_run(run, vehicle, surface)
-    pressure = model.run.pressure[: model.samples]
-    peak = float(pressure.max())
-    pressed = (
-        np.flatnonzero(pressure > rules.brake_onset_share * peak)
-        if peak > 0.0
-        else np.empty(0, dtype=np.int64)
-    )
-    onset = int(pressed[0]) if pressed.size else model.samples
+    onset = find_brake_onset(model, rules.brake_onset_share)
     seen = [
         name
         for name in FITTED

@@ -84,10 +84,11 @@ def test_a_run_is_the_same_whenever_it_is_driven():
 def test_a_driver_holds_his_speed_until_he_lifts_and_then_the_car_coasts():
     resistance = {"drag_area": 0.8, "rolling_coefficient": 0.012, "engine_torque": 60.0, "pad_drag": 50.0}
     run = {"speed": 25.0, "duration": 4.0, "onset": 3.0}
+    truth = Truth(name="held", values=resistance)
     held, coasting = (
-        np.gradient(measure_run(plan, "run-01", Truth(name="held", values=resistance), LEVEL, (0,), False).columns["speed"], 0.01)
+        np.gradient(measure_run(plan, "run-01", truth, LEVEL, (0,), False).columns["speed"], 0.01)
         for plan in (run | {"driver": [0.0, 0.5]}, run)
-    )  # fmt: skip
+    )
     assert np.abs(held[100:220]).max() < 0.01
     assert coasting[100:220].max() < -0.4
     assert held[280:295].mean() == pytest.approx(coasting[20:35].mean(), abs=0.02)  # at the same speed

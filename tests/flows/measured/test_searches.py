@@ -12,8 +12,7 @@ from tasks.identification.decision.disputes import ForeignCarError
     ("says_little", "foreign", "judge"),
     [
         (False, None, "one"),
-        (False, "find_missing_effects", "joint"),
-        (False, "calibrate_gain", "joint"),
+        (False, "find_single_effects", "joint"),
         (True, None, "joint"),
     ],
 )
@@ -29,6 +28,6 @@ def test_the_search_is_chosen_by_what_is_known_and_by_whether_the_runs_agree(
         return answer_or_refuse
 
     monkeypatch.setattr(searches, "needs_joint_fit", lambda *_: says_little)
-    for name, answer in (("calibrate_gain", {}), ("find_missing_effects", "one"), ("judge_jointly", "joint")):
+    for name, answer in (("find_single_effects", "one"), ("judge_jointly", "joint")):
         monkeypatch.setattr(searches, name, answer_as(name, answer))
     assert searches.judge_campaign(SimpleNamespace(), SimpleNamespace(), SimpleNamespace(), ()) == judge

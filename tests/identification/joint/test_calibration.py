@@ -74,19 +74,6 @@ def test_a_gain_far_from_the_files_is_found_and_refined_beside_the_mass(gain):
         )
 
 
-def test_a_car_that_is_driven_until_it_brakes_is_left_to_the_joint_fit():
-    def hold_speed(run: Run) -> Run:
-        response = run.response.copy()
-        before = run.pressure == 0.0
-        time = run.interval * np.arange(len(response))
-        response[:, SPEED] += 0.4 * np.where(before, time, time[before][-1])
-        response[before, ACCELERATION] += 0.4
-        return replace(run, response=response)
-
-    with pytest.raises(ForeignCarError):
-        calibrate_campaign(make_campaign(tuple(hold_speed(run) for run in make_runs(0.0))))
-
-
 def test_a_car_that_no_gain_makes_the_models_is_left_to_the_joint_fit():
     def shake_speed(run: Run) -> Run:
         response = run.response.copy()

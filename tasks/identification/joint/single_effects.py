@@ -1,0 +1,87 @@
+"""Single effects of a car that its file knows but for its brake gain, and of one whose driver held his speed."""
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from tasks.campaign.campaign import Campaign
+from tasks.identification.decision.disputes import ForeignCarError
+from tasks.identification.decision.verdict import Trace, find_missing_effects
+from tasks.identification.inference.driver import begin_at_brake, measure_drive
+from tasks.identification.inference.forward import prepare_run
+from tasks.identification.inference.hypothesis import compose_parameters
+from tasks.identification.joint.calibration import calibrate_gain
+from tasks.identification.joint.numbers import JointNumber
+from tasks.identification.rules import DecisionRules
+from tasks.surface.state import SurfaceParameters
+from tasks.vehicle.effects.library import Effect
+from tasks.vehicle.effects.table import EFFECT_TABLE
+from tasks.vehicle.parameters import Vehicle
+
+
+def find_single_effects(
+    campaign: Campaign,
+    vehicle: Vehicle,
+    surface: SurfaceParameters,
+    effects: tuple[Effect, ...],
+    numbers: Sequence[JointNumber],
+    rules: DecisionRules,
+) -> Trace:
+    """Look for one effect at a time; where a driver held his speed until he braked, from the brake on.
+
+    That he did is seen beside the file's model, or only beside the resistance that a search finds. Taken for coasting,
+    such runs agree about nothing; from the brake on they may.
+
+    Parameters
+    ----------
+    campaign : measured runs with their split
+    vehicle, surface : the model that is judged
+    effects : library of candidates
+    numbers : that a joint fit may move
+    rules : of the decision
+
+    Raises
+    ------
+    ForeignCarError
+        If single effects cannot be told; `judge_jointly` can.
+    """
+    share = rules.joint.brake_onset_share
+    train = [prepare_run(run, vehicle, surface) for run in campaign.train]
+
+    def search(runs: Campaign) -> Trace:
+        gain = calibrate_gain(runs, vehicle, surface, numbers, rules.joint)
+        return find_missing_effects(runs, vehicle, surface, effects, rules, hardly_known=gain)
+
+    def measure_drive_beside(trace: Trace) -> float:
+        found = trace.end.base
+        return measure_drive(train, *compose_parameters(found.parts, found.values, found.session), share)
+
+    drive, whole = measure_drive(train, np.zeros(len(EFFECT_TABLE)), (), share), None
+    if drive <= rules.joint.driven_acceleration:
+        with suppress(ForeignCarError):
+            whole = search(campaign)
+            drive = measure_drive_beside(whole)
+    if whole is not None and drive <= rules.joint.driven_acceleration:
+        return whole
+    trace = search(begin_at_brake(campaign, vehicle, surface, share))
+    drive = max(drive, measure_drive_beside(trace))
+    if drive <= rules.joint.driven_acceleration:
+        raise ForeignCarError
+    return replace(
+        trace, verdict=replace(trace.verdict, reasons=(*trace.verdict.reasons, tell_driven(drive)))
+    )
+
+
+def tell_driven(drive: float) -> str:
+    """Return the sentence on runs that begin at their brake.
+
+    Parameters
+    ----------
+    drive : acceleration before the brake that the model leaves open [m/s2]
+    """
+    return (
+        f"before the brake the car was driven with {drive:.2f} m/s2, and no channel says by what: each stop on a flat"
+        " road is judged from its brake on; log the throttle or the engine's torque, or coast for a second before it"
+    )
