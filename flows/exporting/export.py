@@ -18,7 +18,7 @@ from flows.reading.suggestions import suggest_names
 from flows.running.progress import progress_bar
 from flows.store.address import is_address, open_for_reading
 from flows.store.layout import PARTIAL, write_json
-from flows.store.sealed import read_manifest
+from flows.store.sealed import read_manifest, refuse_changed_content
 from manifests.manifest import is_quarantined
 from tasks.errors import InputError
 
@@ -44,8 +44,8 @@ def export_dataset(
     Raises
     ------
     InputError
-        For an unknown format or clip, a dataset that lacks what the format needs, a package that is not installed, or
-        a folder that holds something.
+        For an unknown format or clip, a dataset that lacks what the format needs or is not as recorded, a package that
+        is not installed, or a folder that holds something.
     """
     chosen = find_format(to)
     writer = import_writer(chosen)
@@ -68,6 +68,7 @@ def export_dataset(
     if problems:
         raise InputError(problems)
     refuse_changed_records(layout, manifest)
+    refuse_changed_content(layout, manifest, kept)
     with write_folder(folder) as partial, progress_bar("clips", len(kept)) as advance:
         exported = ExportedDataset(layout=layout, manifest=manifest, rows=kept, finish=advance)
         writer(exported, partial)

@@ -15,13 +15,13 @@ from flows.judging.judged_clip import METHODS, JudgedClip, View, judge_clip
 from flows.judging.physics import clip_facts
 from flows.making.catalogue import Catalogue, catalogue_of
 from flows.making.driving import simulate_drive
+from flows.making.places import refuse_changed_scene
 from flows.making.plan import TICK_RATE_HZ, Plan, read_plan
 from flows.making.traced import refuse_traced
 from flows.running.orchestration import run_as_stage
 from flows.store.address import open_for_reading
-from flows.store.layout import Layout
 from flows.store.outputs import Outputs
-from flows.store.sealed import read_manifest, require_frames
+from flows.store.sealed import read_manifest, refuse_changed_content, require_frames
 from tasks.errors import InputError
 from tasks.eval.negative_controls import (
     Claim,
@@ -67,12 +67,16 @@ def run_controls(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If the folder is no finished dataset with frames, or holds fewer than two clips.
+        If the folder is no finished dataset with frames, or holds fewer than two clips, or these or the scene are not
+        as recorded.
     """
     results = Outputs(out, "controls", "controls.json", "controls.svg")
-    root = open_for_reading(dataset).root
+    layout = open_for_reading(dataset)
+    root, manifest = layout.root, read_manifest(layout)
     refuse_traced(read_plan(root).inputs, dataset, "controls")
-    require_frames(read_manifest(Layout(root)), dataset)
+    require_frames(manifest, dataset)
+    refuse_changed_content(layout, manifest, manifest["clips"])
+    refuse_changed_scene(manifest["scene"])
     facts = clip_facts(root)
     if len(facts) < 2:
         raise InputError(f"{root}: negative controls need at least two clips; there are {len(facts)}.")

@@ -17,10 +17,11 @@ from flows.judging.physics import clip_facts
 from flows.judging.road_edit_rows import road_edit_rows
 from flows.judging.standards import find_reference_cases, own_telemetry, reference_traces
 from flows.judging.trajectories import trajectory_files
+from flows.making.places import refuse_changed_scene
 from flows.running.orchestration import run_as_stage
 from flows.store.address import open_for_reading
 from flows.store.outputs import Outputs
-from flows.store.sealed import read_manifest, require_frames
+from flows.store.sealed import read_manifest, refuse_changed_content, require_frames
 from flows.store.telemetry import write_parquet
 from tasks.errors import InputError
 from tasks.eval.severity import severity_agreement
@@ -66,7 +67,8 @@ def evaluate_dataset(
     Raises
     ------
     InputError
-        If the folder is no finished dataset with frames, or a trajectory, a checkpoint or a reference cannot be used.
+        If the folder is no finished dataset with frames, or what is judged of it or its scene is not as recorded, or a
+        trajectory, a checkpoint or a reference cannot be used.
     """
     if event_window not in get_args(EventWindow):
         raise InputError(f"event_window must be {' or '.join(get_args(EventWindow))}; it is {event_window}")
@@ -78,6 +80,8 @@ def evaluate_dataset(
     layout = open_for_reading(dataset)
     manifest, root = read_manifest(layout), layout.root
     require_frames(manifest, layout)
+    refuse_changed_content(layout, manifest, manifest["clips"])
+    refuse_changed_scene(manifest["scene"])
     judges = load_judges(learned)
     facts = clip_facts(root)
     told = trajectory_files(Path(trajectories), [row["clip_id"] for row in facts]) if trajectories else {}

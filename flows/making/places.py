@@ -70,6 +70,26 @@ def find_scene(scene: Mapping[str, Any]) -> str:
     )
 
 
+def refuse_changed_scene(scene: Mapping[str, Any]) -> None:
+    """Hold a user's scene against its recorded hash; the built-in street is of the code, which an audit compares.
+
+    Parameters
+    ----------
+    scene : ``name`` and ``sha256``, of a plan or manifest
+
+    Raises
+    ------
+    InputError
+        If no place is known that holds it, or it is another one now.
+    """
+    place = find_scene(scene)
+    if scene["name"] not in BUILT_IN and _identity_at(Path(place)) != scene["sha256"]:
+        raise InputError(
+            f"scene {scene['name']}: must be the recorded one (SHA-256 {scene['sha256'][:12]}...); {place} holds"
+            f" another now: put the recorded one back, or set {SHELVES} to the folder in which it lies"
+        )
+
+
 def _identity_at(place: Path) -> str | None:
     try:
         return scene_identity(str(place))

@@ -132,6 +132,25 @@ def refuse_changed_clips(
     refuse_changed_files(layout, tables | pictures)
 
 
+def refuse_changed_content(
+    layout: Layout, manifest: Mapping[str, Any], clips: Sequence[Mapping[str, Any]]
+) -> None:
+    """Hold all that a dataset has of some clips, and its tables, against the recorded hashes.
+
+    Parameters
+    ----------
+    layout, manifest : of the dataset
+    clips : records of those that are judged or handed on
+
+    Raises
+    ------
+    InputError
+        Listing every file that is missing or changed.
+    """
+    own = {name: digest for clip in clips for name, digest in clip["artifacts"].items()}
+    refuse_changed_files(layout, manifest["artifacts"] | own)
+
+
 def _refuse_unfinished(layout: Layout) -> None:
     if layout.plan.is_file() and not layout.manifest.is_file():
         clips = read_plan_record(layout)["clips"]

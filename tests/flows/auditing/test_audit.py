@@ -11,6 +11,8 @@ import flows.auditing.audit
 import manifests.explain
 from catalogs.scenes import load_scene, write_scene
 from flows.auditing.audit import audit_dataset, format_text
+from flows.judging.controls import run_controls
+from flows.judging.evaluation import evaluate_dataset
 from flows.making.generate import generate_dataset
 from flows.store.layout import Layout
 from tasks.errors import InputError
@@ -89,6 +91,15 @@ def test_a_scene_that_has_changed_since_is_named_as_the_reason(own_dataset, tmp_
     load_scene.cache_clear()  # as if in another process
     result = audited(own_dataset)
     assert result["mismatches"][0]["why"] == ["scene"] and result["differences"][0].startswith("scene")
+
+
+@pytest.mark.parametrize("judge", [evaluate_dataset, run_controls])
+def test_a_dataset_is_not_judged_beside_another_scene_than_its_own(own_dataset, tmp_path, judge):
+    shutil.rmtree(tmp_path / "scene")
+    write_scene(toy_street(seed=2), tmp_path / "scene", {})
+    load_scene.cache_clear()
+    with pytest.raises(InputError, match=r"scene .*: must be the recorded one .* holds another now"):
+        judge(str(own_dataset.root), out=str(tmp_path / "out"))
 
 
 def test_a_broken_scene_is_the_inputs_fault_and_one_sentence(own_dataset, tmp_path):
