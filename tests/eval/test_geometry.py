@@ -6,7 +6,13 @@ import pytest
 from scipy.linalg import expm
 
 from benchmarks.synthetic_street import camera_matrix, make_mount
-from tasks.eval.poses.corners import corner_strength, grid_corners, merge_tracks, track_corners
+from tasks.eval.poses.corners import (
+    corner_strength,
+    even_contrast,
+    grid_corners,
+    merge_tracks,
+    track_corners,
+)
 from tasks.eval.poses.epipolar import (
     fit_rotation,
     refine_essential,
@@ -245,3 +251,12 @@ def test_corners_that_are_tracked_in_two_lots_go_where_they_go_together() -> Non
     for ours, theirs in zip(merged, together, strict=True):
         assert np.array_equal(ours, theirs)
     assert len(track_corners(earlier, later, corners[:0], 11, 1, 0.3).came_back) == 0
+
+
+def test_a_patch_looks_alike_under_any_light_and_noise_stays_noise() -> None:
+    patch = np.random.default_rng(3).integers(60, 180, (40, 50)).astype(np.float64)
+    bright = even_contrast(np.rint(patch).astype(np.uint8), 11, 2.0).astype(float)
+    dull = even_contrast(np.rint(200 - 0.5 * (200 - patch)).astype(np.uint8), 11, 2.0).astype(float)
+    assert np.abs(bright - dull).max() < 4 and bright.std() > 30
+    flat = even_contrast(np.full((40, 50), 90, np.uint8) + np.eye(40, 50, dtype=np.uint8), 11, 2.0)
+    assert np.abs(flat.astype(float) - 128).max() < 25

@@ -5,13 +5,13 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from benchmarks.synthetic_street import Clip, drive_clip
+from benchmarks.synthetic_street import Clip, camera_matrix, drive_clip, render_clip
 from tasks.errors import InputError
 from tasks.eval.poses import essential
 from tasks.eval.poses.essential import recover_motion_essential
 from tasks.eval.poses.motion import RecoveredMotion
 from tests.eval.scoring import normalised_progress_rmse, pitch_rmse_deg
-from tests.eval.weathering import add_flakes, code_as_jpeg, fade_pictures
+from tests.eval.weathering import add_flakes, add_veil, code_as_jpeg, fade_pictures
 
 
 def recover_motion(clip: Clip, frames: np.ndarray | None = None) -> RecoveredMotion:
@@ -116,3 +116,16 @@ def test_a_step_that_shows_few_depths_is_placed_by_the_known_ones(
     assert not seen.failed.any()
     assert pitch_rmse_deg(seen, hump_clip) < 0.06
     assert normalised_progress_rmse(seen, hump_clip) < 0.01
+
+
+def test_a_veil_that_thins_as_things_come_nearer_is_no_motion(full_clip: Clip) -> None:
+    veiled = add_veil(full_clip.frames, full_clip.depth, full_clip.K, 0.01, 0.88)
+    assert pitch_rmse_deg(recover_motion(full_clip, veiled), full_clip) < 0.009
+
+
+def test_a_turn_that_nothing_foretells_is_followed() -> None:
+    station, pitch = 1.1 * np.arange(9.0), np.deg2rad(3.0) * (np.arange(9) >= 5)
+    clip = render_clip(station, 0 * station, pitch, K=camera_matrix(240, 160, 200.0), width=240, height=160)
+    seen = recover_motion(clip)
+    assert not seen.failed.any() and pitch_rmse_deg(seen, clip) < 0.03
+    assert normalised_progress_rmse(seen, clip) < 0.005

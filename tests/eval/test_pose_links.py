@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from benchmarks.synthetic_street import Clip, drive_clip
+from tasks.eval.poses import essential
 from tasks.eval.poses.essential import EssentialSettings, recover_motion_essential
 from tasks.eval.poses.links import Link, chained_poses, link_placements
 from tasks.eval.poses.motion import FrameStep, Placement, failed_step
 from tasks.eval.poses.rigid import invert_pose
 from tasks.eval.poses.twists import pose_from_twist
-from tests.eval.scoring import pitch_rmse_deg
+from tests.eval.scoring import normalised_progress_rmse, pitch_rmse_deg
+from tests.eval.weathering import add_noise
 
 AHEAD = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 TILT = np.array([0.0, 0.0, 0.0, 1e-4, 0.0, 0.0])
@@ -76,18 +78,22 @@ def test_a_step_that_states_no_error_is_believed_all_but_wholly():
     )
 
 
-@pytest.fixture(scope="module")
-def long_clip() -> Clip:
-    return drive_clip(frames=40, frame_rate=10.0, hump_at=1.0, width=240, height=160, focal=200.0)
-
-
-def test_links_hold_the_camera_only_pitch_at_ten_frames_a_second(long_clip: Clip):
-    arguments = (long_clip.frames, long_clip.K, long_clip.T_rig_camera)
+def test_links_hold_the_camera_only_pitch(full_clip: Clip) -> None:
+    arguments = (full_clip.frames, full_clip.K, full_clip.T_rig_camera)
     bare, tied = (
-        pitch_rmse_deg(recover_motion_essential(*arguments, settings=settings), long_clip)
+        pitch_rmse_deg(recover_motion_essential(*arguments, settings=settings), full_clip)
         for settings in (EssentialSettings(link_span=NONE), EssentialSettings())
     )
     assert tied < 0.6 * bare
+
+
+def test_the_depths_of_links_keep_the_unit_of_length(monkeypatch: pytest.MonkeyPatch) -> None:
+    clip = drive_clip(frames=40, frame_rate=10.0, hump_at=1.0, width=240, height=160, focal=200.0)
+    noisy = (add_noise(clip.frames, 10.0), clip.K, clip.T_rig_camera)
+    kept = normalised_progress_rmse(recover_motion_essential(*noisy), clip)
+    monkeypatch.setattr(essential, "keep_sharper_depth", lambda frame, linked: frame)
+    crept = normalised_progress_rmse(recover_motion_essential(*noisy), clip)
+    assert kept < 0.0025 < crept
 
 
 def test_poses_of_the_chain_are_products_of_its_steps():

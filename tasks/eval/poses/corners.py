@@ -25,6 +25,29 @@ def least_strength(strength: NDArray[np.float32], quality: float) -> float:
     return quality * float(np.percentile(strength, 95))
 
 
+GREY_LEVELS_A_DEVIATION = 40
+"""Grey levels for one standard deviation of a patch: 3.2 of them fit into eight bits on either side [1]."""
+
+
+def even_contrast(grey: NDArray[np.uint8], window: int, least: float) -> NDArray[np.uint8]:
+    """Return a picture [H, W] whose patches all have one mean and one contrast [1].
+
+    A surface that comes nearer loses veil, so that it darkens under a bright sky. Where its outline stands before the
+    sky a tracker that takes grey levels as constant reads this as motion, always towards the sky.
+
+    Parameters
+    ----------
+    grey : uint8 [H, W] grey levels [1]
+    window : side of the tracked patches, which are also those that are evened [px]
+    least : standard deviation to which that of a flat patch is raised, so that its noise stays noise, 8-bit [1]
+    """
+    level = grey.astype(np.float32)
+    mean = cv2.blur(level, (window, window))
+    variance = np.maximum(cv2.blur(level * level, (window, window)) - mean * mean, 0.0)
+    evened = 128 + GREY_LEVELS_A_DEVIATION * (level - mean) / np.sqrt(variance + least**2)
+    return np.clip(np.rint(evened), 0, 255).astype(np.uint8)
+
+
 def cell_size(width: int, cells_across: int) -> int:
     """Return the side of the grid cells over a picture of that width [px]."""
     return max(width // cells_across, 4)

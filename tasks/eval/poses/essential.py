@@ -5,11 +5,9 @@ It reads no data of a renderer, so it can judge any video; in return, the scale 
 
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.eval.poses.corners import cell_size, corner_strength, grid_corners, least_strength
 from tasks.eval.poses.epipolar import (
     fit_rotation,
     five_point_pose,
@@ -18,6 +16,7 @@ from tasks.eval.poses.epipolar import (
     step_length,
     triangulate_points,
 )
+from tasks.eval.poses.key_frames import KeyFrame, give_depth, keep_sharper_depth, make_key_frame
 from tasks.eval.poses.links import Link, link_placements
 from tasks.eval.poses.motion import (
     MAX_GAP,
@@ -28,7 +27,7 @@ from tasks.eval.poses.motion import (
     failed_step,
     integrate_motion,
 )
-from tasks.eval.poses.point_pairs import PointPairs, track_pairs
+from tasks.eval.poses.point_pairs import PointPairs, Tracker, correct_turn, track_pairs
 from tasks.eval.poses.rigid import Floats, invert_pose
 from tasks.eval.poses.solve_pnp import PnpLimits, solve_pnp
 
@@ -50,6 +49,8 @@ class EssentialSettings:
     min_points : fewest points that carry a pose [1]
     min_inlier_share : least share of tracked points that must agree on the pose [1]
     noise_floor, noise_ceiling : smallest assumed tracking error, and largest error of a valid track [px]
+    least_contrast : standard deviation of a patch that noise alone may have, 8-bit [1]
+    near_prediction : median shift of the corners up to which the predicted turn is kept [px]
     link_span : frames that the longer steps beside the chain span [1]
     link_stride : frames between their starts [1]
     """
@@ -66,20 +67,10 @@ class EssentialSettings:
     min_inlier_share: float = 0.3
     noise_floor: float = 0.01
     noise_ceiling: float = 2.0
+    least_contrast: float = 2.0
+    near_prediction: float = 1.5
     link_span: int = 8
     link_stride: int = 2
-
-
-@dataclass(frozen=True, kw_only=True)
-class _KeyFrame:
-    """The frame against which later ones are placed, and the known depth of its corners, in the chain's unit."""
-
-    index: int
-    grey: NDArray[np.uint8]
-    corners: NDArray[np.float32]
-    depth: Floats  # [N]
-    precision: Floats  # [N], relative, up to a factor; 0 where the depth is unknown
-    inverse_depth: NDArray[np.float32]  # [H, W], a guess for every pixel
 
 
 def recover_motion_essential(
@@ -92,7 +83,8 @@ def recover_motion_essential(
     """Recover ego motion up to scale by frame-to-frame essential matrices (Nister 2004, DOI 10.1109/TPAMI.2004.17).
 
     The rotation and direction of each step come from the five-point method, refined on Sampson's error, and its
-    length from the depth of the same corners in the step before. Steps over more frames constrain the chain further.
+    length from the depth of the same corners in the step before. Steps over more frames constrain the chain further,
+    and their depths, several times as sharp, keep its unit of length from creeping.
     While the car stands, frames are placed against the last one that moved. Path and heave are those of the camera:
     its offset from the rig's origin is in metres, which the chain's unknown unit cannot express.
 
@@ -114,7 +106,7 @@ def recover_motion_essential(
     chosen = settings or EssentialSettings()
     key = _make_key_frame(0, frames[0], chosen)
     placements: list[Placement] = []
-    poses, passed, links = [np.eye(4)], dict[int, _KeyFrame](), list[Link]()
+    poses, passed, links = [np.eye(4)], dict[int, KeyFrame](), list[Link]()
     missed, velocity, T_key_last, last = 0, np.eye(4), np.eye(4), 0
     for k in range(1, len(frames)):
         anchor, later = key.index, _make_key_frame(k, frames[k], chosen)
@@ -129,8 +121,10 @@ def recover_motion_essential(
         start = passed.pop(k - chosen.link_span, None)
         if start is not None and start.index % chosen.link_stride == 0 and not step.failure:
             between = invert_pose(poses[start.index]) @ poses[k]
-            link, _ = _solve_step(start, later, between, chosen.track_levels, K, chosen, trusted=True)
+            link, linked = _solve_step(start, later, between, chosen.track_levels, K, chosen, trusted=True)
             links.append(Link(earlier=start.index, later=k, step=link))
+            if linked is not start and moved_on is not key:
+                moved_on = keep_sharper_depth(moved_on, linked)
         if not step.failure:
             if k - last == 1:
                 velocity = invert_pose(T_key_last) @ step.T_earlier_later
@@ -145,25 +139,15 @@ def recover_motion_essential(
     )
 
 
-def _make_key_frame(index: int, rgb: NDArray[np.uint8], settings: EssentialSettings) -> _KeyFrame:
-    grey = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
-    strength = corner_strength(grey)
-    least = least_strength(strength, settings.corner_quality)
-    corners = grid_corners(strength, settings.cells_across, settings.window // 2, least)
-    unknown = np.zeros(len(corners))
-    return _KeyFrame(
-        index=index,
-        grey=grey,
-        corners=corners.astype(np.float32),
-        depth=unknown,
-        precision=unknown,
-        inverse_depth=np.zeros(grey.shape, np.float32),
+def _make_key_frame(index: int, rgb: NDArray[np.uint8], settings: EssentialSettings) -> KeyFrame:
+    return make_key_frame(
+        index, rgb, settings.cells_across, settings.corner_quality, settings.window, settings.least_contrast
     )
 
 
 def _place_frame(
-    key: _KeyFrame, later: _KeyFrame, predicted: Floats, K: Floats, settings: EssentialSettings
-) -> tuple[FrameStep, _KeyFrame]:
+    key: KeyFrame, later: KeyFrame, predicted: Floats, K: Floats, settings: EssentialSettings
+) -> tuple[FrameStep, KeyFrame]:
     """Return the step to a frame, and the frame against which the next one is placed."""
     fewest = min(len(key.corners), len(later.corners))
     if fewest < settings.min_points:
@@ -190,20 +174,17 @@ def _place_frame(
 
 
 def _solve_step(
-    key: _KeyFrame,
-    later: _KeyFrame,
+    key: KeyFrame,
+    later: KeyFrame,
     predicted: Floats,
     levels: int,
     K: Floats,
     settings: EssentialSettings,
     trusted: bool = False,
-) -> tuple[FrameStep, _KeyFrame]:
+) -> tuple[FrameStep, KeyFrame]:
     """Solve the step by the tracked points; a trusted prediction replaces the RANSAC first guess."""
     focal = float(K[0, 0] + K[1, 1]) / 2
-    tracker = (settings.window, levels, settings.forward_backward)
-    pairs = track_pairs(
-        (key.grey, key.corners), (later.grey, later.corners), key.inverse_depth, predicted, K, *tracker
-    )
+    pairs = _track_points(key, later, predicted, levels, K, settings, trusted)
     count = len(pairs.rays)
     if count < settings.min_points:
         return failed_step(f"{count} points tracked, at least {settings.min_points} are needed", count), key
@@ -237,22 +218,35 @@ def _solve_step(
         length, length_std = step_length(*before, depth[:split], precision[:split])
         if np.isnan(length):
             return failed_step("no point links this step's length to the one before", inliers), key
-    placed = replace(
-        later,
-        depth=_scatter_values(later_depth[split:] * length, pairs.later_kept),
-        precision=_scatter_values(precision[split:], pairs.later_kept),
-        inverse_depth=_spread_inverse_depth(
-            pairs.later_pixels[precision > 0],
-            1 / (later_depth[precision > 0] * length),
-            later.grey.shape,
-            settings,
-        ),
-    )
+    placed = give_depth(later, pairs, later_depth * length, precision, settings.cells_across)
     return scaled_step(R, t, covariance, length, length_std, inliers), placed
 
 
+def _track_points(
+    key: KeyFrame,
+    later: KeyFrame,
+    predicted: Floats,
+    levels: int,
+    K: Floats,
+    settings: EssentialSettings,
+    trusted: bool,
+) -> PointPairs:
+    tracker = Tracker(settings.window, levels, settings.forward_backward)
+    if (
+        trusted
+    ):  # a longer step, over which pictures differ in scale: they are evened as one camera sees the other
+        pictures = (key.grey, key.corners), (later.grey, later.corners)
+        evening = tracker._replace(least_contrast=settings.least_contrast)
+        return track_pairs(*pictures, key.inverse_depth, predicted, K, evening)
+    coarse = (key.coarse, key.corners), later.coarse
+    rules = settings.min_points, settings.near_prediction
+    turned = correct_turn(*coarse, key.inverse_depth, predicted, K, tracker, *rules)
+    pictures = (key.evened, key.corners), (later.evened, later.corners)
+    return track_pairs(*pictures, key.inverse_depth, turned, K, tracker)
+
+
 def _standing_step(
-    key: _KeyFrame, turn: Floats, pairs: PointPairs, K: Floats, settings: EssentialSettings
+    key: KeyFrame, turn: Floats, pairs: PointPairs, K: Floats, settings: EssentialSettings
 ) -> FrameStep:
     """Return the step to a frame taken near the key frame: by the depth of its corners, or else as a rotation."""
     T = np.eye(4)
@@ -270,25 +264,3 @@ def _standing_step(
         return solve_pnp(points, seen, T, K, limits)
     covariance = np.diag([0.0, 0.0, 0.0, 1.0, 1.0, 1.0]) * (settings.min_parallax / K[0, 0]) ** 2
     return FrameStep(T_earlier_later=invert_pose(T), covariance=covariance, inliers=len(pairs.rays))
-
-
-def _spread_inverse_depth(
-    pixels: Floats, inverse_depth: Floats, shape: tuple[int, ...], settings: EssentialSettings
-) -> NDArray[np.float32]:
-    """Return a smooth guess of inverse depth for every pixel, by normalised convolution over the grid cells."""
-    cell = cell_size(shape[1], settings.cells_across)
-    rows, columns = -(-shape[0] // cell), -(-shape[1] // cell)
-    at = np.clip((pixels[:, ::-1] / cell).astype(np.int64), 0, [rows - 1, columns - 1])
-    total, count = np.zeros((rows, columns)), np.zeros((rows, columns))
-    np.add.at(total, tuple(at.T), inverse_depth)
-    np.add.at(count, tuple(at.T), 1.0)
-    near, far = ([cv2.GaussianBlur(a, (0, 0), width) for a in (total, count)] for width in (1.0, 6.0))
-    # the wide blur only matters where no point lies near
-    guess = (near[0] + 1e-3 * far[0]) / (near[1] + 1e-3 * far[1] + 1e-12)
-    return cv2.resize(guess.astype(np.float32), (columns * cell, rows * cell))[: shape[0], : shape[1]]
-
-
-def _scatter_values(values: Floats, where: NDArray[np.bool_]) -> Floats:
-    spread = np.zeros(len(where))
-    spread[where] = values
-    return spread
