@@ -1,6 +1,6 @@
 """Backward elimination: what does not earn its place goes, the least certain first, each time with a new fit."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -191,7 +191,11 @@ def refit_numbers(
 
 
 def find_substitutes(
-    stops: Sequence[Stop], fitted: JointFit, everything: Sequence[JointNumber], share: float
+    stops: Sequence[Stop],
+    fitted: JointFit,
+    everything: Sequence[JointNumber],
+    share: float,
+    doubted: Collection[str] = (),
 ) -> list[Substitute]:
     """Return what explains nearly as much as each named number in its place.
 
@@ -204,12 +208,13 @@ def find_substitutes(
     fitted : after elimination
     everything : numbers that the campaign could show
     share : of what a number explains from which a substitute is as good [1]
+    doubted : numbers that every car needs anew, but that the file claims to know: they too may stand for another
     """
     left = {n.name for n in fitted.numbers}
     found = []
     for number in fitted.numbers:
         others = [n for n in everything if n.removable and n.name not in left]
-        if not number.removable or not others:
+        if not (number.removable or number.name in doubted) or not others:
             continue
         rest = tuple(n for n in fitted.numbers if n is not number)
         without = refit_numbers(stops, fitted, rest)

@@ -110,14 +110,16 @@ def judge_jointly(
     predicted = predict_held_out(held_out, retuned, fitted)
     error, manoeuvres = summarise_held_out(held_out, predicted, rules)
     progress("rivals")
-    as_good = find_substitutes(train, fitted, shown, rules.rival_gain_share)
-    substitutes = drop_contradicted_rivals(held_out, fitted, as_good, joint)
-    effects, rivals = _named(fitted, substitutes, joint)
     tolerances = _tolerances(campaign)
-    calibrated = tuple(
-        e for e in effects if is_within_tolerance(e, tolerances, joint.wrong_number_tolerances)
-    )
-    effects = [e for e in effects if e not in calibrated]
+    named = _name_effects(fitted, joint)
+    calibrated = tuple(e for e in named if is_within_tolerance(e, tolerances, joint.wrong_number_tolerances))
+    effects = [e for e in named if e not in calibrated]
+    # a number that the file claims to know may stand for what the model lacks
+    claimed = [name for name, tolerance in tolerances.items() if tolerance < joint.unknown_gain_tolerance]
+    doubted = {e.parameters[0].name for e in effects} & set(claimed)
+    as_good = find_substitutes(train, fitted, shown, rules.rival_gain_share, doubted)
+    substitutes = drop_contradicted_rivals(held_out, fitted, as_good, joint)
+    rivals = _name_rivals(fitted, substitutes, effects, joint)
     kind = _kind(effects, rivals)
     reasons += tell_what_was_used(campaign, train, agreeing, joint)
     reasons += tell_rivals(effects, rivals, shown)
@@ -176,26 +178,29 @@ def _settle(
     return fits[0], (same, len(fits))
 
 
-def _named(
-    fitted: JointFit, substitutes: Sequence[Substitute], rules: JointRules
-) -> tuple[list[NamedEffect], list[tuple[str, NamedEffect]]]:
-    """Return what is named, new physics first, and its rivals."""
+def _name_effects(fitted: JointFit, rules: JointRules) -> list[NamedEffect]:
+    """Return what is named, new physics first."""
     # what every car needs anew is told whatever its size: the prediction rests on it
     named = [n for n, _ in certain_numbers(fitted, rules)] + [n for n in fitted.numbers if not n.removable]
-    effects = [_named_effect(fitted, n, rules) for n in named]
     order = {"effect": 0, "sensor": 1, "retune": 2}
-    effects.sort(key=lambda e: order[e.effect_class])
+    return sorted((_named_effect(fitted, n, rules) for n in named), key=lambda e: order[e.effect_class])
+
+
+def _name_rivals(
+    fitted: JointFit, substitutes: Sequence[Substitute], effects: Sequence[NamedEffect], rules: JointRules
+) -> list[tuple[str, NamedEffect]]:
+    """Return the rivals of what is named, each with the name that it stands in for."""
     effect_of = {n.name: n.effect.name for n in fitted.numbers}
     rivals = []
     for other in substitutes:
         number = next(n for n in other.fitted.numbers if n.name == other.name)
-        rival = _named_effect(other.fitted, number, rules)
-        rivals.append((effect_of[other.of], rival))
+        rivals.append((effect_of[other.of], _named_effect(other.fitted, number, rules)))
     friction = next((n for n in fitted.numbers if n.group == "friction"), None)
     if friction is not None:  # tyres at their limit bend the brake's curve too
         grip = _named_effect(fitted, friction, rules)
-        rivals += [(n.effect.name, grip) for n in named if n.group == "curve"]
-    return effects, rivals
+        curve = {n.effect.name for n in fitted.numbers if n.group == "curve"}
+        rivals += [(effect.name, grip) for effect in effects if effect.name in curve]
+    return rivals
 
 
 def _named_effect(fitted: JointFit, number: JointNumber, rules: JointRules) -> NamedEffect:
@@ -218,7 +223,7 @@ def _tolerances(campaign: Campaign) -> dict[str, float]:
 
 
 def _kind(effects: Sequence[NamedEffect], rivals: Sequence[tuple[str, NamedEffect]]) -> VerdictName:
-    classes = {effect.effect_class for effect in effects}
+    classes = {effect.effect_class for effect in (*effects, *(rival for _, rival in rivals))}
     if "effect" in classes:
         return "SET" if rivals else "FOUND"
     return "SENSOR" if "sensor" in classes else "RETUNE" if classes else "NOTHING"

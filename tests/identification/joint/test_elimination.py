@@ -69,3 +69,18 @@ def test_whatever_explains_nearly_as_much_is_a_rival_of_whichever_kind(monkeypat
     monkeypatch.setattr(elimination, "refit_numbers", look_up_cost)
     found = find_substitutes([], named, list(NUMBERS.values()), 0.85)
     assert [(one.of, one.name) for one in found] == [("pressure_curve", "engine_torque")]
+
+
+def test_a_gain_that_the_file_claims_to_know_may_stand_for_a_resistance(monkeypatch):
+    named = replace(fit_of([np.zeros(100)]), numbers=(NUMBERS["pressure_gain"],), cost=10.0)
+    cost = {"rolling_coefficient": 24.0, "drag_area": 26.0}
+
+    def look_up_cost(_stops, fitted, numbers, _start=None):
+        return replace(
+            fitted, numbers=numbers, cost=min((cost.get(n.name, 110.0) for n in numbers), default=110.0)
+        )
+
+    monkeypatch.setattr(elimination, "refit_numbers", look_up_cost)
+    assert find_substitutes([], named, list(NUMBERS.values()), 0.85) == []
+    (found,) = find_substitutes([], named, list(NUMBERS.values()), 0.85, {"pressure_gain"})
+    assert (found.of, found.name) == ("pressure_gain", "rolling_coefficient")

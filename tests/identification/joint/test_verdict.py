@@ -9,7 +9,9 @@ import pytest
 from catalogs.decision_rules import load_decision_rules
 from catalogs.joint_numbers import load_joint_numbers
 from tasks.campaign.campaign import CHANNELS, Campaign, Run
+from tasks.identification.joint import verdict
 from tasks.identification.joint.calibration import needs_joint_fit
+from tasks.identification.joint.elimination import Substitute
 from tasks.identification.joint.held_out import drop_what_predicts_worse
 from tasks.identification.joint.verdict import JointTrace, judge_jointly
 from tasks.identification.rules import DecisionRules
@@ -105,6 +107,27 @@ def test_a_number_of_the_file_is_wrong_only_beyond_as_many_tolerances_as_the_rul
     trace = judge(campaign_of({"pressure_gain": 0.3, "lag": 0.09}), rules=replace(RULES, joint=strict))
     assert {e.name for e in trace.verdict.effects} == {"brake_lag", "retuned_pressure_gain"}
     assert trace.agreeing[0] == 1 < slow_brakes().agreeing[0]
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "kind", "rivals"),
+    [(0.02, "SET", ["rolling_resistance"]), (RULES.joint.unknown_gain_tolerance, "RETUNE", [])],
+)
+def test_a_gain_that_the_file_claims_to_know_is_doubted_where_a_resistance_explains_as_much(
+    monkeypatch, tolerance: float, kind: str, rivals: list[str]
+):
+    def find_resistance(_stops, fitted, everything, _share, doubted):
+        rolling = next(n for n in everything if n.name == "rolling_coefficient")
+        instead = replace(fitted, numbers=(rolling,), values=np.array([0.02]))
+        return [Substitute(of=name, name=rolling.name, fitted=instead) for name in doubted]
+
+    monkeypatch.setattr(verdict, "find_substitutes", find_resistance)
+    monkeypatch.setattr(verdict, "drop_contradicted_rivals", lambda _held_out, _fitted, found, _rules: found)
+    campaign = campaign_of({"pressure_gain": 0.5})
+    known = replace(campaign, tolerances=replace(TOLERANCES, session=(tolerance, *TOLERANCES.session[1:])))
+    told = judge(known).verdict
+    assert (told.verdict, [effect.name for effect in told.effects]) == (kind, ["retuned_pressure_gain"])
+    assert [(of, rival.name) for of, rival in told.rivals] == [("retuned_pressure_gain", n) for n in rivals]
 
 
 @pytest.mark.parametrize("share", ["better_prediction_share", "equal_prediction_share"])
