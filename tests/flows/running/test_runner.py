@@ -1,6 +1,7 @@
 import os
 import subprocess
 import sys
+import threading
 import time
 from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
 from contextlib import ExitStack
@@ -165,6 +166,17 @@ def test_a_scheduler_that_does_not_answer_is_an_input_error(monkeypatch):
         open_executor("dask", 1, "tcp://127.0.0.1:9"),
     ):
         pass
+
+
+def test_a_client_that_fails_half_way_is_closed_at_once():
+    """Closed when Python collects it, it waits for ever for another client that starts at that moment."""
+    running = set(threading.enumerate())
+    with (
+        pytest.raises(InputError, match="unknown address scheme"),
+        open_executor("dask", 1, "foo://127.0.0.1:9"),
+    ):
+        pass
+    assert set(threading.enumerate()) <= running
 
 
 def test_outside_a_flow_a_stage_is_its_function():
