@@ -19,6 +19,8 @@ LONGEST_S = 10.0
 """An input on which a process works longer is a hang [s]: its own time, so that a busy machine makes none."""
 LONGEST_WAIT_S = 120.0
 """And one that takes longer by the clock: then it waits for what never comes [s]."""
+LOOKED_AT_S = 1.0
+"""Time between two looks at the processes that are silent [s]."""
 LARGEST_BYTES = 2**30
 """A process that holds more memory has grown beyond bounds."""
 ROOM_BYTES = 3 * 2**30
@@ -88,7 +90,7 @@ def read_watched(
 
 def _list_ready(staff: "list[_Worker]") -> "list[_Worker]":
     """The workers that have something to tell, or are silent for too long."""
-    speaking = wait([worker.line for worker in staff], timeout=1.0)
+    speaking = wait([worker.line for worker in staff], timeout=LOOKED_AT_S)
     return [worker for worker in staff if worker.line in speaking or worker.is_late]
 
 

@@ -1,7 +1,5 @@
 """Commands that read measured data, calibrate vehicles and find the effects that the model lacks."""
 
-from typing import Any
-
 from flows.commands.command import (
     CAMPAIGN,
     CAMPAIGN_VEHICLE,
@@ -13,115 +11,17 @@ from flows.commands.command import (
     define_option,
     select_keys,
 )
+from flows.commands.measured_results import (
+    shorten_agreement,
+    shorten_brake_protocol,
+    shorten_bump_study,
+    shorten_import,
+    shorten_stop_study,
+    shorten_verdict,
+)
 from flows.commands.studies import MODE
 
 GROUP = "Measured data"
-WIDE_COLUMNS = {
-    "criterion",
-    "fails_only_here",
-    "mean_trajectory",
-    "trained_on",
-    "rate_correlation",
-    "no_dive_rmse",
-}
-BUMP_FIGURES = ("rate_rmse", "rate_rms", "rate_correlation", "vertical_correlation", "peak_pitch")
-
-
-def shorten_import(result: dict[str, Any]) -> dict[str, Any]:
-    """Return the report of an import, or a narrow table of signals for each recording."""
-    if "signals" not in result:
-        return result
-    return {
-        file: [_shorten_signal(row, any(row["note"] for row in rows)) for row in rows]
-        for file, rows in result["signals"].items()
-    }
-
-
-def _shorten_signal(row: dict[str, Any], noted: bool) -> dict[str, Any]:
-    def join(low: float | None, high: float | None) -> str | None:
-        return None if low is None else f"{low:.6g} to {high:.6g}"
-
-    return {
-        **{key: row[key] for key in ("signal", "unit", "samples", "rate_hz")},
-        "time_s": join(row["start_s"], row["end_s"]),
-        "range": join(row["lowest"], row["highest"]),
-        **({"note": row["note"]} if noted else {}),
-    }
-
-
-def shorten_brake_protocol(result: dict[str, Any]) -> dict[str, Any]:
-    """Return a brake protocol without its events and the widest columns of its tables."""
-    brief = {key: value for key, value in result.items() if key != "events"}
-    for table in ("attrition", "folds"):
-        brief[table] = [{k: v for k, v in row.items() if k not in WIDE_COLUMNS} for row in result[table]]
-    return brief
-
-
-def shorten_stop_study(result: dict[str, Any]) -> dict[str, Any]:
-    """Return a stop study with the held-out figures of each step."""
-    return result | {"rungs": [{"rung": row["rung"], **row["held_out"]} for row in result["rungs"]]}
-
-
-def shorten_bump_study(result: dict[str, Any]) -> dict[str, Any]:
-    """Return a bump study with a row for each window and car."""
-    rows = [
-        {
-            "window": row["window"],
-            "car": car,
-            **row[car]["feature"],
-            **{name: row[car][name] for name in BUMP_FIGURES},
-        }
-        for row in result["windows"]
-        for car in ("uncalibrated", "calibrated")
-    ]
-    return result | {"windows": rows}
-
-
-def shorten_agreement(result: dict[str, Any]) -> dict[str, Any]:
-    """Return an agreement with the main columns of each case, and the groups."""
-    hidden = {"window", "note"}
-    cases = [{key: value for key, value in row.items() if key not in hidden} for row in result["cases"]]
-    figures = tuple(result["mean"])
-    groups = [
-        {"split": row["split"], "group": row["group"], "cases": row["count"]}
-        | {name: _write_pair(row[name], row["maximum"][name]) for name in figures}
-        for row in result["groups"]
-    ]
-    printed = [
-        {"cases of": f"{row['split']}, {row['group']}", "figure": row["figure"],
-         "here": _write_pair(row["mean"], row["maximum"]),
-         "paper": _write_pair(row["paper_mean"], row["paper_maximum"]), "note": row["note"]}
-        for row in result["beside_print"]
-    ]  # fmt: skip
-    return {"cases": cases, "mean / maximum of groups": groups, "beside the paper's against CarSim": printed}
-
-
-def _write_pair(mean: float | None, maximum: float | None) -> str | None:
-    """Mean and, where there is one, maximum in one cell, as the paper prints them."""
-    if mean is None:
-        return None
-    return f"{mean:.4g}" if maximum is None else f"{mean:.4g} / {maximum:.4g}"
-
-
-def shorten_verdict(result: dict[str, Any]) -> dict[str, Any]:
-    """Return a verdict with a row for each parameter of a named effect, and for the error of each channel."""
-    effects = [
-        {
-            "name": effect["name"],
-            "class": effect["class"],
-            "parameter": name,
-            **{key: parameter[key] for key in ("value", "ci_low", "ci_high", "unit")},
-        }
-        for effect in result["effects"]
-        for name, parameter in effect["parameters"].items()
-    ]
-    error = [
-        {"channel": channel, **{key: entry[key] for key in ("frozen", "retuned", "after", "unit")}}
-        for channel, entry in result["error"].items()
-    ]
-    kept = {key: result[key] for key in ("verdict", "sentence", "reasons", "vehicle_file", "report")}
-    return kept | {"effects": effects, "error": error}
-
 
 COMMANDS = (
     Command(

@@ -139,7 +139,7 @@ def _dask_client(workers: int, scheduler: str | None, warm: Callable[[], Any] | 
             yield client
         return
     try:
-        client = Client(scheduler, timeout=CONNECT_TIMEOUT)
+        client = _connect(scheduler)
     except TypeError:  # what Dask raises for tls:// without certificates
         raise InputError(
             f"--scheduler {scheduler}: tls needs certificates; name them in Dask's configuration "
@@ -155,6 +155,24 @@ def _dask_client(workers: int, scheduler: str | None, warm: Callable[[], Any] | 
                 warm_cluster(client, warm, scheduler)
             tell_dashboard(client)
             yield client
+
+
+def _connect(address: str) -> Any:
+    """A `distributed.Client` of a scheduler, or what it raises, closed.
+
+    Dask leaves one that cannot connect running until Python collects it. It then closes itself, and takes a lock for
+    that which another client holds while it starts: where that one's start is what made Python collect, both wait for
+    ever (`LoopRunner._lock`).
+    """
+    from distributed import Client
+
+    client = Client.__new__(Client)
+    try:
+        client.__init__(address, timeout=CONNECT_TIMEOUT)
+    except (TypeError, OSError, ValueError):
+        client.close()
+        raise
+    return client
 
 
 def tell_dashboard(client: Any) -> None:

@@ -54,14 +54,14 @@ def test_a_surface_is_as_bright_without_air_at_any_range(hump_clip: Clip) -> Non
 
 @pytest.mark.parametrize("extinction", [0.005, 0.02])
 def test_veil_that_thins_as_things_come_nearer_is_no_motion(
-    full_clip: Clip, extinction: float, monkeypatch: pytest.MonkeyPatch
+    hump_clip: Clip, extinction: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    frames = add_veil(full_clip.frames, full_clip.depth, full_clip.K, extinction, LIGHT)
-    seen = recover_motion(full_clip, frames)
-    assert pitch_rmse_deg(seen, full_clip) < 0.003
-    assert progress_rmse(seen, full_clip) < 0.001
+    frames = add_veil(hump_clip.frames, hump_clip.depth, hump_clip.K, extinction, LIGHT)
+    seen = recover_motion(hump_clip, frames)
+    assert pitch_rmse_deg(seen, hump_clip) < 0.012
+    assert progress_rmse(seen, hump_clip) < 0.002
     monkeypatch.setattr(photometric, "LEAST_EXTINCTION", np.inf)
-    assert pitch_rmse_deg(recover_motion(full_clip, frames), full_clip) > 0.01
+    assert pitch_rmse_deg(recover_motion(hump_clip, frames), hump_clip) > 0.04
 
 
 def test_clear_air_leaves_the_pictures_as_they_are(hump_clip: Clip, monkeypatch: pytest.MonkeyPatch) -> None:

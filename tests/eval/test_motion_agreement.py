@@ -23,18 +23,18 @@ CAMERA_ONLY = replace(THRESHOLDS, pitch_relative_error=0.20, progress_rmse_m=Non
 
 
 @pytest.fixture(scope="module")
-def recovered(full_clip: Clip) -> dict[str, RecoveredMotion]:
+def recovered(hump_clip: Clip) -> dict[str, RecoveredMotion]:
     with_depth = (
-        full_clip.frames,
-        full_clip.depth,
-        full_clip.K,
-        full_clip.T_rig_camera,
-        full_clip.class_id == SemanticClass.SKY,
+        hump_clip.frames,
+        hump_clip.depth,
+        hump_clip.K,
+        hump_clip.T_rig_camera,
+        hump_clip.class_id == SemanticClass.SKY,
     )
     return {
         "pnp": recover_motion_pnp(*with_depth),
         "photometric": recover_motion_photometric(*with_depth),
-        "essential": recover_motion_essential(full_clip.frames, full_clip.K, full_clip.T_rig_camera),
+        "essential": recover_motion_essential(hump_clip.frames, hump_clip.K, hump_clip.T_rig_camera),
     }
 
 
@@ -58,8 +58,8 @@ class TestVerdictOnFrames:
         limits = CAMERA_ONLY if method == "essential" else THRESHOLDS
         return judge_pose(recovered[method], pitch, clip.station, limits)
 
-    def test_the_true_telemetry_passes(self, recovered, method, full_clip) -> None:
-        verdict = self.judge(recovered, method, full_clip, full_clip.pitch)
+    def test_the_true_telemetry_passes(self, recovered, method, hump_clip) -> None:
+        verdict = self.judge(recovered, method, hump_clip, hump_clip.pitch)
         assert verdict.passed, verdict.reasons
         assert verdict.pitch_relative_error < 0.05 and verdict.pitch_correlation > 0.999
         assert verdict.claimed_pitch_rms_deg > 0.4
@@ -67,9 +67,9 @@ class TestVerdictOnFrames:
 
     @pytest.mark.parametrize("control", CONTROLS)
     def test_telemetry_out_of_step_with_the_pictures_fails(
-        self, recovered, method, full_clip, control
+        self, recovered, method, hump_clip, control
     ) -> None:
-        verdict = self.judge(recovered, method, full_clip, CONTROLS[control](full_clip.pitch))
+        verdict = self.judge(recovered, method, hump_clip, CONTROLS[control](hump_clip.pitch))
         assert not verdict.passed and verdict.reasons
 
 
@@ -86,18 +86,18 @@ def motion_with(clip: Clip, pitch: NDArray[np.float64], **others: object) -> Rec
 
 
 @pytest.mark.parametrize("control", CONTROLS)
-def test_pictures_out_of_step_with_true_telemetry_fail(full_clip: Clip, control: str) -> None:
+def test_pictures_out_of_step_with_true_telemetry_fail(hump_clip: Clip, control: str) -> None:
     assert judge_pose(
-        motion_with(full_clip, full_clip.pitch), full_clip.pitch, full_clip.station, THRESHOLDS
+        motion_with(hump_clip, hump_clip.pitch), hump_clip.pitch, hump_clip.station, THRESHOLDS
     ).passed
-    shown = motion_with(full_clip, CONTROLS[control](full_clip.pitch))
-    assert not judge_pose(shown, full_clip.pitch, full_clip.station, THRESHOLDS).passed
+    shown = motion_with(hump_clip, CONTROLS[control](hump_clip.pitch))
+    assert not judge_pose(shown, hump_clip.pitch, hump_clip.station, THRESHOLDS).passed
 
 
-def test_the_controls_score_as_their_algebra_says(full_clip: Clip) -> None:
+def test_the_controls_score_as_their_algebra_says(hump_clip: Clip) -> None:
     def relative(name: str) -> float:
-        shown = motion_with(full_clip, CONTROLS[name](full_clip.pitch))
-        return judge_pose(shown, full_clip.pitch, full_clip.station, THRESHOLDS).pitch_relative_error
+        shown = motion_with(hump_clip, CONTROLS[name](hump_clip.pitch))
+        return judge_pose(shown, hump_clip.pitch, hump_clip.station, THRESHOLDS).pitch_relative_error
 
     assert relative("no response") == pytest.approx(1.0)
     assert relative("amplitude x 0.8") == pytest.approx(0.2)
@@ -105,58 +105,58 @@ def test_the_controls_score_as_their_algebra_says(full_clip: Clip) -> None:
     assert relative("one frame late") > 0.2
 
 
-def test_a_wrong_speed_fails_by_progress_alone(full_clip: Clip) -> None:
+def test_a_wrong_speed_fails_by_progress_alone(hump_clip: Clip) -> None:
     verdict = judge_pose(
-        motion_with(full_clip, full_clip.pitch), full_clip.pitch, 1.05 * full_clip.station, THRESHOLDS
+        motion_with(hump_clip, hump_clip.pitch), hump_clip.pitch, 1.05 * hump_clip.station, THRESHOLDS
     )
     assert [reason.split(" is ")[0] for reason in verdict.reasons] == ["progress RMSE"]
 
 
-def test_pitch_counts_from_frame_0_so_a_constant_offset_does_not_matter(full_clip: Clip) -> None:
+def test_pitch_counts_from_frame_0_so_a_constant_offset_does_not_matter(hump_clip: Clip) -> None:
     verdict = judge_pose(
-        motion_with(full_clip, full_clip.pitch), full_clip.pitch + 0.1, full_clip.station + 50, THRESHOLDS
+        motion_with(hump_clip, hump_clip.pitch), hump_clip.pitch + 0.1, hump_clip.station + 50, THRESHOLDS
     )
     assert verdict.passed and verdict.pitch_rmse_deg < 1e-9 and verdict.progress_rmse_m < 1e-9
 
 
-def test_without_response_the_relative_figures_are_not_judged(full_clip: Clip) -> None:
-    noise = np.deg2rad(0.01) * np.random.default_rng(0).standard_normal(len(full_clip.pitch))
-    quiet = motion_with(full_clip, noise)
-    verdict = judge_pose(quiet, 0 * full_clip.pitch, full_clip.station, THRESHOLDS)
+def test_without_response_the_relative_figures_are_not_judged(hump_clip: Clip) -> None:
+    noise = np.deg2rad(0.01) * np.random.default_rng(0).standard_normal(len(hump_clip.pitch))
+    quiet = motion_with(hump_clip, noise)
+    verdict = judge_pose(quiet, 0 * hump_clip.pitch, hump_clip.station, THRESHOLDS)
     assert verdict.passed and np.isnan(verdict.pitch_relative_error) and np.isnan(verdict.pitch_correlation)
 
 
-def test_a_car_that_stands_has_no_normalised_progress(full_clip: Clip) -> None:
-    n = len(full_clip.pitch)
+def test_a_car_that_stands_has_no_normalised_progress(hump_clip: Clip) -> None:
+    n = len(hump_clip.pitch)
     still = motion_with(
-        full_clip, 0 * full_clip.pitch, progress=np.zeros(n), normalised_path=np.full((n, 3), np.nan)
+        hump_clip, 0 * hump_clip.pitch, progress=np.zeros(n), normalised_path=np.full((n, 3), np.nan)
     )
     verdict = judge_pose(still, np.zeros(n), np.full(n, 7.0), THRESHOLDS)
     assert verdict.passed and np.isnan(verdict.normalised_progress_rmse)
     # but a car that should have moved and was seen standing fails, though its figure is NaN
-    moved = judge_pose(still, np.zeros(n), full_clip.station, replace(THRESHOLDS, progress_rmse_m=None))
+    moved = judge_pose(still, np.zeros(n), hump_clip.station, replace(THRESHOLDS, progress_rmse_m=None))
     assert not moved.passed
 
 
-def test_a_frame_without_a_pose_fails_the_clip_unless_a_share_of_them_is_allowed(full_clip: Clip) -> None:
-    n = len(full_clip.pitch)
+def test_a_frame_without_a_pose_fails_the_clip_unless_a_share_of_them_is_allowed(hump_clip: Clip) -> None:
+    n = len(hump_clip.pitch)
     failed = np.arange(n) == 5
     gap = motion_with(
-        full_clip,
-        np.where(failed, np.nan, full_clip.pitch),
+        hump_clip,
+        np.where(failed, np.nan, hump_clip.pitch),
         failed=failed,
         failures=("exact: frame 5 has no pose: dark.",),
     )
-    verdict = judge_pose(gap, full_clip.pitch, full_clip.station, THRESHOLDS)
+    verdict = judge_pose(gap, hump_clip.pitch, hump_clip.station, THRESHOLDS)
     assert not verdict.passed and verdict.failed_frames == 1 and "frame 5" in verdict.reasons[0]
     assert np.isfinite(verdict.pitch_rmse_deg)
     lenient = replace(THRESHOLDS, failed_share=0.1)
-    assert judge_pose(gap, full_clip.pitch, full_clip.station, lenient).passed
+    assert judge_pose(gap, hump_clip.pitch, hump_clip.station, lenient).passed
 
 
-def test_telemetry_that_does_not_fit_the_frames_is_refused(full_clip: Clip) -> None:
-    holed = full_clip.station.copy()
+def test_telemetry_that_does_not_fit_the_frames_is_refused(hump_clip: Clip) -> None:
+    holed = hump_clip.station.copy()
     holed[3] = np.nan
     with pytest.raises(InputError) as caught:
-        judge_pose(motion_with(full_clip, full_clip.pitch), full_clip.pitch[:-1], holed, THRESHOLDS)
+        judge_pose(motion_with(hump_clip, hump_clip.pitch), hump_clip.pitch[:-1], holed, THRESHOLDS)
     assert len(caught.value.problems) == 2

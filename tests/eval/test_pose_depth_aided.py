@@ -73,9 +73,9 @@ def test_progress_follows_a_bend_without_being_told_the_route(
 
 def test_the_route_s_own_slope_is_not_body_pitch(hump_clip: Clip, check: Check, method: str) -> None:
     # a road that pitches exactly as this body does leaves the body level
-    seen = recover_motion(check, hump_clip, route_rotations=hump_clip.T_world_rig[:, :3, :3])
+    seen = recover_motion(check, hump_clip, upto=14, route_rotations=hump_clip.T_world_rig[:14, :3, :3])
     assert np.rad2deg(np.abs(seen.pitch)).max() < 2 * SMALL_DEG[method]
-    assert np.rad2deg(np.abs(hump_clip.pitch)).max() > 0.5
+    assert np.rad2deg(np.abs(hump_clip.pitch[:14])).max() > 0.5
 
 
 @pytest.mark.parametrize("weather", ["flakes", "jpeg", "noise", "fog"])
@@ -146,14 +146,12 @@ def test_pictures_of_nothing_common_are_not_given_a_pose(hump_clip: Clip, check:
 
 
 def test_the_error_is_within_a_few_of_its_own_uncertainties(hump_clip: Clip, check: Check) -> None:
-    clear, noisy = (
-        recover_motion(check, hump_clip),
-        recover_motion(check, hump_clip, frames=add_noise(hump_clip.frames, 8.0)),
-    )
+    clear = recover_motion(check, hump_clip)
+    noisy = recover_motion(check, hump_clip, upto=8, frames=add_noise(hump_clip.frames[:8], 8.0))
     assert (np.abs(clear.pitch - hump_clip.pitch)[1:] < 5 * clear.pitch_std[1:]).all()
     assert (np.abs(clear.progress - hump_clip.station)[1:] < 5 * clear.progress_std[1:]).all()
     assert np.rad2deg(clear.pitch_std[-1]) < 0.03
-    assert noisy.pitch_std[-1] > clear.pitch_std[-1]
+    assert noisy.pitch_std[-1] > clear.pitch_std[7]
 
 
 def test_same_frames_give_the_same_bytes(hump_clip: Clip, check: Check) -> None:

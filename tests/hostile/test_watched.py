@@ -38,7 +38,7 @@ def crash(folder: Path) -> None:
 
 def grow(folder: Path) -> None:
     watched.LARGEST_BYTES = watched.read_peak() + 2**26  # in the process of its own that reads
-    kept.append(ctypes.create_string_buffer(b"x" * 2**28))
+    kept.append(ctypes.create_string_buffer(b"x" * 2**27))
 
 
 def divide(folder: Path) -> None:
@@ -54,8 +54,8 @@ def flood(folder: Path) -> None:
     [
         (refuse, "refused", "it is refused"),
         (lambda folder: None, "silent", "accepted although"),
-        (work_for_ever, "hang", "over 0.5 s"),
-        (wait_for_ever, "hang", "over 0.5 s"),
+        (work_for_ever, "hang", "over 0.2 s"),
+        (wait_for_ever, "hang", "over 0.2 s"),
         (crash, "traceback", "the process ended with -9"),
         (grow, "memory", "MiB"),
         (divide, "traceback", "ZeroDivisionError"),
@@ -73,8 +73,9 @@ def test_what_becomes_of_an_input_is_counted(tmp_path, monkeypatch, read, outcom
     parser = Parser(name="p", write=write_texts({"a.yaml": "a: 1"}), read=read_changed, rules=(FINITE,))
     monkeypatch.setattr(desk, "BY_NAME", {"p": parser})
     monkeypatch.setattr(watched, "START", "fork")
-    monkeypatch.setattr(watched, "LONGEST_S", 0.5)
+    monkeypatch.setattr(watched, "LONGEST_S", 0.2)
     monkeypatch.setattr(watched, "LONGEST_WAIT_S", 2.0)
+    monkeypatch.setattr(watched, "LOOKED_AT_S", 0.1)
     monkeypatch.setattr(watched, "LARGEST_BYTES", 2**50)  # a fork of a large process is no finding
     monkeypatch.setattr("benchmarks.fuzzing.inputs.KNOWINGLY", 1.0)
     (tmp_path / "p" / "0").mkdir(parents=True)

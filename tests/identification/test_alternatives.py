@@ -1,6 +1,7 @@
 """Explanations that no search of one effect at a time meets: a wrong number beside it, two effects together."""
 
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,8 @@ NAMES = ("aerodynamic_drag", "pad_drag", "rolling_resistance_speed", "retuned_pr
 LIBRARY = {e.name: e for e in load_effects() if e.name in NAMES}
 
 
-def evidence_of(truth: dict[str, float]) -> tuple[Evidence, Fit]:
+@cache
+def evidence_of(**truth: float) -> tuple[Evidence, Fit]:
     theta = build_parameter_vector(truth)
     runs = [(32.0, 0.0, 1), (22.0, 0.0, -1), (28.0, 1.5, -1), (14.0, 0.0, 1), (15.0, 1.0, -1)]
     derived = tuple(
@@ -66,7 +68,7 @@ def name_effect(evidence: Evidence, null: Fit, name: str) -> tuple[SearchState, 
 
 
 def test_two_effects_that_together_explain_as_much_stand_beside_the_one_that_is_named() -> None:
-    evidence, null = evidence_of({"drag_area": 0.8, "pad_drag": 60.0})
+    evidence, null = evidence_of(drag_area=0.8, pad_drag=60.0)
     pairs = find_pairs(*name_effect(evidence, null, "rolling_resistance_speed"))
     values = {other.candidate.hypothesis.name: other.candidate.fitted.values[-1] for other in pairs}
     assert values == {
@@ -77,7 +79,7 @@ def test_two_effects_that_together_explain_as_much_stand_beside_the_one_that_is_
 
 
 def test_two_effects_do_not_stand_beside_the_truth() -> None:
-    evidence, null = evidence_of({"rolling_speed": 0.0009})
+    evidence, null = evidence_of(rolling_speed=0.0009)
     assert find_pairs(*name_effect(evidence, null, "rolling_resistance_speed")) == []
 
 
@@ -85,7 +87,7 @@ def test_two_effects_do_not_stand_beside_the_truth() -> None:
     ("unseen", "close"), [((3, 3), True), ((0, 1), False), ((0, 3), True)], ids=["slow", "fast", "one fast"]
 )
 def test_unseen_runs_may_tell_a_rival_from_the_named_effect(unseen: tuple[int, ...], close: bool) -> None:
-    evidence, _ = evidence_of({"rolling_speed": 0.0005})
+    evidence, _ = evidence_of(rolling_speed=0.0005)
     # one slow coast-down trains: there, speed says nothing
     evidence = replace(evidence, train=evidence.train[3:4], held_out=tuple(evidence.train[i] for i in unseen))
     null = fit_hypotheses(evidence.train, (), evidence.session_sigma)
@@ -99,13 +101,13 @@ def test_unseen_runs_may_tell_a_rival_from_the_named_effect(unseen: tuple[int, .
 
 
 def test_a_number_that_stays_pulled_beyond_belief_stands_beside_what_is_named() -> None:
-    evidence, null = evidence_of({"pressure_gain": 0.15})
+    evidence, null = evidence_of(pressure_gain=0.15)
     found, _ = name_effect(evidence, null, "brake_fade")
     (other,) = [
         a for a in find_pulled_numbers(found) if a.candidate.hypothesis.name == "retuned_pressure_gain"
     ]
     assert other.candidate.fitted.values[-1] == pytest.approx(0.15, abs=0.03)
-    plain, null = evidence_of({})
+    plain, null = evidence_of()
     assert find_pulled_numbers(name_effect(plain, null, "brake_fade")[0]) == []
 
 
@@ -135,7 +137,7 @@ class TestHeldOutChannels:
 
 
 def test_what_was_named_first_goes_where_a_later_name_explains_it() -> None:
-    evidence, null = evidence_of({"drag_area": 0.8})
+    evidence, null = evidence_of(drag_area=0.8)
     rolling = name_effect(evidence, null, "rolling_resistance_speed")[0]
     later = judge_hypothesis(
         evidence, rolling.base, None, make_library_hypothesis(LIBRARY["aerodynamic_drag"])
@@ -170,7 +172,7 @@ def test_a_force_in_proportion_to_the_suspensions_speed_is_damping_and_no_form(
 def test_a_fit_also_starts_from_a_session_at_rest_where_it_bends_to_make_up_for_what_is_missing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    evidence, null = evidence_of({})
+    evidence, null = evidence_of()
     begun: list[float] = []
 
     def follow(*arguments: Any, session: np.ndarray, **options: Any) -> Fit:
@@ -192,7 +194,7 @@ def test_a_fit_also_starts_from_a_session_at_rest_where_it_bends_to_make_up_for_
 def test_what_pulls_the_session_beyond_belief_gives_way_to_what_does_not_and_explains_enough(
     gain: float, chosen: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    evidence, null = evidence_of({})
+    evidence, null = evidence_of()
 
     def passing(name: str, score: float, gain: float, pull: float) -> Candidate:
         judged = judge_hypothesis(evidence, null, None, make_library_hypothesis(LIBRARY[name]))

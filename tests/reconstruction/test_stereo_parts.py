@@ -12,15 +12,10 @@ from tasks.reconstruction.exposure import estimate_exposure
 from tasks.reconstruction.fusion import find_finest_view, fuse_depth
 from tasks.reconstruction.normals import estimate_normals, turn_to_camera
 from tasks.reconstruction.road_plane import fit_road_plane, lay_route_below, settle_route
-from tasks.reconstruction.sky import Sky, build_panorama, fit_sky, mask_sky
 from tasks.reconstruction.surfels import COVERAGE, derive_discs, sample_picture
 from tasks.render.composition import to_display
 from tasks.scene.route import Route
-
-F, CX, CY, BASELINE = 200.0, 80.0, 50.0, 0.5
-K = np.array([[F, 0, CX], [0, F, CY], [0, 0, 1]])
-SCALE = F * BASELINE
-SHAPE = (110, 160)
+from tests.reconstruction.small_camera import CX, CY, SCALE, SHAPE, F, K, draw_smooth_noise
 
 
 def plane_depth(normal: tuple[float, float, float], distance: float) -> np.ndarray:
@@ -31,15 +26,6 @@ def plane_depth(normal: tuple[float, float, float], distance: float) -> np.ndarr
     return np.where((depth > 0) & (depth < 200), depth, np.nan).astype(np.float32)
 
 
-def smooth_noise(shape: tuple[int, int], seed: int) -> np.ndarray:
-    """Periodic picture with detail at a few pixels."""
-    draw = np.random.Generator(np.random.Philox(seed))
-    spectrum = np.fft.rfft2(draw.normal(size=shape))
-    radius = np.hypot(np.fft.fftfreq(shape[0])[:, None], np.fft.rfftfreq(shape[1])[None])
-    picture = np.fft.irfft2(spectrum * np.exp(-((radius / 0.15) ** 2)), shape)
-    return 128 + 45 * picture / picture.std()
-
-
 def shift_picture(picture: np.ndarray, by: float) -> np.ndarray:
     """The periodic picture moved to the left by a part of a pixel, by its spectrum."""
     phase = np.exp(2j * np.pi * np.fft.rfftfreq(picture.shape[1]) * by)
@@ -48,7 +34,7 @@ def shift_picture(picture: np.ndarray, by: float) -> np.ndarray:
 
 @pytest.mark.parametrize("disparity", [12.0, 12.4, 7.75])
 def test_disparity_is_found_to_a_fraction_of_a_pixel(disparity: float) -> None:
-    left = smooth_noise((80, 200), 1)
+    left = draw_smooth_noise((80, 200), 1)
     to_bytes = [np.clip(np.rint(p), 0, 255).astype(np.uint8) for p in (left, shift_picture(left, disparity))]
     found = match_stereo(*to_bytes, 32)
     inner = found[10:-10, 40:-10]
@@ -57,7 +43,7 @@ def test_disparity_is_found_to_a_fraction_of_a_pixel(disparity: float) -> None:
 
 
 def test_what_the_right_camera_does_not_see_has_no_disparity() -> None:
-    left = smooth_noise((80, 200), 2).clip(0, 255).astype(np.uint8)
+    left = draw_smooth_noise((80, 200), 2).clip(0, 255).astype(np.uint8)
     found = match_stereo(left, shift_picture(left.astype(float), 15.0).clip(0, 255).astype(np.uint8), 32)
     assert np.isnan(found[:, :10]).mean() > 0.9
 
@@ -168,7 +154,7 @@ def test_the_picture_of_a_disc_is_round_whatever_its_slant() -> None:
 
 def test_even_blocks_become_one_sample_and_others_keep_the_grid() -> None:
     picture = np.full((*SHAPE, 3), 100, np.uint8)
-    picture[:, :80] = smooth_noise((SHAPE[0], 80), 8).clip(0, 255).astype(np.uint8)[..., None]
+    picture[:, :80] = draw_smooth_noise((SHAPE[0], 80), 8).clip(0, 255).astype(np.uint8)[..., None]
     depth = np.full(SHAPE, 10.0, np.float32)
     wanted = np.ones(SHAPE, bool)
     wanted[:20] = False
@@ -253,7 +239,7 @@ def test_a_surface_is_taken_from_the_picture_that_shows_it_largest() -> None:
 
 
 def test_gains_and_lens_shading_are_found_together() -> None:
-    scene = smooth_noise((600, 600), 9) / 255 * 0.4 + 0.2
+    scene = draw_smooth_noise((600, 600), 9) / 255 * 0.4 + 0.2
     rays = pixel_rays(SHAPE, K)[..., :2]
     falloff = np.exp(-0.4 * (rays**2).sum(axis=-1))
     gains, depths = np.array([1.0, 1.2, 0.8, 1.1]), np.array([14.0, 12.5, 11.0, 9.5])
@@ -270,57 +256,3 @@ def test_gains_and_lens_shading_are_found_together() -> None:
     assert exposure.falloff[5, 5] == pytest.approx(falloff[5, 5], abs=0.03)
     light = exposure.to_radiance(np.repeat(pictures[1][..., None], 3, axis=2), 1)
     np.testing.assert_allclose(exposure.to_picture(light, 1)[..., 0], pictures[1] / 255, atol=2e-3)
-
-
-CAMERA_TO_WORLD = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1.5], [0, 0, 0, 1]])
-
-
-def drive_below_a_sky() -> tuple[list[np.ndarray], np.ndarray]:
-    """Pictures with a sky above row 40 that stands still, and speckles below that change."""
-    pictures = []
-    elevation = np.arctan((CY - np.arange(SHAPE[0])) / F)
-    for n in range(6):
-        picture = np.repeat((0.4 - 0.3 * elevation)[:, None], SHAPE[1], axis=1)
-        picture[40:] = smooth_noise((SHAPE[0] - 40, SHAPE[1]), 20 + n) / 255
-        pictures.append(np.repeat(picture[..., None], 3, axis=2).astype(np.float32))
-    return pictures, np.tile(CAMERA_TO_WORLD, (6, 1, 1))
-
-
-def test_what_stands_still_is_sky_and_what_moves_is_not() -> None:
-    pictures, poses = drive_below_a_sky()
-    sky = fit_sky(pictures, K, poses)
-    assert sky is not None
-    mask = mask_sky(pictures[2], sky, K, poses[2])
-    assert mask[:38].mean() > 0.99
-    assert not mask[52:].any()
-
-
-def test_the_fitted_sky_has_the_light_of_each_direction() -> None:
-    pictures, poses = drive_below_a_sky()
-    sky = fit_sky(pictures, K, poses)
-    assert sky is not None
-    elevation = np.linspace(*sky.elevation, 7)
-    found = sky.radiance_along(np.zeros(7), elevation)
-    np.testing.assert_allclose(found, np.repeat((0.4 - 0.3 * elevation)[:, None], 3, axis=1), atol=0.005)
-
-
-def test_a_drive_without_steady_sky_has_none() -> None:
-    pictures, poses = drive_below_a_sky()
-    for n, picture in enumerate(pictures):
-        picture *= 1 + 0.3 * n
-    assert fit_sky(pictures, K, poses) is None
-    assert not mask_sky(pictures[0], None, K, poses[0]).any()
-
-
-def test_panorama_puts_zenith_first_and_left_to_the_left() -> None:
-    sky = Sky(
-        coefficients=np.outer([0.5, 0.1, -0.2, 0, 0, 0], np.ones(3)), azimuth=(-0.5, 0.5), elevation=(0, 0.4)
-    )
-    pictures, poses = drive_below_a_sky()
-    masks = [np.zeros(SHAPE, bool) for _ in pictures]
-    out = build_panorama(sky, pictures, masks, K, poses, 64)
-    assert out.shape == (64, 128, 3)
-    assert out[28, 64 - 8, 0] > out[28, 64 + 8, 0]  # brighter towards +y, which is left of the centre column
-    assert out[31, 64, 0] == pytest.approx(0.5, abs=0.02)
-    np.testing.assert_allclose(out[0], 0.5 - 0.2 * 0.4 + 0.1 * 0, atol=0.06)
-    assert (out[40:] == out[40, 0]).all()

@@ -4,9 +4,7 @@ import ctypes
 import re
 import shlex
 import shutil
-import subprocess
 import zipfile
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +12,6 @@ import pytest
 from catalogs.entries import entry_names
 from catalogs.vehicles import load_vehicle
 from flows.exporting.fmu import write_fmu
-from flows.exporting.fmu_binary import FRAME, find_compiler, find_own_platform, format_header
 from manifests.provenance import SOURCE_ROOT
 from tasks.errors import InputError
 from tasks.surface.road_profile import FLAT_ROAD, RoadHazard, road_elevation, road_slope
@@ -27,10 +24,10 @@ from tasks.vehicle.model.embedded_variables import INPUTS, OUTPUTS
 from tasks.vehicle.model.simulation import COLUMNS, Recording, simulate
 from tasks.vehicle.parameters import compute_surface_response
 from tasks.vehicle.rollout import Controls, simulate_scenario
+from tests.flows.exporting.fmu_car import Car
 from tests.flows.shell import run_command
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy, which loads FMUs, is not installed: pip install fmpy")
-from fmpy.fmi2 import FMU2Slave  # noqa: E402
 from fmpy.validation import validate_fmu  # noqa: E402
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
@@ -44,49 +41,6 @@ effects:
 PAGE = (SOURCE_ROOT / "docs" / "how-to" / "drive-the-car-in-another-simulator.md").read_text()
 SNOW = {"weather": 3, "road_friction": 0.3, "snow_depth": 12.0}
 HUMP = RoadHazard(center_m=5.0, length_m=3.6, height_m=0.08)
-
-
-class Car:
-    """An FMU that is driven step by step."""
-
-    def __init__(self, path: Path, folder: Path, **given: float) -> None:
-        self.description = fmpy.read_model_description(str(path))
-        self.places = {v.name: (v.valueReference, v.type) for v in self.description.modelVariables}
-        self.said: list[str] = []
-        fmpy.extract(str(path), str(folder))
-        self.slave = FMU2Slave(
-            guid=self.description.guid, unzipDirectory=str(folder), instanceName="car",
-            modelIdentifier=self.description.coSimulation.modelIdentifier,
-        )  # fmt: skip
-        callbacks = fmpy.fmi2.fmi2CallbackFunctions()
-        callbacks.logger = fmpy.fmi2.fmi2CallbackLoggerTYPE(
-            lambda *words: self.said.append(words[4].decode())
-        )
-        self.slave.instantiate(callbacks=callbacks)
-        self.callbacks, self.time = callbacks, 0.0
-        self.start(**given)
-
-    def start(self, **given: float) -> None:
-        self.time = 0.0
-        self.slave.setupExperiment(startTime=0.0)
-        self.slave.enterInitializationMode()
-        self.set(**given)
-        self.slave.exitInitializationMode()
-
-    def set(self, **given: float) -> None:
-        for name, value in given.items():
-            place, kind = self.places[name]
-            setter = {"Real": self.slave.setReal, "Boolean": self.slave.setBoolean}.get(
-                kind, self.slave.setInteger
-            )
-            setter([place], [value])
-
-    def step(self, length: float) -> None:
-        self.slave.doStep(self.time, length)
-        self.time = round(self.time + length, 9)
-
-    def row(self) -> np.ndarray:
-        return np.array(self.slave.getReal([self.places[name][0] for name in COLUMNS]))
 
 
 @pytest.fixture(scope="module")
@@ -271,25 +225,6 @@ def test_a_library_shows_the_standards_functions_alone_so_that_two_cars_can_shar
     assert library.fmi2DoStep
     for inner in ("musync_advance", "NRT_Allocate"):
         assert not hasattr(library, inner), inner
-
-
-def test_the_frame_has_the_functions_of_the_standards_own_headers(vehicle, tmp_path):
-    (tmp_path / "model.h").write_text(format_header(vehicle, [0.0] * len(INPUTS), "guid"))
-    headers = Path(fmpy.__file__).parent / "c-code"
-    words = [
-        "-std=c11",
-        "-Wall",
-        "-Wextra",
-        "-Werror",
-        "-fsyntax-only",
-        "-DMUSYNC_HEADERS",
-        f"-I{headers}",
-        f"-I{tmp_path}",
-    ]
-    done = subprocess.run(
-        [*find_compiler(find_own_platform()), *words, str(FRAME)], capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stderr
 
 
 def test_the_example_of_the_page_stops_on_snow(fmu, monkeypatch, capsys):

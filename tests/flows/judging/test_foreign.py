@@ -1,6 +1,8 @@
 """Any video against a claim: other sizes, rates and codecs; damaged files in one clear line."""
 
 import tracemalloc
+from collections.abc import Iterator
+from hashlib import sha256
 from pathlib import Path
 
 import cv2
@@ -12,15 +14,12 @@ import pytest
 from benchmarks.synthetic_street import Clip, drive_clip
 from catalogs.gates import load_foreign_gates
 from flows.judging import foreign_sources
-from flows.judging.claims import read_claim
 from flows.judging.foreign import judge_video, measure_retention
 from flows.judging.foreign_sources import (
     LEVEL,
     MOST_PIXELS,
     ForeignCamera,
-    read_camera,
     read_video,
-    scale_intrinsics,
 )
 from tasks.errors import InputError
 from tasks.eval.foreign_video import VideoClaim, judge_motion, sample_claim
@@ -32,6 +31,23 @@ from tests.flows.judging.test_trajectories import tum_lines
 @pytest.fixture(scope="module")
 def street() -> Clip:
     return drive_clip(frames=24, frame_rate=16.0, hump_at=0.2)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def each_video_followed_once() -> Iterator[None]:
+    """The motion in equal frames is the same, whatever is claimed of it."""
+    seen: dict[tuple[bytes, ...], RecoveredMotion] = {}
+    recover = foreign_sources.recover_motion_essential
+
+    def recover_once(frames: np.ndarray, *geometry: np.ndarray) -> RecoveredMotion:
+        key = (sha256(frames).digest(), *(array.tobytes() for array in geometry))
+        if key not in seen:
+            seen[key] = recover(frames, *geometry)
+        return seen[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(foreign_sources, "recover_motion_essential", recover_once)
+        yield
 
 
 def encode(path: Path, frames: np.ndarray, rate: float, codec: str) -> Path:
@@ -87,13 +103,13 @@ def test_half_the_frames_at_half_the_rate_are_judged_by_their_own_times(street: 
 
 
 def test_large_frames_are_judged_reduced_and_held_once(street: Clip, tmp_path: Path) -> None:
-    large = np.stack([cv2.resize(f, (1440, 960), interpolation=cv2.INTER_CUBIC) for f in street.frames])
+    large = np.stack([cv2.resize(f, (1440, 960), interpolation=cv2.INTER_CUBIC) for f in street.frames[:14]])
     video = encode(tmp_path / "v.mp4", large, 16.0, "mp4v")
     tracemalloc.start()
     frames, times, size = read_video(video)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert size == (1440, 960) and frames.shape == (24, 587, 881, 3) and len(times) == 24
+    assert size == (1440, 960) and frames.shape == (14, 587, 881, 3) and len(times) == 14
     assert MOST_PIXELS > 881 * 587 and peak < 1.1 * frames.nbytes + 8 * large[0].nbytes
     reduced = cv2.resize(large[0], (881, 587), interpolation=cv2.INTER_AREA)
     assert np.abs(frames[0].astype(int) - reduced).mean() < 3.0
@@ -164,16 +180,6 @@ def test_all_wrong_inputs_are_told_at_once(tmp_path: Path) -> None:
     assert "no such file" in told and "lacks the column pitch" in told and "fx must be a number" in told
 
 
-def test_intrinsics_follow_the_size_and_refuse_another_shape(tmp_path: Path) -> None:
-    K = np.array([[400.0, 0, 239.5], [0, 400, 159.5], [0, 0, 1]])
-    camera = ForeignCamera(K=K, width=480, height=320, mount=np.eye(4), distortion=None)
-    half = scale_intrinsics(camera, 240, 160)
-    np.testing.assert_allclose(half, [[200, 0, 119.5], [0, 200, 79.5], [0, 0, 1]])
-    with pytest.raises(InputError, match="not the same shape"):
-        scale_intrinsics(camera, 320, 320)
-    assert pytest.approx(K) == read_camera(Path("catalogs/cameras/dashcam-480x320.yaml")).K
-
-
 def test_a_short_wrong_swing_is_not_hidden_by_a_long_quiet_clip() -> None:
     times = np.arange(81) * 0.1
     swing = 0.015 * np.exp(-((times - 3.0) ** 2) / 0.05)
@@ -235,23 +241,6 @@ def test_retention_sees_what_an_editor_kept_and_what_it_lost(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize(
-    ("unit", "step", "told"), [(1.0, 0.1, False), (1.0, 0.4, False), (1e3, 0.1, True), (1e3, 1e-3, True)]
-)
-def test_a_claim_with_its_time_in_ms_is_not_judged_by_its_first_rows(
-    unit: float, step: float, told: bool
-) -> None:
-    """The first 8 of its seconds would be 8 ms of driving, in which nothing happens: any video would pass."""
-    time = np.arange(0.0, 8.0, step) * unit
-    claim = VideoClaim(time=time, pitch=np.zeros(len(time)), station=time)
-    frames = np.arange(80) * 0.1
-    if told:
-        with pytest.raises(InputError, match=r"The claim has .* rows in the 7\.9 s of the video's 80 frames"):
-            sample_claim(claim, frames)
-    else:
-        assert len(sample_claim(claim, frames).rows) >= 76
-
-
-@pytest.mark.parametrize(
     "text",
     ["ffconcat version 1.0\nfile {}\n", "#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\n{}\n#EXT-X-ENDLIST\n"],
 )
@@ -261,40 +250,3 @@ def test_a_playlist_opens_no_other_file(tmp_path: Path, street: Clip, text: str)
         (tmp_path / name).write_text(text.format("other.avi"))
         with pytest.raises(InputError, match="no frame can be read"):
             read_video(tmp_path / name)
-
-
-@pytest.mark.parametrize(
-    ("content", "words"),
-    [
-        ("{width: .inf, height: 2, focal_length: 3}", "finite"),
-        ("{width: 1.0e+300, height: 2, focal_length: 3}", "width must be a number of 1 to 1e.06"),
-        ("{width: 0.5, height: 2, focal_length: 3}", "width must be a number of 1"),
-        ("{width: true, height: 2, focal_length: 3}", "width must be a number of 1"),
-        (
-            "{width: 4, height: 2, focal_length: 3, height_above_road: high}",
-            "height_above_road must be a number",
-        ),
-        ("{width: 4, width: 5, height: 2, focal_length: 3}", "distinct keys"),
-    ],
-)
-def test_a_camera_holds_what_a_camera_can_have(tmp_path: Path, content: str, words: str) -> None:
-    (tmp_path / "K.yaml").write_text(content)
-    with pytest.raises(InputError, match=words):
-        read_camera(tmp_path / "K.yaml")
-
-
-@pytest.mark.parametrize(
-    ("columns", "words"),
-    [
-        ({"pitch": ["x", "y"]}, "pitch must be of numbers"),
-        ({"pitch": [0.0, 1e9]}, r"pitch must be within 3\.142 rad"),
-        ({"station": [0.0, float("inf")]}, "finite number of at most"),
-        ({"time": [0.0, float("nan")]}, "time must rise"),
-        ({"clip_id": ["a", "b"]}, "holds 2 clips"),
-    ],
-)
-def test_a_claim_holds_what_a_drive_can_have(tmp_path: Path, columns: dict, words: str) -> None:
-    sound = {"time": [0.0, 1.0], "pitch": [0.0, 0.1], "station": [0.0, 2.0]}
-    pq.write_table(pa.table(sound | columns), tmp_path / "claim.parquet")
-    with pytest.raises(InputError, match=words):
-        read_claim(tmp_path / "claim.parquet")

@@ -1,6 +1,7 @@
 import os
 import subprocess
 import sys
+import threading
 import time
 from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
 from contextlib import ExitStack
@@ -22,16 +23,7 @@ from flows.running.runner import (
 )
 from manifests.provenance import SOURCE_ROOT
 from tasks.errors import InputError
-
-
-def square_or_fail(number: int) -> int:
-    if number == 3:
-        raise ValueError("three")
-    return number * number
-
-
-def process_id(_: int) -> int:
-    return os.getpid()
+from tests.flows.running.calls import end_worker, list_variables, square_or_fail, tell_process_id
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +62,7 @@ def test_only_so_many_calls_are_submitted_at_once(monkeypatch):
             yield (number,)
 
     with ThreadPoolExecutor(2) as executor:
-        for ended, _ in enumerate(run_unordered(executor, process_id, calls()), start=1):
+        for ended, _ in enumerate(run_unordered(executor, tell_process_id, calls()), start=1):
             assert len(asked) <= ended + 4
     assert asked == list(range(40))
 
@@ -79,14 +71,10 @@ def test_a_run_that_stops_asks_for_no_further_calls(monkeypatch):
     monkeypatch.setattr("flows.running.runner.IN_FLIGHT", 4)
     calls = iter([(number,) for number in range(40)])
     with ThreadPoolExecutor(2) as executor:
-        running = run_unordered(executor, process_id, calls)
+        running = run_unordered(executor, tell_process_id, calls)
         next(running)
         running.close()
     assert len(list(calls)) >= 35
-
-
-def end_worker(_: int) -> None:
-    os._exit(1)
 
 
 def test_calls_that_are_left_when_the_workers_die_fail_one_by_one(monkeypatch):
@@ -105,7 +93,7 @@ def test_without_frames_the_run_is_on_threads_unless_a_runner_is_named():
 
 
 def test_processes_are_other_processes(executors):
-    assert executors["processes"].submit(process_id, 0).result() != os.getpid()
+    assert executors["processes"].submit(tell_process_id, 0).result() != os.getpid()
 
 
 def test_a_running_dask_cluster_is_used_by_its_address(executors):
@@ -116,7 +104,9 @@ def test_a_running_dask_cluster_is_used_by_its_address(executors):
     ):
         pass
     with open_executor("dask", None, address) as executor:
-        assert executor.submit(process_id, 0).result() in executors["dask"]._client.run(os.getpid).values()
+        assert (
+            executor.submit(tell_process_id, 0).result() in executors["dask"]._client.run(os.getpid).values()
+        )
 
 
 @pytest.mark.parametrize("runner", ["process", "Dask", ""])
@@ -131,12 +121,9 @@ def test_a_runner_that_does_not_exist_is_refused_and_not_taken_for_dask(runner, 
     assert not any(tmp_path.iterdir()), "nothing is begun"
 
 
-def memory_settings() -> dict[str, str | None]:
-    return {name: os.environ.get(name) for name in ALLOCATOR}
-
-
 def test_local_workers_keep_the_memory_that_the_next_frame_needs(executors):
-    assert executors["dask"].submit(memory_settings).result() == {k: str(v) for k, v in ALLOCATOR.items()}
+    found = executors["dask"].submit(list_variables, tuple(ALLOCATOR)).result()
+    assert found == {name: str(value) for name, value in ALLOCATOR.items()}
 
 
 def test_each_worker_process_sees_one_gpu_of_those_visible(executors):
@@ -165,6 +152,17 @@ def test_a_scheduler_that_does_not_answer_is_an_input_error(monkeypatch):
         open_executor("dask", 1, "tcp://127.0.0.1:9"),
     ):
         pass
+
+
+def test_a_client_that_fails_half_way_is_closed_at_once():
+    """Closed when Python collects it, it waits for ever for another client that starts at that moment."""
+    running = set(threading.enumerate())
+    with (
+        pytest.raises(InputError, match="unknown address scheme"),
+        open_executor("dask", 1, "foo://127.0.0.1:9"),
+    ):
+        pass
+    assert set(threading.enumerate()) <= running
 
 
 def test_outside_a_flow_a_stage_is_its_function():

@@ -21,7 +21,7 @@ from tests.identification.synthetic import SURFACE, TOLERANCES, VEHICLE, measure
 
 SPEED_AND_ACCELERATION = ("speed", "longitudinal_acceleration")
 RULES = load_decision_rules()
-STOPS = ((27.0, 1.2), (20.0, 2.4), (16.0, 1.5), (22.0, 2.0))
+STOPS = ((29.0, 0.9), (17.0, 2.0), (22.0, 2.0))
 """Speed [m/s] and brake pressure [MPa] of the runs; the last is held out."""
 
 

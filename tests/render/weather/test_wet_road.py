@@ -10,6 +10,7 @@ from tasks.render.weather.layer import recompose_layers
 from tasks.render.weather.rays import pixel_rays
 from tasks.render.weather.sky import LUMINANCE, sky_light
 from tasks.render.weather.wet import wet_road
+from tasks.render.weather.wet.lobe import average_over_lobe
 from tasks.render.weather.wet.puddles import compute_struck_slope, compute_wetness, water_surface
 from tasks.render.weather.wet.reflection import mirrored_scene
 from tasks.render.weather.wet.road_view import RoadView
@@ -258,7 +259,7 @@ def test_a_lobe_is_as_wide_across_as_it_is_steep_and_seen_flat(parameters):
     light[:, 30] = 1
     view = replace(see_road(flat_gbuffer(VIEW)[1]), road=road, mirrors=road)
     across = np.repeat(np.array([0, 1.5, 4, 9], np.float32)[:, None], 61, axis=1)
-    out = wet_road._lobe_mean(light, view, 0, across)
+    out = average_over_lobe(light, view, 0, across)
     assert [(row > 0).sum() for row in out[..., 0]] == [1, 3, 9, 19]
     assert out.sum(axis=1) == pytest.approx(np.ones((4, 3)), rel=1e-5)
 
