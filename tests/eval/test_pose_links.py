@@ -78,7 +78,7 @@ def test_a_step_that_states_no_error_is_believed_all_but_wholly():
 
 @pytest.fixture(scope="module")
 def long_clip() -> Clip:
-    return drive_clip(frames=24, frame_rate=10.0, hump_at=1.0, width=240, height=160, focal=200.0)
+    return drive_clip(frames=40, frame_rate=10.0, hump_at=1.0, width=240, height=160, focal=200.0)
 
 
 def test_links_hold_the_camera_only_pitch_at_ten_frames_a_second(long_clip: Clip):
