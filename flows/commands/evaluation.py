@@ -1,23 +1,35 @@
 """Commands that judge pixels."""
 
+from collections import Counter
 from typing import Any
 
 from flows.commands.command import CAMERA, DATASET, OUT, Command, define_argument, define_option, require_key
 
 GROUP = "Evaluation"
-EVALUATION_COLUMNS = ("metric", "method", "condition", "value", "unit", "paper", "floor", "note")
+EVALUATION_COLUMNS = ("metric", "method", "condition", "value", "unit", "paper")
 
 
 def shorten_evaluation(result: dict[str, Any]) -> dict[str, Any]:
-    """Return an evaluation without the rows of single windows, and the main columns of the others."""
-    rows = [{key: row[key] for key in EVALUATION_COLUMNS} for row in result["rows"] if not row["window"]]
-    return result | {"rows": rows}
+    """Return an evaluation's means over all clips and over the paper's, and what lacks; or a single clip's rows."""
+    rows = [row for row in result["rows"] if not row["window"]]
+    means = [row for row in rows if row["condition"] == "all" or row["condition"].startswith("paper/")]
+    told = [
+        {key: row[key] for key in EVALUATION_COLUMNS} for row in means or rows if row["value"] is not None
+    ]
+    lacking = {row["metric"]: row["note"] for row in rows if row["condition"] == "-" and row["value"] is None}
+    return result | {"rows": told, "lacking": [f"{metric} ({note})" for metric, note in lacking.items()]}
 
 
-def leave_out_roc(result: dict[str, Any]) -> dict[str, Any]:
-    """Return the negative controls without the points of their ROC curves."""
-    rows = [{key: value for key, value in row.items() if key != "roc"} for row in result["rows"]]
-    return result | {"rows": rows}
+def shorten_controls(result: dict[str, Any]) -> dict[str, Any]:
+    """Return of each negative control which metrics see it, and by how many methods; or why it was not tried."""
+    controls = []
+    for row in result["controls"]:
+        methods = Counter(reading.split(" by ")[0] for reading in row["seen_by"])
+        seen = ", ".join(f"{metric} ({count})" for metric, count in methods.items())
+        controls.append(
+            {"control": row["control"], "seen by metric (methods)": seen or row["reason"] or "none"}
+        )
+    return {key: result[key] for key in ("all_detected", "undetected")} | {"controls": controls}
 
 
 def show_table(result: dict[str, Any]) -> dict[str, Any]:
@@ -93,7 +105,7 @@ COMMANDS = (
         sentence="Desynchronise a dataset's claims in seven ways, and say which metric detects which fault.",
         function="flows.judging.controls:run_controls",
         options=(DATASET, OUT),
-        brief=leave_out_roc,
+        brief=shorten_controls,
         passed=require_key("all_detected"),
     ),
     Command(

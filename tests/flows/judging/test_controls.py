@@ -9,6 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from flows.cli import app
+from flows.commands.evaluation import shorten_controls
 from flows.drawing import as_svg
 from flows.judging import controls as judging_controls
 from flows.judging.controls import (
@@ -163,6 +164,19 @@ def test_a_control_that_could_not_be_tried_is_not_detected(
     assert told["undetected"][0].startswith("fixed-mu: not tried: in none of 3 clips does it change")
     by_name = {row["control"]: row for row in told["controls"]}
     assert not by_name["fixed-mu"]["tried"] and by_name["sign-flip"]["tried"]
+
+
+def test_the_terminal_says_of_each_control_which_metrics_see_it_or_why_it_was_not_tried() -> None:
+    seen = {"seen_by": ["pitch_mae by pnp", "pitch_mae by stereo", "e_weather by pnp"], "reason": ""}
+    untried = {"control": "fixed-mu", "seen_by": [], "reason": "not tried: in none of 3 clips does it change"}
+    controls = [{"control": "sign-flip", **seen}, untried]
+    told = shorten_controls(
+        {"all_detected": False, "undetected": ["fixed-mu"], "controls": controls, "rows": []}
+    )
+    assert [tuple(row.values()) for row in told["controls"]] == [
+        ("sign-flip", "pitch_mae (2), e_weather (1)"),
+        ("fixed-mu", "not tried: in none of 3 clips does it change"),
+    ]
 
 
 def test_a_dataset_without_a_single_track_says_so_of_every_control(

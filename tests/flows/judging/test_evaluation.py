@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from flows.commands.evaluation import shorten_evaluation
 from flows.judging import evaluation
 from flows.judging.evaluation import NOT_RUN, evaluate_dataset
 from flows.judging.physics import clip_columns, clip_facts
@@ -87,6 +88,21 @@ def write_reference(dataset: Path, folder: Path) -> None:
         rows.append({key: facts[key] for key in keys} | {"case": name})
         rows[-1]["surface_coefficient"] = round(facts["surface_friction"], 6)
     (folder / "cases.json").write_text(json.dumps(rows))
+
+
+def test_the_terminal_shows_the_means_over_all_clips_and_what_lacks(judged: Path) -> None:
+    told = shorten_evaluation(json.loads((judged / "evaluation.json").read_text()))
+    assert {row["condition"] for row in told["rows"]} == {"all", "paper/dry-features"}
+    assert all(row["value"] is not None for row in told["rows"])
+    assert any(row["metric"] == "pitch_rmse" and row["method"] == "essential" for row in told["rows"])
+    assert any(line.startswith("fast_vqa (not run") for line in told["lacking"])
+
+
+def test_the_terminal_shows_the_rows_of_a_single_clip_where_there_are_no_means() -> None:
+    columns = {"metric": "pitch_mae", "method": "pnp", "unit": "deg", "paper": None, "note": ""}
+    row = columns | {"condition": "snow-3/flat", "value": 0.1, "window": False}
+    told = shorten_evaluation({"clips": 1, "rows": [row, row | {"window": True}]})
+    assert [row["condition"] for row in told["rows"]] == ["snow-3/flat"]
 
 
 def test_every_metric_has_rows_and_a_row_without_a_value_says_why(judged: Path) -> None:
