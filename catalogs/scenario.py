@@ -83,6 +83,10 @@ def scenario_problems(scenario: Scenario, unknown: Collection[str] = ()) -> list
         problems.append(
             "braking (peak_pressure_mpa above 0) needs exactly one of brake_onset_s and brake_onset_m"
         )
+    if s.peak_pressure_mpa > 0 and s.hold_s == s.ramp_s == s.release_s == 0:
+        problems.append(
+            "braking needs ramp_s, hold_s or release_s above 0; all are 0, and the brake never acts"
+        )
     if abs(s.hazard_height_m) > 0 and s.hazard_length_m == 0:
         problems.append(f"a hazard of height {s.hazard_height_m:g} m needs hazard_length_m above 0; it is 0")
     shortest = load_physical_limits().shortest_hazard

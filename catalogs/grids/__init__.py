@@ -79,7 +79,7 @@ def load_grid(source: str | Path) -> Grid:
             grid = faults.grid
         problems += _find_impossible_conditions(form.settings, path)
         if grid is not None and not problems:
-            problems = cap_problems(_find_idle_conditions(grid, path))
+            problems = cap_problems([*_find_idle_conditions(grid, path), *_find_late_brakes(grid, path)])
     if problems or grid is None:
         raise FaultyGrid(problems, grid)
     return grid
@@ -164,3 +164,21 @@ def _find_idle_conditions(grid: Grid, place: Path) -> list[str]:
             for number in grid.idle
         ]
     return problems
+
+
+def _find_late_brakes(grid: Grid, place: Path) -> list[str]:
+    """Return a sentence that names the scenarios whose brake would come after the telemetry's end; [] without any."""
+    end = grid.settings.telemetry_s
+    late = {
+        label: scenario.brake_onset_s
+        for label, scenario in grid.scenarios
+        if scenario.peak_pressure_mpa > 0 and scenario.brake_onset_s is not None
+        and scenario.brake_onset_s >= end
+    }  # fmt: skip
+    if not late:
+        return []
+    return [
+        f"{shorten(place)}: scenario {name_some(list(late))}: brake_onset_s must lie before the end of the telemetry,"
+        f" {end:g} s; it is {min(late.values()):g} s: make duration_s longer, or peak_pressure_mpa 0 for a car that"
+        " does not brake"
+    ]

@@ -104,7 +104,7 @@ def refuse_several(connection: duckdb.DuckDBPyConnection, query: str, *, allow_f
     """
     count = len(connection.extract_statements(query))
     if count == 0 or (count > 1 and not allow_files):
-        raise InputError(f"--- {shorten(query)}: must be one SQL statement; it holds {count}")
+        raise InputError(f"query {shorten(query)}: must be one SQL statement; it holds {count}")
 
 
 def _fetch_rows(connection: duckdb.DuckDBPyConnection, query: str) -> tuple[list[str], Any]:
@@ -133,7 +133,7 @@ def _fetch_table(connection: duckdb.DuckDBPyConnection, query: str) -> tuple[lis
 def _bound_answer(query: str, rows: int, columns: int) -> None:
     if rows * columns > MOST_VALUES:
         raise InputError(
-            f"--- {shorten(query)}: the answer must have at most {MOST_VALUES:,} values (rows times columns); it"
+            f"query {shorten(query)}: the answer must have at most {MOST_VALUES:,} values (rows times columns); it"
             " has more: add LIMIT, or take it in parts with musync.open(...).sql(...).to_arrow_reader()"
         )
 
@@ -171,13 +171,14 @@ def refused_query(query: str, error: Exception, option: str) -> InputError:
     reached = _REACHED.search(text)
     if reached is None:
         return InputError(
-            f"--- {shorten(query)}: {_last_line(text)}\nviews are {', '.join(VIEWS)}; musync schema lists their columns"
+            f"query {shorten(query)}: {_last_line(text)}\n"
+            f"views are {', '.join(VIEWS)}; musync schema lists their columns"
         )
     asked = (
         shorten(reached["place"]) if reached["place"] else "a change of DuckDB's settings, or an extension"
     )
     return InputError(
-        f"--- {shorten(query)}: this query asks for {asked}, and may read the dataset's views alone;"
+        f"query {shorten(query)}: this query asks for {asked}, and may read the dataset's views alone;"
         f" {option} lets SQL read and write files of this machine"
     )
 

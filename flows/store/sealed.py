@@ -35,7 +35,7 @@ def read_manifest(layout: Layout, *, sealed: bool = True) -> Manifest:
     InputError
         If the run is unfinished, or the manifest is missing, of another format, breaks a rule, or was changed.
     """
-    _refuse_unfinished(layout)
+    _refuse_without_manifest(layout)
     content = read_content(layout.manifest, RECORD, LARGEST_JSON)
     return _check_content(content, layout.manifest, sealed=sealed)
 
@@ -50,7 +50,7 @@ def read_manifest_head(layout: Layout) -> ManifestHead:
     InputError
         As `read_manifest` raises it.
     """
-    _refuse_unfinished(layout)
+    _refuse_without_manifest(layout)
     content = read_content(layout.manifest, RECORD, LARGEST_JSON)
     head = head_of_sealed(content)
     if head is None:
@@ -151,14 +151,20 @@ def refuse_changed_content(
     refuse_changed_files(layout, manifest["artifacts"] | own)
 
 
-def _refuse_unfinished(layout: Layout) -> None:
-    if layout.plan.is_file() and not layout.manifest.is_file():
+def _refuse_without_manifest(layout: Layout) -> None:
+    if layout.manifest.exists():
+        return
+    if layout.plan.is_file():
         clips = read_plan_record(layout)["clips"]
         done = sum(layout.receipt(clip["clip_id"]).is_file() for clip in clips)
         raise InputError(
             f"{layout}: the dataset must be finished; {done} of {len(clips)} clips are made:"
             " run its musync generate command again"
         )
+    raise InputError(
+        f"{layout}: must be a finished dataset; it has no {layout.manifest.name}: name another folder, or make"
+        " a dataset with musync generate"
+    )
 
 
 def check_manifest(content: Any, place: object) -> Manifest:

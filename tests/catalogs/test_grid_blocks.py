@@ -158,6 +158,24 @@ def test_a_condition_that_no_clip_of_the_grid_meets_is_refused(tmp_path, body, t
         load_grid(write_grid(tmp_path, body))
 
 
+@pytest.mark.parametrize(
+    ("duration", "onset", "late"), [(8, 8.0, True), (8, 7.9, False), (10, 9.0, False), (10, 12.0, True)]
+)
+def test_a_brake_after_the_end_of_the_telemetry_is_refused(tmp_path, duration, onset, late):
+    braked = f"peak_pressure_mpa: 2, brake_onset_s: {onset}"
+    grid = tmp_path / "grid.yaml"
+    grid.write_text(
+        f"{{name: t, duration_s: {duration}, scenarios: {{a: {{{braked}}}, b: {{brake_onset_s: 60}}}}}}"
+    )
+    if late:
+        with pytest.raises(
+            InputError, match=rf"scenario a: brake_onset_s .* {duration} s; it is {onset:g} s"
+        ):
+            load_grid(grid)
+    else:
+        assert len(load_grid(grid).scenarios) == 2
+
+
 def test_the_grid_of_a_frozen_manifest_makes_what_it_made():
     assert grid_of(f"{{{AXES}, exclude: [{{precipitation_mm_h: 51}}]}}").idle == (0,)
 

@@ -121,6 +121,10 @@ def test_an_unknown_grid_lists_those_that_exist():
         ({"peak_pressure_mpa": 2.0}, "exactly one of brake_onset_s and brake_onset_m"),
         ({"peak_pressure_mpa": 2.0, "brake_onset_s": 1.0, "brake_onset_m": 12.0}, "exactly one of"),
         ({"brake_onset_s": -1.0}, "must not be negative"),
+        (
+            {"peak_pressure_mpa": 2.0, "brake_onset_s": 1.0, "ramp_s": 0.0, "hold_s": 0.0, "release_s": 0.0},
+            "the brake never acts",
+        ),
         ({"hazard_height_m": 0.1}, "needs hazard_length_m above 0"),
     ],
 )

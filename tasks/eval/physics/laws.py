@@ -24,6 +24,9 @@ from tasks.eval.physics.half_step import INNER_STEP, HalfStep, find_brake_onset,
 ROUNDING = 1e-9
 """Relative error that double-precision sums of a run may carry [1]."""
 
+AT_A_STEP = 1e-9
+"""Time about a tick within which a command that jumps has either value [s]."""
+
 ASKED = "clips.peak_pressure_mpa clips.ramp_s"
 """Columns that decide the brake pressure between ticks."""
 
@@ -240,7 +243,11 @@ def command_laws(
     time: Floats = 1e-3 * np.arange(len(s), dtype=np.float64)
     onset = find_brake_onset(ticks, facts)
     peak, ramp, hold, lasting = pressure_shape(facts)
-    wanted = pressure_at(time - onset, peak, ramp, hold, lasting)
+    pressure = ticks["brake_pressure_mpa"]
+    around = [
+        pressure_at(time - onset + late, peak, ramp, hold, lasting) for late in (-AT_A_STEP, 0.0, AT_A_STEP)
+    ]
+    wanted = np.clip(pressure, np.min(around, axis=0), np.max(around, axis=0))
     steepest = peak / max(ramp, 1e-3)
     by_place = facts["brake_onset_m"] is not None and np.isfinite(facts["brake_onset_m"])
     slack = 1e-9 + (steepest * 1e-5 if by_place else 0.0)
@@ -248,7 +255,7 @@ def command_laws(
     columns = f"brake_pressure_mpa clips.peak_pressure_mpa clips.ramp_s clips.brake_onset_s{release}"
     if by_place:
         columns = columns.replace("brake_onset_s", "brake_onset_m")
-    laws = [evaluate_law("brake pressure as commanded", columns, ticks["brake_pressure_mpa"] - wanted, slack)]
+    laws = [evaluate_law("brake pressure as commanded", columns, pressure - wanted, slack)]
     hump = facts["hazard_center_m"], facts["hazard_length_m"], facts["hazard_height_m"]
     moves = v > 0
     for axle, behind in (("f", 0.0), ("r", constants.wheelbase)):

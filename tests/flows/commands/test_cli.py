@@ -80,7 +80,7 @@ def test_a_folder_with_other_files_is_left_alone(musync, tmp_path):
 def test_a_folder_that_is_no_dataset_is_refused(musync, tmp_path, command):
     done = musync(command, str(tmp_path))
     assert done.code == 2
-    assert "manifest.json: no such file" in done.err
+    assert "must be a finished dataset; it has no manifest.json: name another folder" in done.err
 
 
 def test_a_manifest_of_another_version_is_refused(musync, tmp_path):

@@ -33,6 +33,17 @@ axes:
     hump: {{initial_speed_km_h: 30, peak_pressure_mpa: 2.3, brake_onset_m: 6.0,
             hazard_center_m: 8.0, hazard_length_m: 3.7, hazard_height_m: 0.075}}
 """
+JUMPS = """
+name: jumps
+scene: {folder}/scene
+camera: {folder}/camera.yaml
+frames: 8
+frame_rate_hz: 5
+base: {{initial_speed_km_h: 25, peak_pressure_mpa: 2.3, ramp_s: 0, release_s: 0, hold_s: 0.3}}
+scenarios:
+  early: {{brake_onset_s: 0.2}}
+  late: {{brake_onset_s: 0.7}}
+"""
 TRIALS = 60
 
 
@@ -51,6 +62,19 @@ def test_sound_telemetry_keeps_every_law(dataset: Path, tmp_path: Path) -> None:
     assert result["verified"], [(row["label"], row["broken"]) for row in result["clips"]]
     assert result["laws_checked"] > 80 * result["clips_checked"]
     assert (tmp_path / "physics.json").is_file()
+
+
+def test_a_brake_that_jumps_keeps_every_law_and_one_that_acts_a_tick_late_does_not(tmp_path: Path) -> None:
+    grid = write_toy_grid(tmp_path, JUMPS)
+    made = tmp_path / "made"
+    generate_dataset(grid, str(made), runner="threads", workers=1, pictures=False)
+    result = audit_physics(str(made), out=str(tmp_path))
+    assert result["verified"], [(row["label"], row["broken"]) for row in result["clips"]]
+    facts = clip_facts(made)[0]
+    ticks, frames = (clip_columns(made, table, facts) for table in ("ticks", "frames"))
+    late = {**ticks, "brake_pressure_mpa": np.roll(ticks["brake_pressure_mpa"], 1)}
+    verdict = audit_clip(late, frames, facts, read_constants(made))
+    assert "brake pressure as commanded" in [law.name for law in verdict.laws if law.broken]
 
 
 def test_a_dataset_with_pictures_keeps_the_laws_of_its_pose_check_too(
