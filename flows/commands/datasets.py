@@ -22,6 +22,20 @@ CLIPS = define_option(
     None,
     spelling="clip",
 )
+VEHICLE = define_option(
+    "vehicle",
+    str | None,
+    "Vehicle to take instead of the grid's: YAML file, or the name of one in catalogs/vehicles.",
+    None,
+    known="catalogs/vehicles/*.yaml",
+)
+PICTURES = define_option(
+    "pictures",
+    bool,
+    "Render the frames; --no-frames makes telemetry alone.",
+    True,
+    spelling="frames",
+)
 
 
 def list_quarantined_clips(result: dict[str, Any]) -> dict[str, Any]:
@@ -59,13 +73,7 @@ COMMANDS = (
             ),
             *GENERATING_RUNNER,
             BACKEND,
-            define_option(
-                "vehicle",
-                str | None,
-                "Vehicle to take instead of the grid's: YAML file, or the name of one in catalogs/vehicles.",
-                None,
-                known="catalogs/vehicles/*.yaml",
-            ),
+            VEHICLE,
             define_option(
                 "poses",
                 str | None,
@@ -73,13 +81,7 @@ COMMANDS = (
                 " its conditions, not the vehicle's.",
                 None,
             ),
-            define_option(
-                "pictures",
-                bool,
-                "Render the frames; --no-frames makes telemetry alone.",
-                True,
-                spelling="frames",
-            ),
+            PICTURES,
         ),
         brief=list_quarantined_clips,
         passed=lambda result: not result.get("telemetry_differs"),
@@ -161,7 +163,7 @@ COMMANDS = (
         group=GROUP,
         sentence="Check a grid and estimate its size, without making anything.",
         function="flows.reading.describe:validate_grid",
-        options=(GRID,),
+        options=(GRID, VEHICLE, PICTURES),
     ),
     Command(
         name="describe",

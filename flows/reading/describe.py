@@ -54,15 +54,20 @@ def describe_dataset(dataset: str) -> dict[str, Any]:
     }
 
 
-def validate_grid(grid: str) -> dict[str, Any]:
+def validate_grid(grid: str, *, vehicle: str | None = None, pictures: bool = True) -> dict[str, Any]:
     """Check a grid without making anything; counts and estimates.
+
+    Parameters
+    ----------
+    grid : grid file, or the name of one that ships
+    vehicle, pictures : as of `flows.making.generate.generate_dataset`
 
     Raises
     ------
     InputError
         Listing every problem of the grid.
     """
-    plan, _ = make_plan(grid, "cpu")
+    plan, _ = make_plan(grid, "cpu", vehicle, pictures=pictures)
     settings = plan.settings
     camera = load_camera(
         load_grid(grid).settings.camera

@@ -29,6 +29,16 @@ def test_validate_counts_clips_and_frames(musync):
     assert (facts["clips"], facts["frames"]) == (15, 15 * 81)
 
 
+def test_validate_tells_the_run_that_generate_makes_with_the_same_options(musync, tmp_path):
+    grid = write_toy_grid(tmp_path, frames=10)
+    options = ("--vehicle", "multibody-grown", "--no-frames")
+    told = json.loads(musync("validate", grid, *options, "--json").out)
+    made = json.loads(musync("generate", grid, *options, "--out", "data", "--json").out)
+    assert told["run_id"] == made["run_id"] != json.loads(musync("validate", grid, "--json").out)["run_id"]
+    assert told["frames"] == 0
+    assert musync("validate", grid, "--vehicle", "nowhere").code == 2
+
+
 def test_validate_counts_the_pixels_of_a_camera_given_by_an_absolute_path(musync, tmp_path):
     (tmp_path / "folder").mkdir()
     grid = write_toy_grid(tmp_path / "folder", frames=10)
