@@ -15,7 +15,7 @@ from catalogs.scenario import UNKNOWN_WEATHER, Scenario, range_problems, scenari
 from catalogs.sentences import cap_problems, name_some, shorten
 from tasks.errors import InputError
 
-__all__ = ["FaultyGrid", "Grid", "GridFile", "expand_grid", "load_grid"]
+__all__ = ["FaultyGrid", "Grid", "GridFile", "expand_grid", "load_grid", "warn_of_late_brakes"]
 
 LONGEST_LABEL = 200
 """Bytes of a label [1]: with a suffix it is still a file name, of 255 bytes at most."""
@@ -79,7 +79,7 @@ def load_grid(source: str | Path) -> Grid:
             grid = faults.grid
         problems += _find_impossible_conditions(form.settings, path)
         if grid is not None and not problems:
-            problems = cap_problems([*_find_idle_conditions(grid, path), *_find_late_brakes(grid, path)])
+            problems = cap_problems(_find_idle_conditions(grid, path))
     if problems or grid is None:
         raise FaultyGrid(problems, grid)
     return grid
@@ -166,8 +166,15 @@ def _find_idle_conditions(grid: Grid, place: Path) -> list[str]:
     return problems
 
 
-def _find_late_brakes(grid: Grid, place: Path) -> list[str]:
-    """Return a sentence that names the scenarios whose brake would come after the telemetry's end; [] without any."""
+def warn_of_late_brakes(grid: Grid) -> str | None:
+    """Return a sentence that names the scenarios whose brake comes after the telemetry's end; None without any.
+
+    It is no fault: who tries a grid with a few frames wants it too.
+
+    Parameters
+    ----------
+    grid : a validated grid
+    """
     end = grid.settings.telemetry_s
     late = {
         label: scenario.brake_onset_s
@@ -176,9 +183,8 @@ def _find_late_brakes(grid: Grid, place: Path) -> list[str]:
         and scenario.brake_onset_s >= end
     }  # fmt: skip
     if not late:
-        return []
-    return [
-        f"{shorten(place)}: scenario {name_some(list(late))}: brake_onset_s must lie before the end of the telemetry,"
-        f" {end:g} s; it is {min(late.values()):g} s: make duration_s longer, or peak_pressure_mpa 0 for a car that"
-        " does not brake"
-    ]
+        return None
+    return (
+        f"scenario {name_some(list(late))} does not brake: brake_onset_s is {min(late.values()):g} s or later, and the"
+        f" telemetry ends at {end:g} s: make duration_s longer"
+    )

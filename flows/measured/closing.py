@@ -13,7 +13,12 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_tolerances, load_vehicle, vehicle_content
 from flows.measured.closing_ledger import record_reading
 from flows.measured.grown_vehicle import grown_vehicle, tyre_beside
-from flows.measured.residuals import compute_residual_rmse, predict_runs
+from flows.measured.residuals import (
+    compute_friction_pulls,
+    compute_residual_rmse,
+    predict_runs,
+    say_friction_pulls,
+)
 from flows.measured.searches import SEARCHES, judge_campaign
 from flows.measured.verdict_report import write_verdict_page
 from flows.store.outputs import Outputs
@@ -62,6 +67,7 @@ def close_loop(
     measured = replace(measured, tolerances=measured.tolerances.with_session(session_tolerances(name)))
     trace = judge_campaign(measured, model, road, load_effects())
     result = verdict_json(trace.verdict) | tell_search(trace)
+    result = tell_friction_pulls(result, measured.tolerances.friction)
     result["held_out_readings_before"] = earlier
     if earlier:
         result["reasons"].append(
@@ -127,7 +133,8 @@ def tell_search(trace: Trace | JointTrace) -> dict[str, Any]:
     told = {"sentence": sentence, "calibrated": [effect_json(effect, library) for effect in trace.calibrated]}
     if isinstance(trace, Trace):
         residual = compute_residual_rmse((*train, *held_out))
-        return {"search": SEARCHES[0], **told, "residual_rmse": residual}
+        pulls = compute_friction_pulls(trace)
+        return {"search": SEARCHES[0], **told, "residual_rmse": residual, "friction_pulls_sigma": pulls}
     return {
         "search": SEARCHES[1],
         **told,
@@ -140,6 +147,24 @@ def tell_search(trace: Trace | JointTrace) -> dict[str, Any]:
         "starts_agreeing": {"agreeing": trace.agreeing[0], "of": trace.agreeing[1]},
         "residual_rmse": compute_residual_rmse(held_out),
     }  # fmt: skip
+
+
+def tell_friction_pulls(result: dict[str, Any], tolerance: float) -> dict[str, Any]:
+    """Return a verdict in plain values with the runs whose tyres do not grip as the surface mapping says, if any.
+
+    They are a reason of every verdict, and part of the first sentence where nothing is named.
+
+    Parameters
+    ----------
+    result : of `verdict_json` and `tell_search`
+    tolerance : one sigma of a run's friction, relative [1]
+    """
+    pulled = say_friction_pulls(result.get("friction_pulls_sigma", {}), tolerance)
+    if pulled is None:
+        return result
+    brief, full = pulled
+    lead = f" {brief}" if result["verdict"] == "NOTHING" else ""
+    return result | {"sentence": result["sentence"] + lead, "reasons": [*result["reasons"], full]}
 
 
 def split_of(campaign: Campaign) -> dict[str, Any]:

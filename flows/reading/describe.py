@@ -4,7 +4,7 @@ from collections import Counter
 from typing import Any
 
 from catalogs.cameras import load_camera
-from catalogs.grids import load_grid
+from catalogs.grids import load_grid, warn_of_late_brakes
 from catalogs.variants import warn_of_variant
 from flows.making.plan import make_plan
 from flows.store.address import open_for_reading, stored_bytes, want_manifest
@@ -69,9 +69,9 @@ def validate_grid(grid: str, *, vehicle: str | None = None, pictures: bool = Tru
     """
     plan, _ = make_plan(grid, "cpu", vehicle, pictures=pictures)
     settings = plan.settings
-    camera = load_camera(
-        load_grid(grid).settings.camera
-    )  # of a file the plan records the name, without its folder
+    read = load_grid(grid)
+    camera = load_camera(read.settings.camera)  # of a file the plan records the name, without its folder
+    warnings = [w for w in (warn_of_variant(settings.variant), warn_of_late_brakes(read)) if w]
     frames = len(plan.clips) * settings.frames if settings.pictures else 0
     ticks = len(plan.clips) * plan.ticks_per_clip
     pixels = frames * camera.width * camera.height
@@ -80,7 +80,7 @@ def validate_grid(grid: str, *, vehicle: str | None = None, pictures: bool = Tru
     return {
         "grid": settings.name,
         "run_id": plan.run_id,
-        **({"warning": warning} if (warning := warn_of_variant(settings.variant)) else {}),
+        **({"warning": "; ".join(warnings)} if warnings else {}),
         "clips": len(plan.clips),
         "frames": frames,
         "ticks": ticks,

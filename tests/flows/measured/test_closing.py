@@ -16,14 +16,17 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_provenance
 from flows.cli import app
 from flows.making.plan import make_plan
-from flows.measured.closing import close_loop, verdict_json
+from flows.measured.closing import close_loop, tell_friction_pulls, verdict_json
 from flows.measured.closing_ledger import record_reading
 from flows.measured.grown_vehicle import grown_vehicle
+from flows.measured.residuals import FRICTION_OFFSET, TOLD_PULL, say_friction_pulls
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS, SESSION, Campaign
 from tasks.campaign.planned_runs import RunPlan
 from tasks.identification.benchmark import TOLERANCES, make_synthetic_campaign
 from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter, Verdict
-from tasks.identification.inference.disturbance import Disturbance
+from tasks.identification.inference.disturbance import N_OFFSETS, Disturbance
+from tasks.identification.inference.evidence import move_by_offsets
+from tasks.vehicle.effects.table import EFFECT_TABLE, PARAMETER_INDEX
 
 VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
 HOSTILE = "lagging <img src=x onerror=alert(1)>"
@@ -104,6 +107,37 @@ def test_a_lag_in_the_data_is_named_with_its_value_and_better_predictions(closed
     assert speed["after"] < 0.5 * speed["frozen"] and speed["ci_low"] <= speed["after"] <= speed["ci_high"]
     distance = verdict["manoeuvre_error"]["stopping_distance"]
     assert distance["unit"] == "m" and distance["after"] < 0.5 * distance["frozen"]
+
+
+def test_runs_that_grip_as_the_mapping_says_pull_no_friction(closed: Path) -> None:
+    verdict = json.loads((closed / "verdict.json").read_text())
+    pulls = verdict["friction_pulls_sigma"]
+    assert list(pulls) == json.loads((closed / "split.json").read_text())["train"]
+    assert max(map(abs, pulls.values())) < TOLD_PULL
+    assert say_friction_pulls(pulls, TOLERANCES.friction) is None
+
+
+@pytest.mark.parametrize(("kind", "in_the_lead"), [("NOTHING", True), ("FOUND", False)])
+def test_runs_that_grip_less_than_the_mapping_says_are_told_beside_the_verdict(
+    kind: str, in_the_lead: bool
+) -> None:
+    result = {"verdict": kind, "sentence": "So it is.", "reasons": ["because"]}
+    result["friction_pulls_sigma"] = {"run-1": -2.4, "run-2": -3.8, "run-3": 2.6}
+    told = tell_friction_pulls(result, 0.03)
+    lead = "So it is. But in run-2 and run-3 the tyres do not grip as the surface mapping says."
+    assert told["sentence"] == (lead if in_the_lead else "So it is.")
+    assert (
+        told["reasons"][0] == "because"
+        and "(3.0% each): run-2 by -3.8 and run-3 by +2.6;" in told["reasons"][1]
+    )
+    assert tell_friction_pulls({"verdict": kind}, 0.03) == {"verdict": kind}
+
+
+def test_the_friction_that_is_told_is_the_one_that_a_run_moves_by() -> None:
+    offsets = np.zeros(N_OFFSETS)
+    offsets[FRICTION_OFFSET] = -0.06
+    moved, _ = move_by_offsets(np.zeros(len(EFFECT_TABLE)), (), offsets, (0, 0, 0))
+    assert moved[PARAMETER_INDEX["friction"]] == -0.06
 
 
 def test_a_lag_leaves_a_residual_that_goes_with_the_pressure_until_it_is_named(closed: Path) -> None:
