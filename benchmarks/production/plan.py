@@ -28,7 +28,7 @@ class ClipCosts:
     puts, gets : requests to an object store while it is made and sealed [1]
     """
 
-    cpu_s: float = 20.0
+    cpu_s: float = 11.2
     gather_cpu_s: float = 0.012
     driver_cpu_s: float = 0.0015
     scheduler_cpu_s: float = 0.0062
