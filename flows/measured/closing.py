@@ -16,6 +16,7 @@ from flows.measured.grown_vehicle import grown_vehicle, tyre_beside
 from flows.measured.residuals import (
     compute_friction_pulls,
     compute_residual_rmse,
+    find_pulled_runs,
     predict_runs,
     say_friction_pulls,
 )
@@ -159,10 +160,10 @@ def tell_friction_pulls(result: dict[str, Any], tolerance: float) -> dict[str, A
     result : of `verdict_json` and `tell_search`
     tolerance : one sigma of a run's friction, relative [1]
     """
-    pulled = say_friction_pulls(result.get("friction_pulls_sigma", {}), tolerance)
-    if pulled is None:
+    pulled = find_pulled_runs(result.get("friction_pulls_sigma", {}))
+    if not pulled:
         return result
-    brief, full = pulled
+    brief, full = say_friction_pulls(pulled, tolerance)
     lead = f" {brief}" if result["verdict"] == "NOTHING" else ""
     return result | {"sentence": result["sentence"] + lead, "reasons": [*result["reasons"], full]}
 

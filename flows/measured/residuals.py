@@ -128,20 +128,27 @@ def compute_friction_pulls(trace: Trace) -> dict[str, float]:
     }
 
 
-def say_friction_pulls(pulls: Mapping[str, float], tolerance: float) -> tuple[str, str] | None:
-    """Return in brief and in full which runs pull friction by more than `TOLD_PULL` tolerances; None without any.
+def find_pulled_runs(pulls: Mapping[str, float]) -> dict[str, float]:
+    """Return the runs whose friction is pulled by more than `TOLD_PULL` tolerances, with their pull [1].
 
     Parameters
     ----------
     pulls : of `compute_friction_pulls`
+    """
+    return {name: pull for name, pull in pulls.items() if abs(pull) > TOLD_PULL}
+
+
+def say_friction_pulls(pulled: Mapping[str, float], tolerance: float) -> tuple[str, str]:
+    """Return in brief and in full that runs pull their friction.
+
+    Parameters
+    ----------
+    pulled : of `find_pulled_runs`, at least one
     tolerance : one sigma of a run's friction, relative [1]
     """
-    told = {name: pull for name, pull in pulls.items() if abs(pull) > TOLD_PULL}
-    if not told:
-        return None
-    listed = join_phrases(f"{name} by {pull:+.1f}" for name, pull in told.items())
+    listed = join_phrases(f"{name} by {pull:+.1f}" for name, pull in pulled.items())
     return (
-        f"But in {join_phrases(told)} the tyres do not grip as the surface mapping says.",
+        f"But in {join_phrases(pulled)} the tyres do not grip as the surface mapping says.",
         f"runs at their limit pull friction by more than {TOLD_PULL:g} of its tolerances ({tolerance:.1%} each):"
         f" {listed}; what is named does not explain it, and stops at the limit are predicted no better",
     )

@@ -19,7 +19,7 @@ from flows.making.plan import make_plan
 from flows.measured.closing import close_loop, tell_friction_pulls, verdict_json
 from flows.measured.closing_ledger import record_reading
 from flows.measured.grown_vehicle import grown_vehicle
-from flows.measured.residuals import FRICTION_OFFSET, TOLD_PULL, say_friction_pulls
+from flows.measured.residuals import FRICTION_OFFSET, find_pulled_runs
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS, SESSION, Campaign
 from tasks.campaign.planned_runs import RunPlan
 from tasks.identification.benchmark import TOLERANCES, make_synthetic_campaign
@@ -113,8 +113,7 @@ def test_runs_that_grip_as_the_mapping_says_pull_no_friction(closed: Path) -> No
     verdict = json.loads((closed / "verdict.json").read_text())
     pulls = verdict["friction_pulls_sigma"]
     assert list(pulls) == json.loads((closed / "split.json").read_text())["train"]
-    assert max(map(abs, pulls.values())) < TOLD_PULL
-    assert say_friction_pulls(pulls, TOLERANCES.friction) is None
+    assert find_pulled_runs(pulls) == {}
 
 
 @pytest.mark.parametrize(("kind", "in_the_lead"), [("NOTHING", True), ("FOUND", False)])
