@@ -1,5 +1,6 @@
 """Commands that make datasets and look into them."""
 
+from math import degrees
 from typing import Any
 
 from flows.commands.command import (
@@ -43,6 +44,21 @@ def list_quarantined_clips(result: dict[str, Any]) -> dict[str, Any]:
     rows = result["quarantined"].items()
     listed = [{"clip": label, "why": "; ".join(reasons)} for label, reasons in rows]
     return result | ({"quarantined": listed} if listed else {})
+
+
+def shorten_description(result: dict[str, Any]) -> dict[str, Any]:
+    """Return a dataset's description with the columns of its clips that fit a terminal, units in their names."""
+    clips = [
+        {
+            "clip": row["label"],
+            "friction": row["surface_friction"],
+            "stop_m": row["stopping_distance"],
+            "peak_pitch_deg": None if row["peak_pitch"] is None else degrees(row["peak_pitch"]),
+            "passed": row["passed"],
+        }
+        for row in result["clips"]
+    ]
+    return result | {"clips": clips}
 
 
 def select_answer(result: dict[str, Any]) -> dict[str, Any]:
@@ -171,6 +187,7 @@ COMMANDS = (
         sentence="Summarise a dataset: clips, weathers, road features, verdicts.",
         function="flows.reading.describe:describe_dataset",
         options=(DATASET,),
+        brief=shorten_description,
     ),
     Command(
         name="sql",

@@ -1,6 +1,7 @@
 """Commands as a user types them: their exit codes, and what stands on the terminal."""
 
 import json
+from math import degrees
 from types import SimpleNamespace
 
 import pytest
@@ -84,6 +85,16 @@ def test_a_folder_with_other_files_is_left_alone(musync, tmp_path):
     assert done.code == 2
     assert "must be an empty or new folder" in done.err
     assert [p.name for p in (tmp_path / "data").iterdir()] == ["thesis.tex"]
+
+
+def test_describe_gives_a_row_a_clip_with_units_that_a_terminal_can_hold(musync, toy_dataset, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    shown = musync("describe", str(toy_dataset.root)).out.splitlines()
+    whole = json.loads(musync("describe", str(toy_dataset.root), "--json").out)["clips"]
+    assert any("stop_m" in line and "peak_pitch_deg" in line for line in shown)
+    for clip in whole:
+        (line,) = [line for line in shown if clip["label"] in line]
+        assert f"{degrees(clip['peak_pitch']):.5g}" in line
 
 
 @pytest.mark.parametrize("command", ["audit", "describe"])
