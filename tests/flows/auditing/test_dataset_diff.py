@@ -127,5 +127,5 @@ def test_the_text_says_which_label_moved_how_far_and_why(datasets: dict[str, str
 
 
 def test_an_unfinished_or_foreign_folder_is_refused(datasets: dict[str, str], tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"manifest\.json: no such file"):
+    with pytest.raises(InputError, match="must be a finished dataset; it has no manifest"):
         compare_datasets(datasets["a"], str(tmp_path))

@@ -226,5 +226,5 @@ def test_what_needs_pictures_says_that_the_dataset_was_made_without_and_advises_
 
 
 def test_a_folder_that_is_no_dataset_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no such file"):
+    with pytest.raises(InputError, match="it has no manifest"):
         run_controls(str(tmp_path))

@@ -157,7 +157,7 @@ def test_as_a_prefect_flow_the_stages_are_tasks_and_the_bytes_are_the_same(runs)
 def test_a_flow_that_fails_ends_like_the_command_without_prefect(runs):
     assert (runs["plain"]["wrong"], runs["plain"]["broken"]) == (2, 3)
     wrong, broken = (line for line in runs["said"].splitlines() if not line.startswith("clips "))
-    assert wrong.startswith("musync: ") and "manifest.json: no such file" in wrong
+    assert wrong.startswith("musync: ") and "it has no manifest.json" in wrong
     assert "a defect of muSync" in broken and "KeyError: 'clips'" in broken
 
 
