@@ -1,12 +1,14 @@
 """Overhead of the pipeline: wall and processor time of a run compared with those of its clips."""
 
+import argparse
 import resource
-import sys
 import tempfile
 import time
 from pathlib import Path
 from typing import Any
 
+from benchmarks.side_by_side import print_rows
+from flows.cli import run_to_end
 from flows.making.generate import generate_dataset
 
 WORKERS = 2
@@ -85,7 +87,12 @@ def _count_processor_time() -> tuple[float, float]:
     return own.ru_utime + children.ru_utime, own.ru_stime + children.ru_stime
 
 
+def run_benchmark() -> None:
+    """Measure the grid that the command line names."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.pipeline")
+    parser.add_argument("grid", nargs="?", default="demo", help="grid file, or the name of one that ships")
+    print_rows(measure_rows(parser.parse_args().grid))
+
+
 if __name__ == "__main__":
-    for row in measure_rows(*sys.argv[1:2]):
-        ratio = "" if row["ratio"] is None else f"{row['ratio']:.3f} of {row['peer']}"
-        print(f"{row['name']:36} {row['value']:10.3f} {row['unit']:12} {ratio}")
+    run_to_end(run_benchmark)

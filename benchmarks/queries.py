@@ -4,8 +4,8 @@
 only the columns that the questions need, which is kind to pandas. SQLite's table too, and it has an index of clips.
 """
 
+import argparse
 import sqlite3
-import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -17,7 +17,10 @@ import pandas as pd
 import yaml
 
 import musync
+from benchmarks.side_by_side import print_rows
+from flows.cli import run_to_end
 from flows.making.generate import generate_dataset
+from tasks.errors import InputError
 
 CLIPS = 1000
 LEVELS = 10
@@ -170,7 +173,21 @@ def _measure_time(call: Callable[[], Any]) -> tuple[float, float, Any]:
     return time.perf_counter() - clock, time.process_time() - processor, result
 
 
+def run_benchmark() -> None:
+    """Ask about as many clips as the command line names, and print a row for each question and tool."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.queries")
+    parser.add_argument(
+        "clips",
+        type=int,
+        nargs="?",
+        default=CLIPS,
+        help="number of clips of one second, rounded up to hundreds",
+    )
+    clips = parser.parse_args().clips
+    if clips < 1:
+        raise InputError(f"clips must be 1 or more; it is {clips}")
+    print_rows(measure_rows(clips))
+
+
 if __name__ == "__main__":
-    for row in measure_rows(int(sys.argv[1]) if len(sys.argv) > 1 else CLIPS):
-        ratio = "" if row["ratio"] is None else f"{row['ratio']:.3f} of {row['peer']}"
-        print(f"{row['name']:28} {row['value']:10.4f} {row['unit']:8} {ratio}")
+    run_to_end(run_benchmark)

@@ -1,6 +1,6 @@
 """Does the weather one sees grow with the weather that falls? Image statistics, by street, branch and seed."""
 
-import sys
+import argparse
 import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from catalogs.grids import load_grid
+from flows.cli import run_to_end
 from flows.making.catalogue import load_catalogue
 from flows.making.clip import frame_rows, render_frames, rig_of
 from flows.making.driving import simulate_drive
@@ -77,11 +78,18 @@ def _measure_clips(scene: str, seed: int) -> tuple[dict[str, float], dict[str, d
     return rates, values
 
 
-if __name__ == "__main__":
-    for row in measure_rows(tuple(sys.argv[1:]) or ("street",)):
+def run_benchmark() -> None:
+    """Rank the levels of the scenes that the command line names, and print each row as it comes."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.severity")
+    parser.add_argument("scene", nargs="*", default=["street"], help="scene folder, or street")
+    for row in measure_rows(tuple(parser.parse_args().scene)):
         levels = " ".join(f"{value:.4f}" for value in row["values"])
         print(
             f"{row['scene']:8} seed {row['seed']} {row['branch']} {row['statistic']:17} rho {row['spearman']:+.2f}"
             f" adjacent {row['adjacent']:.2f}  {levels}",
             flush=True,
         )
+
+
+if __name__ == "__main__":
+    run_to_end(run_benchmark)
