@@ -1,4 +1,4 @@
-"""What the terminal shows of results on measured data: narrow tables; the files hold every figure."""
+"""Results on measured data, shortened to narrow tables for the terminal; the files hold every figure."""
 
 from typing import Any
 
@@ -24,13 +24,13 @@ def shorten_import(result: dict[str, Any]) -> dict[str, Any]:
 
 
 def _shorten_signal(row: dict[str, Any], noted: bool) -> dict[str, Any]:
-    def join(low: float | None, high: float | None) -> str | None:
+    def format_range(low: float | None, high: float | None) -> str | None:
         return None if low is None else f"{low:.6g} to {high:.6g}"
 
     return {
         **{key: row[key] for key in ("signal", "unit", "samples", "rate_hz")},
-        "time_s": join(row["start_s"], row["end_s"]),
-        "range": join(row["lowest"], row["highest"]),
+        "time_s": format_range(row["start_s"], row["end_s"]),
+        "range": format_range(row["lowest"], row["highest"]),
         **({"note": row["note"]} if noted else {}),
     }
 

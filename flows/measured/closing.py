@@ -12,14 +12,9 @@ from catalogs.effects import LIBRARY_FILE, load_effects
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_tolerances, load_vehicle, vehicle_content
 from flows.measured.closing_ledger import record_reading
+from flows.measured.friction_pulls import compute_friction_pulls, tell_friction_pulls
 from flows.measured.grown_vehicle import grown_vehicle, tyre_beside
-from flows.measured.residuals import (
-    compute_friction_pulls,
-    compute_residual_rmse,
-    find_pulled_runs,
-    predict_runs,
-    say_friction_pulls,
-)
+from flows.measured.residuals import compute_residual_rmse, predict_runs
 from flows.measured.searches import SEARCHES, judge_campaign
 from flows.measured.verdict_report import write_verdict_page
 from flows.store.outputs import Outputs
@@ -148,24 +143,6 @@ def tell_search(trace: Trace | JointTrace) -> dict[str, Any]:
         "starts_agreeing": {"agreeing": trace.agreeing[0], "of": trace.agreeing[1]},
         "residual_rmse": compute_residual_rmse(held_out),
     }  # fmt: skip
-
-
-def tell_friction_pulls(result: dict[str, Any], tolerance: float) -> dict[str, Any]:
-    """Return a verdict in plain values with the runs whose tyres do not grip as the surface mapping says, if any.
-
-    They are a reason of every verdict, and part of the first sentence where nothing is named.
-
-    Parameters
-    ----------
-    result : of `verdict_json` and `tell_search`
-    tolerance : one sigma of a run's friction, relative [1]
-    """
-    pulled = find_pulled_runs(result.get("friction_pulls_sigma", {}))
-    if not pulled:
-        return result
-    brief, full = say_friction_pulls(pulled, tolerance)
-    lead = f" {brief}" if result["verdict"] == "NOTHING" else ""
-    return result | {"sentence": result["sentence"] + lead, "reasons": [*result["reasons"], full]}
 
 
 def split_of(campaign: Campaign) -> dict[str, Any]:

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from tasks.campaign.campaign import CHANNELS
 from tasks.identification.decision.verdict import Trace
-from tasks.identification.decision.words import join_phrases
 from tasks.identification.inference.forward import RunModel, predict_channels
 from tasks.identification.inference.hypothesis import compose_parameters
 from tasks.identification.joint.fit import lead_offsets
@@ -18,11 +17,6 @@ from tasks.vehicle.effects.table import EFFECT_TABLE
 
 MODELS = ("frozen", "retuned", "after")
 """Models of a verdict: the vehicle file's, with its own numbers fitted, and with what was found."""
-
-FRICTION_OFFSET = 1
-"""Place of friction among a run's own offsets (`tasks.identification.inference.evidence.move_by_offsets`)."""
-TOLD_PULL = 2.5
-"""Pull of a run's friction from which it is told, in tolerances: one such run in 80 has it by chance [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,45 +104,3 @@ def compute_residual_rmse(runs: Sequence[RunPrediction]) -> dict[str, dict[str, 
         }
         for run in runs
     }
-
-
-def compute_friction_pulls(trace: Trace) -> dict[str, float]:
-    """Return by training run how far its friction is pulled from the surface mapping, in its tolerances [1].
-
-    It is 0 for a run that does not reach its limit of friction.
-
-    Parameters
-    ----------
-    trace : the verdict and what it stands on
-    """
-    runs, tolerance = trace.end.evidence.train, trace.end.evidence.tolerances.friction
-    return {
-        run.model.run.name: float(offsets[FRICTION_OFFSET] / tolerance)
-        for run, offsets in zip(runs, trace.end.base.offsets, strict=True)
-    }
-
-
-def find_pulled_runs(pulls: Mapping[str, float]) -> dict[str, float]:
-    """Return the runs whose friction is pulled by more than `TOLD_PULL` tolerances, with their pull [1].
-
-    Parameters
-    ----------
-    pulls : of `compute_friction_pulls`
-    """
-    return {name: pull for name, pull in pulls.items() if abs(pull) > TOLD_PULL}
-
-
-def say_friction_pulls(pulled: Mapping[str, float], tolerance: float) -> tuple[str, str]:
-    """Return in brief and in full that runs pull their friction.
-
-    Parameters
-    ----------
-    pulled : of `find_pulled_runs`, at least one
-    tolerance : one sigma of a run's friction, relative [1]
-    """
-    listed = join_phrases(f"{name} by {pull:+.1f}" for name, pull in pulled.items())
-    return (
-        f"But in {join_phrases(pulled)} the tyres do not grip as the surface mapping says.",
-        f"runs at their limit pull friction by more than {TOLD_PULL:g} of its tolerances ({tolerance:.1%} each):"
-        f" {listed}; what is named does not explain it, and stops at the limit are predicted no better",
-    )

@@ -8,7 +8,8 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from flows.measured.closing_error_rates import tell_error_rates
-from flows.measured.residuals import find_pulled_runs, predict_runs
+from flows.measured.friction_pulls import find_pulled_runs
+from flows.measured.residuals import predict_runs
 from flows.measured.verdict_figures import (
     find_alike_numbers,
     format_plain_unit,
@@ -97,7 +98,7 @@ def find_next_steps(result: Mapping[str, Any], campaign: Campaign) -> list[tuple
     elif result["verdict"] == "NOTHING":
         wanted = (
             "stops at the limit of friction, from several speeds on each surface,"
-            if find_pulled_runs(result.get("friction_pulls_sigma", {}))
+            if find_pulled_runs(result)
             else "runs that reach further than these, faster and harder,"
         )
         steps.append((f"Record {wanted} and import them with the others:", IMPORT))

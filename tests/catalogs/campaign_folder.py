@@ -62,7 +62,7 @@ def write_campaign(folder: Path) -> Path:
 
 
 def list_problems(folder: Path) -> str:
-    """What reading the folder says is wrong with it."""
+    """Return the problems that reading the folder tells."""
     with pytest.raises(InputError) as caught:
         read_campaign(folder)
     return str(caught.value)

@@ -23,7 +23,7 @@ CAMERA_ONLY = replace(THRESHOLDS, pitch_relative_error=0.20, progress_rmse_m=Non
 
 
 @pytest.fixture(scope="module")
-def recovered(hump_clip: Clip) -> dict[str, RecoveredMotion]:
+def recovered_motions(hump_clip: Clip) -> dict[str, RecoveredMotion]:
     with_depth = (
         hump_clip.frames,
         hump_clip.depth,
@@ -53,13 +53,17 @@ CONTROLS = {
 @pytest.mark.parametrize("method", ["pnp", "photometric", "essential"])
 class TestVerdictOnFrames:
     def judge(
-        self, recovered: dict[str, RecoveredMotion], method: str, clip: Clip, pitch: NDArray[np.float64]
+        self,
+        recovered_motions: dict[str, RecoveredMotion],
+        method: str,
+        clip: Clip,
+        pitch: NDArray[np.float64],
     ) -> PoseVerdict:
         limits = CAMERA_ONLY if method == "essential" else THRESHOLDS
-        return judge_pose(recovered[method], pitch, clip.station, limits)
+        return judge_pose(recovered_motions[method], pitch, clip.station, limits)
 
-    def test_the_true_telemetry_passes(self, recovered, method, hump_clip) -> None:
-        verdict = self.judge(recovered, method, hump_clip, hump_clip.pitch)
+    def test_the_true_telemetry_passes(self, recovered_motions, method, hump_clip) -> None:
+        verdict = self.judge(recovered_motions, method, hump_clip, hump_clip.pitch)
         assert verdict.passed, verdict.reasons
         assert verdict.pitch_relative_error < 0.05 and verdict.pitch_correlation > 0.999
         assert verdict.claimed_pitch_rms_deg > 0.4
@@ -67,9 +71,9 @@ class TestVerdictOnFrames:
 
     @pytest.mark.parametrize("control", CONTROLS)
     def test_telemetry_out_of_step_with_the_pictures_fails(
-        self, recovered, method, hump_clip, control
+        self, recovered_motions, method, hump_clip, control
     ) -> None:
-        verdict = self.judge(recovered, method, hump_clip, CONTROLS[control](hump_clip.pitch))
+        verdict = self.judge(recovered_motions, method, hump_clip, CONTROLS[control](hump_clip.pitch))
         assert not verdict.passed and verdict.reasons
 
 

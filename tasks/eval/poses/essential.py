@@ -232,9 +232,8 @@ def _track_points(
     trusted: bool,
 ) -> PointPairs:
     tracker = Tracker(settings.window, levels, settings.forward_backward)
-    if (
-        trusted
-    ):  # a longer step, over which pictures differ in scale: they are evened as one camera sees the other
+    if trusted:
+        # over a longer step pictures differ in scale: they are evened as one camera sees the other
         pictures = (key.grey, key.corners), (later.grey, later.corners)
         evening = tracker._replace(least_contrast=settings.least_contrast)
         return track_pairs(*pictures, key.inverse_depth, predicted, K, evening)

@@ -29,16 +29,16 @@ class Car:
         )
         self.slave.instantiate(callbacks=callbacks)
         self.callbacks, self.time = callbacks, 0.0
-        self.start(**given)
+        self.begin_drive(**given)
 
-    def start(self, **given: float) -> None:
+    def begin_drive(self, **given: float) -> None:
         self.time = 0.0
         self.slave.setupExperiment(startTime=0.0)
         self.slave.enterInitializationMode()
-        self.set(**given)
+        self.set_inputs(**given)
         self.slave.exitInitializationMode()
 
-    def set(self, **given: float) -> None:
+    def set_inputs(self, **given: float) -> None:
         for name, value in given.items():
             place, kind = self.places[name]
             setter = {"Real": self.slave.setReal, "Boolean": self.slave.setBoolean}.get(
@@ -46,9 +46,9 @@ class Car:
             )
             setter([place], [value])
 
-    def step(self, length: float) -> None:
+    def take_step(self, length: float) -> None:
         self.slave.doStep(self.time, length)
         self.time = round(self.time + length, 9)
 
-    def row(self) -> np.ndarray:
+    def read_row(self) -> np.ndarray:
         return np.array(self.slave.getReal([self.places[name][0] for name in COLUMNS]))

@@ -111,15 +111,15 @@ def test_a_stop_on_snow_is_the_own_rollout(drive, vehicle, hazard):
         initial_speed=9.0, hold_speed=1, road_feature_center=hazard.center_m,
         road_feature_height=hazard.height_m, **SNOW,
     )  # fmt: skip
-    rows = [car.row()]
+    rows = [car.read_row()]
     for n in range(3000):
-        car.set(
+        car.set_inputs(
             brake_pressure=compute_brake_pressure((n + 1) * STEP - 0.2, command.profile),
             hold_speed=int(n < 400),
         )
-        car.step(STEP)
+        car.take_step(STEP)
         if n % 2:
-            rows.append(car.row())
+            rows.append(car.read_row())
     assert own.columns["speed"][-1] < 7.0
     compared = np.delete(np.array(rows), 200, axis=0)
     for name, column in zip(COLUMNS, compared.T, strict=True):
@@ -136,10 +136,10 @@ def test_held_inputs_give_the_same_at_any_step_and_equal_a_trace_that_holds_them
         car = drive(initial_speed=15.0, **SNOW)
         runs[length] = []
         for pressure in pressures:
-            car.set(brake_pressure=pressure)
+            car.set_inputs(brake_pressure=pressure)
             for _ in range(round(0.01 / length)):
-                car.step(length)
-            runs[length].append(car.row())
+                car.take_step(length)
+            runs[length].append(car.read_row())
     np.testing.assert_array_equal(runs[0.001], runs[0.01])
     trace = np.concatenate([[0.0], np.repeat(pressures, 20)])
     own = simulate(
@@ -157,19 +157,19 @@ def test_a_road_told_under_the_axles_is_the_road_feature(drive, vehicle):
     )
     rows = []
     for _ in range(900):
-        known.step(0.001)
-        rows.append(known.row())
+        known.take_step(0.001)
+        rows.append(known.read_row())
     told, seen = drive(initial_speed=9.0), []
     hazard = RoadHazard(center_m=3.0, length_m=3.6, height_m=0.08)
     for _ in range(900):
-        front = told.row()[COLUMNS.index("station")]
+        front = told.read_row()[COLUMNS.index("station")]
         for axle, s in (("f", front), ("r", front - vehicle.wheelbase)):
-            told.set(**{
+            told.set_inputs(**{
                 f"ground_height_{axle}": float(road_elevation(np.array([s]), hazard)[0]),
                 f"ground_slope_{axle}": float(road_slope(np.array([s]), hazard)[0]),
             })  # fmt: skip
-        told.step(0.001)
-        seen.append(told.row())
+        told.take_step(0.001)
+        seen.append(told.read_row())
     pitch, heave = COLUMNS.index("pitch"), COLUMNS.index("heave")
     for place in (pitch, heave):
         one, other = np.array(rows)[:, place], np.array(seen)[:, place]
@@ -178,37 +178,43 @@ def test_a_road_told_under_the_axles_is_the_road_feature(drive, vehicle):
 
 def test_a_kept_state_is_gone_back_to_and_a_reset_begins_anew(drive):
     car = drive(initial_speed=12.0, brake_pressure=1.0)
-    first = car.row()
-    car.step(0.1)
+    first = car.read_row()
+    car.take_step(0.1)
     state, time = car.slave.getFMUState(), car.time
-    car.step(0.2)
-    once = car.row()
+    car.take_step(0.2)
+    once = car.read_row()
     bytes_of_it = car.slave.serializeFMUState(state)
     car.slave.setFMUState(car.slave.deserializeFMUState(bytes_of_it))
     car.time = time
-    car.step(0.2)
-    np.testing.assert_array_equal(car.row(), once)
+    car.take_step(0.2)
+    np.testing.assert_array_equal(car.read_row(), once)
     car.slave.reset()
-    car.start(initial_speed=12.0, brake_pressure=1.0)
-    np.testing.assert_array_equal(car.row(), first)
+    car.begin_drive(initial_speed=12.0, brake_pressure=1.0)
+    np.testing.assert_array_equal(car.read_row(), first)
 
 
 @pytest.mark.parametrize(
     ("act", "sentence"),
     [
-        (lambda car: car.step(0.0013), "the step must be a whole multiple of 0.0005 s; it is 0.0013 s"),
+        (lambda car: car.take_step(0.0013), "the step must be a whole multiple of 0.0005 s; it is 0.0013 s"),
         (
             lambda car: car.slave.doStep(1.0, 0.001),
             "must begin where the last one ended, at 0 s; it begins at 1 s",
         ),
-        (lambda car: car.set(road_friction=0.0), "road_friction must be a number within 0.01 to 2; it is 0"),
         (
-            lambda car: car.set(brake_pressure=float("nan")),
+            lambda car: car.set_inputs(road_friction=0.0),
+            "road_friction must be a number within 0.01 to 2; it is 0",
+        ),
+        (
+            lambda car: car.set_inputs(brake_pressure=float("nan")),
             "brake_pressure must be a number within 0 to 50; it is",
         ),
-        (lambda car: car.set(engine_torque=float("inf")), "engine_torque must be a number"),
-        (lambda car: car.set(initial_speed=30.0), "initial_speed is a parameter: it is set before the start"),
-        (lambda car: car.set(speed=30.0), "only parameters and inputs are set"),
+        (lambda car: car.set_inputs(engine_torque=float("inf")), "engine_torque must be a number"),
+        (
+            lambda car: car.set_inputs(initial_speed=30.0),
+            "initial_speed is a parameter: it is set before the start",
+        ),
+        (lambda car: car.set_inputs(speed=30.0), "only parameters and inputs are set"),
     ],
 )
 def test_what_is_wrong_is_an_error_with_a_sentence_and_the_drive_goes_on(drive, act, sentence):
@@ -216,7 +222,7 @@ def test_what_is_wrong_is_an_error_with_a_sentence_and_the_drive_goes_on(drive, 
     with pytest.raises(Exception, match="status 3"):
         act(car)
     assert len(car.said) == 1 and sentence in car.said[0]
-    car.step(0.001)
+    car.take_step(0.001)
 
 
 def test_a_library_shows_the_standards_functions_alone_so_that_two_cars_can_share_a_process(fmu, tmp_path):
@@ -273,10 +279,10 @@ def test_every_vehicle_of_the_catalogue_stops_in_every_weather_as_in_its_own_rol
             tmp_path / "car.fmu", tmp_path / weather, weather=number, road_friction=0.37, brake_pressure=2.0
         )
         for _ in range(300):
-            car.step(0.01)
+            car.take_step(0.01)
         own = simulate(
             vehicle, compute_surface_response(vehicle, weather, 0.37), make_trace_input(np.array([2.0]), STEP),
             Conditions(), Recording(samples=2, interval=3.0, substeps=6000), initial_speed=20.0,
         )  # fmt: skip
-        np.testing.assert_allclose(car.row(), own.history[1], rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(car.read_row(), own.history[1], rtol=1e-9, atol=1e-9)
         car.slave.freeInstance()

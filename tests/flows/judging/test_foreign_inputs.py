@@ -1,4 +1,4 @@
-"""What a video is judged with: a camera that can be, and a claim of a drive that can be."""
+"""Inputs of a judged video: a camera or a claim that cannot be is refused."""
 
 from pathlib import Path
 

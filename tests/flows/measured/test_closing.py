@@ -16,10 +16,10 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_provenance
 from flows.cli import app
 from flows.making.plan import make_plan
-from flows.measured.closing import close_loop, tell_friction_pulls, verdict_json
+from flows.measured.closing import close_loop, verdict_json
 from flows.measured.closing_ledger import record_reading
+from flows.measured.friction_pulls import FRICTION_OFFSET, find_pulled_runs, tell_friction_pulls
 from flows.measured.grown_vehicle import grown_vehicle
-from flows.measured.residuals import FRICTION_OFFSET, find_pulled_runs
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS, SESSION, Campaign
 from tasks.campaign.planned_runs import RunPlan
 from tasks.identification.benchmark import TOLERANCES, make_synthetic_campaign
@@ -111,9 +111,8 @@ def test_a_lag_in_the_data_is_named_with_its_value_and_better_predictions(closed
 
 def test_runs_that_grip_as_the_mapping_says_pull_no_friction(closed: Path) -> None:
     verdict = json.loads((closed / "verdict.json").read_text())
-    pulls = verdict["friction_pulls_sigma"]
-    assert list(pulls) == json.loads((closed / "split.json").read_text())["train"]
-    assert find_pulled_runs(pulls) == {}
+    assert list(verdict["friction_pulls_sigma"]) == json.loads((closed / "split.json").read_text())["train"]
+    assert find_pulled_runs(verdict) == {}
 
 
 @pytest.mark.parametrize(("kind", "in_the_lead"), [("NOTHING", True), ("FOUND", False)])
