@@ -92,7 +92,7 @@ def test_at_an_end_of_the_interval_the_best_fit_is_worse_by_the_quantile(
             # the other parameter on a grid, not by the optimiser under test
             k = 1 - j
             reach = 1.5 * np.ptp(np.array(compute_curvature_interval(candidate))[:, k])
-            near = candidate.fitted.values[k] + np.linspace(-reach, reach, 7)
+            near = candidate.fitted.values[k] + np.linspace(-reach, reach, 13)
             rises = []
             for other in near:
                 pair = np.array([ends[0], other] if j == 0 else [other, ends[1]])

@@ -58,13 +58,17 @@ def evidence_of(theta: np.ndarray, *names: str) -> Evidence:
     )
 
 
-def test_a_run_that_forks_at_the_abs_threshold_is_told_from_sound_ones() -> None:
+def test_a_run_that_depends_on_the_step_is_told_from_sound_ones() -> None:
+    """Light wheels and an anti-lock band a quarter as wide: steps of 2 ms swing the wheels through it."""
     forked = load_decision_rules().forked_misfit
-    changes = [
-        compute_step_misfit(prepare_run(make_planned_run(drive, "run"), VEHICLE, SURFACE), np.zeros(7), NOISE)
-        for drive in (RICH[0], RICH[2], RICH[11], RICH[19], replace(RICH[19], speed=12.0, peak=3.0))
-    ]
-    assert max(changes[:4]) < 0.5 * forked < 10.0 * forked < changes[4]
+    hard = replace(RICH[2], speed=12.0, peak=12.0)
+    narrow = replace(VEHICLE, abs_release_width=0.05, wheel_inertia_f=0.3 * VEHICLE.wheel_inertia_f)
+    sound, coarse = (
+        [compute_step_misfit(prepare_run(make_planned_run(drive, "run"), car, SURFACE), np.zeros(7), NOISE)
+         for drive in drives]
+        for car, drives in ((VEHICLE, (RICH[0], RICH[2], RICH[11], RICH[19], hard)), (narrow, (hard,)))
+    )  # fmt: skip
+    assert max(sound) < 0.5 * forked < 10.0 * forked < min(coarse)
 
 
 def test_a_fall_counts_only_beyond_the_doubt() -> None:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from catalogs.vehicles import load_vehicle
 from tasks.errors import InputError
 from tasks.surface.road_profile import RoadHazard
 from tasks.vehicle.brake import compute_brake_pressure
@@ -43,6 +44,23 @@ def test_a_command_and_its_pressure_at_the_samples_drive_alike(run):
     for effects in ({}, EFFECTS):
         commanded, measured = run(effects=effects), run(make_trace_input(trace, 0.01), effects=effects)
         np.testing.assert_allclose(measured.history, commanded.history, rtol=1e-9, atol=1e-9)
+
+
+def test_a_stop_far_beyond_the_grip_under_noisy_pressure_hangs_neither_on_the_step_nor_on_rounding():
+    """The anti-lock band of this car is 2 % of slip wide; within 2 ms its brakes swing the wheel by more."""
+    car, noise = load_vehicle("bmw-m8"), np.random.default_rng(3).normal(size=170)
+    pressure = np.clip((np.arange(170) - 10) / 90, 0, 1) * 12 * (1 + 0.1 * noise)
+
+    def wheel_speed(substeps: int, friction: float = 0.82):
+        stop = simulate(
+            car, compute_surface_response(car, "dry", friction), make_trace_input(pressure, 0.01), Conditions(),
+            Recording(samples=170, interval=0.01, substeps=substeps), initial_speed=19.0,
+        )  # fmt: skip
+        return stop.column("wheel_speed_f")[stop.column("speed") > 2]
+
+    found = wheel_speed(5)
+    assert np.abs(found - wheel_speed(80)).max() < 0.2
+    assert np.abs(found - wheel_speed(5, 0.82 * (1 + 1e-12))).max() < 1e-9
 
 
 @pytest.mark.parametrize(("axle", "sign"), [("f", -1.0), ("r", 1.0)])

@@ -54,7 +54,9 @@ def compute_axle_slope(
 ) -> AxleSlope:
     """Return the derivatives of speed and wheel rate through the slip of one axle.
 
-    The stiff pad friction of a locked wheel counts as soon as the wheel can lock within the step.
+    What is stiff counts as soon as the wheel can reach it within the step: the pad friction of a locked wheel, and the
+    anti-lock brake, which takes all torque away within a few percent of slip. A wheel that is only met there after a
+    step has swung through it, and swings on; its motion then hangs on rounding.
 
     Parameters
     ----------
@@ -71,15 +73,20 @@ def compute_axle_slope(
     )
     following = compute_relaxation_rate(motion.speed, wheels.speed_floor, chassis.effects.relaxation_length)
     force, torque, locking = 0.0, 0.0, 0.0
+    change = step * (ports.lever * ports.tyre_force - ports.brake_torque) / axle.inertia
     if abs(ports.slip) < 1.0:
         share = compute_stick_share(motion.speed, chassis.effects)
         load = ports.ground.load
         force = compute_effective_slope(abs(ports.force_slip), load, share, tyre, chassis.effects) * load
-        if 0.0 < ports.abs_scale < 1.0:
+        width = wheels.release_width * tyre.target_slip
+        ahead = ports.slip + slip_per_wheel * change
+        enters = (
+            max(ports.slip, ahead) > tyre.target_slip and min(ports.slip, ahead) < tyre.target_slip + width
+        )
+        if enters and motion.speed >= chassis.effects.abs_cutoff:
             turning = compute_lock_share(omega, chassis.lock_speed)
-            torque = -ports.full_torque * turning / (wheels.release_width * tyre.target_slip)
-    change = step * abs(ports.lever * ports.tyre_force - ports.brake_torque) / axle.inertia
-    if abs(omega) < chassis.lock_speed + change:
+            torque = -ports.full_torque * turning / width
+    if abs(omega) < chassis.lock_speed + abs(change):
         locking = (ports.full_torque * ports.abs_scale + abs(ports.shaft_torque)) / chassis.lock_speed
     slip_share, pushed, followed = 0.0, 0.0, 1.0
     if following > 0.0:
