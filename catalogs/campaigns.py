@@ -165,7 +165,8 @@ def _split_problems(names: Sequence[str], train: Sequence[str], held_out: Sequen
         for name in sorted({*train, *held_out} - set(names))
     ]
     problems += [
-        f"split {part} needs at least one run; it has none"
+        f"split {part} needs at least one run; it has none: list runs there in campaign.yaml, or give them"
+        f" `part: {part}` in the channel map and import again"
         for part, runs in (("train", train), ("held_out", held_out))
         if not runs
     ]
