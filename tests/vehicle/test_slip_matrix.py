@@ -1,10 +1,15 @@
-"""The slip of a tyre with a relaxation length is eliminated from the implicit step: the dense system says the same."""
+"""The stiff part of a step: the eliminated slip solves the dense system, the anti-lock band is seen ahead."""
 
 import numpy as np
 import pytest
 
-from tasks.vehicle.model.slip_matrix import AxleSlope, solve_slip
+from tasks.vehicle.effects.grown import apply_effects
+from tasks.vehicle.model.axle_ports import AxlePorts
+from tasks.vehicle.model.chassis import Conditions, build_chassis
+from tasks.vehicle.model.slip_matrix import AxleSlope, compute_axle_slope, solve_slip
 from tasks.vehicle.model.states import AxleMemory, Memory, Motion
+from tasks.vehicle.model.vertical_ports import Ground
+from tasks.vehicle.parameters import compute_surface_response
 
 STEP_GAMMA = 3e-4
 AXLES = (
@@ -59,3 +64,46 @@ def test_without_a_relaxation_length_only_speed_and_wheels_are_coupled() -> None
     motion, after = solve_slip(Motion(17.0, *given), memory, *slopes, STEP_GAMMA)
     np.testing.assert_allclose([motion.speed, motion.omega_f, motion.omega_r], wanted, rtol=1e-12)
     assert after == memory
+
+
+@pytest.mark.parametrize(
+    ("slip", "torque", "cut_off", "counts"),
+    [
+        (0.5, 9000.0, 0.0, True),  # below the band, and the brake carries the wheel into it
+        (0.5, 2500.0, 0.0, False),  # below, and it stays below
+        (1.1, 2500.0, 0.0, True),  # inside
+        (1.3, 0.0, 0.0, True),  # above, and the tyre turns the wheel back into it
+        (1.3, 9000.0, 0.0, False),  # above, and away from it
+        (0.5, 9000.0, 30.0, False),  # slower than the anti-lock brake works
+    ],
+)
+def test_the_anti_lock_brake_counts_where_a_step_can_reach_its_band(vehicle, slip, torque, cut_off, counts):
+    """Beside the same wheel without pressure, the brake's slope slows the wheel down, or is not there."""
+    car = apply_effects(vehicle, {"abs_cutoff": cut_off})
+    surface = compute_surface_response(car, "dry", 0.82)
+    chassis, load, speed = build_chassis(car, surface, Conditions()), 7000.0, 20.0
+    kappa = slip * surface.tyre.target_slip
+    ports, released = (
+        AxlePorts(
+            Ground(0.0, 0.0, load),
+            kappa,
+            kappa,
+            0.8 * load,
+            1.0,
+            full,
+            torque,
+            0.0,
+            0.0,
+            car.wheel_radius,
+            0.0,
+        )
+        for full in (9000.0, 0.0)
+    )
+    omega = (1.0 - kappa) * speed / car.wheel_radius
+    motion = Motion(0.0, speed, omega, omega)
+    pressed, free = (
+        compute_axle_slope(p, motion, omega, 0.002, chassis.wheels.front, chassis, surface.tyre)
+        for p in (ports, released)
+    )
+    assert (pressed.wheel_by_wheel < free.wheel_by_wheel) == counts
+    assert (pressed == free) != counts
