@@ -19,7 +19,7 @@ class Effect:
     effect_class : effect, retune or sensor
     variable : variable that it depends on
     enters : its term in words and symbols
-    says : the finding in plain words, with its numbers in braces: {lag}, {fade:percent}, {mass:share}
+    says : the finding in plain words, with its numbers in braces: {lag}, {anti_dive:percent}, {mass:share}, {fade:fall}
     parameters : one or two rows of the table; all 0 (or the first 0) is the plain model
     """
 
@@ -52,11 +52,19 @@ class Effect:
 
 
 class _Said(float):
-    """A number as a sentence says it: with two digits, as ``percent``, or as a ``share`` above or below another."""
+    """A number in a sentence: alone, as ``percent``, as a ``share`` above or below another, or as a ``fall``."""
 
     def __format__(self, spec: str) -> str:
+        percent = 100.0 * float(self)
         if spec == "percent":
-            return f"{float(100.0 * self):.2g} %"
+            return f"{_round(percent)} %"
         if spec == "share":
-            return f"{float(abs(100.0 * self)):.2g} % {'above' if self >= 0.0 else 'below'}"
-        return f"{float(self):.2g}" if abs(self) < 100.0 else f"{float(self):.0f}"
+            return f"{_round(abs(percent))} % {'above' if percent >= 0.0 else 'below'}"
+        if spec == "fall":
+            return f"{'falls' if percent >= 0.0 else 'grows'} by {_round(abs(percent))} %"
+        return _round(float(self))
+
+
+def _round(number: float) -> str:
+    """Return a number with two digits, or all those before the point: 0.056, 5.6, 56, 559."""
+    return f"{number:.2g}" if abs(number) < 99.5 else f"{number:.0f}"

@@ -1,5 +1,7 @@
 """Reasons of a joint verdict are sentences, in the plain words of the catalogue."""
 
+import pytest
+
 from catalogs.effects import load_effects
 from catalogs.joint_numbers import load_joint_numbers
 from tasks.identification.decision.answer import NamedEffect, Parameter
@@ -37,8 +39,26 @@ def test_a_resistance_is_told_from_anything_else_by_coasting():
 
 def test_an_effect_is_said_with_its_first_number_alone_and_the_other_at_its_start() -> None:
     pads = next(effect for effect in load_effects() if effect.name == "pad_friction_speed")
-    assert pads.say({"pad_speed": 0.02}) == "the pads lose 2 % of their friction per m/s above 15 m/s"
+    assert pads.say({"pad_speed": 0.02}) == "the pads' friction falls by 2 % per m/s above 15 m/s"
     assert "above 20 m/s" in pads.say({"pad_speed": 0.02, "pad_speed_reference": 20.0})
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("brake_fade", 0.06, "the brakes' torque falls by 6 % per 100 K of disc temperature"),
+        ("brake_fade", -0.035, "the brakes' torque grows by 3.5 % per 100 K of disc temperature"),
+        ("load_sensitivity", -0.2, "friction grows by 20 % where the wheel load doubles"),
+        ("sensor_gravity_leak", 0.996, "the accelerometer feels 100 % of the gravity that pitch turns into its axis"),
+        ("retuned_pressure_gain", 1.25, "the brakes give 125 % above the torque of the vehicle file"),
+        ("pad_drag", 99.7, "pads that rub hold the wheels back with 100 N m"),
+    ],
+)  # fmt: skip
+def test_a_number_is_said_with_its_direction_and_without_an_exponent(
+    name: str, value: float, said: str
+) -> None:
+    effect = next(effect for effect in load_effects() if effect.name == name)
+    assert effect.say({effect.parameters[0].name: value}) == said
 
 
 def test_a_number_is_said_as_the_effect_that_it_is_alone() -> None:
