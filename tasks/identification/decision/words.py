@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from tasks.identification.decision.answer import ChannelError, NamedEffect
 from tasks.identification.decision.attribution import Candidate
-from tasks.vehicle.effects.library import Effect
+from tasks.vehicle.effects.library import Effect, say_number
 
 
 def say_effect(effect: NamedEffect, library: Sequence[Effect]) -> str:
@@ -55,7 +55,8 @@ def tell_verdict(
         text += f", or {choice}, which these runs cannot tell apart"
     figures = {"speed": error["speed"], **manoeuvres}
     moved = join_phrases(
-        f"of the {name.replace('_', ' ')} from {e.frozen:.2g} (re-tuned {e.retuned:.2g}) to {e.after:.2g} {e.unit}"
+        f"of the {name.replace('_', ' ')} from {say_number(e.frozen)} (re-tuned {say_number(e.retuned)}) to"
+        f" {say_number(e.after)} {e.unit}"
         for name, e in figures.items()
     )
     how = "that takes" if len(told) == 1 else "together they take"

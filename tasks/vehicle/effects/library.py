@@ -51,20 +51,25 @@ class Effect:
         return self.says.format_map({name: _Said(value) for name, value in numbers.items()})
 
 
+def say_number(number: float) -> str:
+    """Return a number as a sentence says it, with two digits or all those before the point: 0.056, 5.6, 56, 559.
+
+    Parameters
+    ----------
+    number : in any unit
+    """
+    return f"{number:.2g}" if abs(number) < 99.5 else f"{number:.0f}"
+
+
 class _Said(float):
     """A number in a sentence: alone, as ``percent``, as a ``share`` above or below another, or as a ``fall``."""
 
     def __format__(self, spec: str) -> str:
         percent = 100.0 * float(self)
         if spec == "percent":
-            return f"{_round(percent)} %"
+            return f"{say_number(percent)} %"
         if spec == "share":
-            return f"{_round(abs(percent))} % {'above' if percent >= 0.0 else 'below'}"
+            return f"{say_number(abs(percent))} % {'above' if percent >= 0.0 else 'below'}"
         if spec == "fall":
-            return f"{'falls' if percent >= 0.0 else 'grows'} by {_round(abs(percent))} %"
-        return _round(float(self))
-
-
-def _round(number: float) -> str:
-    """Return a number with two digits, or all those before the point: 0.056, 5.6, 56, 559."""
-    return f"{number:.2g}" if abs(number) < 99.5 else f"{number:.0f}"
+            return f"{'falls' if percent >= 0.0 else 'grows'} by {say_number(abs(percent))} %"
+        return say_number(float(self))
