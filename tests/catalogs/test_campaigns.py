@@ -196,7 +196,8 @@ def test_one_run_to_learn_from_and_one_to_judge_are_enough(folder: Path) -> None
     change_header(folder, lambda h: h.update(split={"train": NAMES[:5], "held_out": NAMES[5:]}))
     assert len(read_campaign(folder).held_out) == 1
     change_header(folder, lambda h: h.update(split={"train": NAMES, "held_out": []}))
-    assert "split held_out needs at least one run" in list_problems(folder)
+    text = list_problems(folder)
+    assert "split held_out needs at least one run" in text and "`part: held_out` in the channel map" in text
 
 
 def test_a_run_in_both_parts_of_the_split_is_refused(folder: Path) -> None:

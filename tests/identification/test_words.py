@@ -12,6 +12,10 @@ from tasks.identification.decision.verdict import find_pair_to_confirm
 from tasks.identification.decision.words import say_confirmation, say_rejection, tell_verdict
 
 RULES = load_decision_rules()
+FORM = NamedEffect(
+    name="pitch_form", effect_class="form", port="pitch_moment", variable="speed", parameters=(),
+    score=45.6, gain=89.0, inflation=1.6, held_out_gain=0.4, cross_validated_gain=0.0, win_share=0.0,
+)  # fmt: skip
 
 
 def judged(
@@ -44,26 +48,18 @@ def test_without_any_candidate_the_refusal_says_that_nothing_acts_on_the_channel
 
 
 def test_what_only_the_training_runs_show_is_suggested_and_not_named() -> None:
-    suggested = NamedEffect(
-        name="anti_dive_form", effect_class="form", port="pitch_moment", variable="speed", parameters=(),
-        score=45.6, gain=89.0, inflation=1.6, held_out_gain=0.4, cross_validated_gain=0.0, win_share=0.0,
-    )  # fmt: skip
-    told = tell_verdict((), (), (), {}, {}, suggested)
+    told = tell_verdict((), (), (), {}, {}, FORM)
     assert told.startswith("These runs prove nothing")
     assert "the pitch moment depends on speed" in told
     assert tell_verdict((), (), (), {}, {}) == "These runs show nothing that the model lacks."
 
 
 def test_an_error_is_said_without_an_exponent() -> None:
-    form = NamedEffect(
-        name="form", effect_class="form", port="pitch_moment", variable="speed", parameters=(),
-        score=45.6, gain=89.0, inflation=1.6, held_out_gain=0.4, cross_validated_gain=0.0, win_share=0.0,
-    )  # fmt: skip
     error = ChannelError(
         frozen=121.4, retuned=99.7, after=0.056, ci_low=0.0, ci_high=1.0, change_low=-1.0, change_high=0.0, wins=2,
         worst_run="a", unit="m/s",
     )  # fmt: skip
-    told = tell_verdict((form,), (), (), {"speed": error}, {"stopping_distance": replace(error, unit="m")})
+    told = tell_verdict((FORM,), (), (), {"speed": error}, {"stopping_distance": replace(error, unit="m")})
     assert "of the speed from 121 (re-tuned 100) to 0.056 m/s and of the stopping distance from 121" in told
 
 
