@@ -13,7 +13,8 @@ from synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
-from tasks.identification.decision.attribution import cross_validate_candidate, refine_candidates
+from tasks.identification.decision.attribution import refine_candidates
+from tasks.identification.decision.cross_validation import cross_validate_candidate
 from tasks.identification.inference import derivatives
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.derivatives import differentiate_run

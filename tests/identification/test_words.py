@@ -44,7 +44,7 @@ def test_a_refusal_names_the_rule_and_the_figure(candidate: Candidate, says: str
 
 
 def test_without_any_candidate_the_refusal_says_that_nothing_acts_on_the_channels() -> None:
-    assert "acts on what these runs measured" in say_rejection([])
+    assert "explains enough of what the model leaves over" in say_rejection([])
 
 
 def test_what_only_the_training_runs_show_is_suggested_and_not_named() -> None:

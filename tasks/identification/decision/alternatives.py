@@ -10,9 +10,9 @@ from tasks.campaign.campaign import SESSION
 from tasks.identification.decision.attribution import Candidate, assess_fit, judge_hypothesis
 from tasks.identification.decision.rivals import RivalComparison, is_close_on_unseen_runs
 from tasks.identification.decision.search import SearchState
+from tasks.identification.decision.session_numbers import free_session_number
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.fit import Fit, compute_misfit_by_run, sum_misfit_falls
-from tasks.identification.inference.hypothesis import make_library_hypothesis
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,14 +44,13 @@ def find_pulled_numbers(found: SearchState) -> list[Alternative]:
     for place in np.flatnonzero(base.pulls > evidence.rules.retune_pull):
         if SESSION[place] in free:
             continue
-        effect = next(
-            e for e in evidence.effects if e.parameters[0].name == SESSION[place] and len(e.parameters) == 1
-        )
-        hypothesis = make_library_hypothesis(effect, float(base.session[place]))
+        hypothesis = free_session_number(evidence, base, SESSION[place])
+        if hypothesis is None:
+            continue
         alternatives.append(
             Alternative(
                 candidate=judge_hypothesis(evidence, base, None, hypothesis),
-                reason=f"{effect.parameters[0].name} is pulled by {base.pulls[place]:.1f} of its tolerances beside what"
+                reason=f"{SESSION[place]} is pulled by {base.pulls[place]:.1f} of its tolerances beside what"
                 " is named: the vehicle's own number may be wrong",
             )
         )

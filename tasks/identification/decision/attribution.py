@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.campaign import SESSION
-from tasks.identification.decision.cross_validation import compute_cross_validated_fall
 from tasks.identification.decision.screening import compute_inflation, find_look_alikes, screen_library
 from tasks.identification.inference.campaign_evidence import Evidence
+from tasks.identification.inference.derivatives import SECOND_SHARES
 from tasks.identification.inference.fit import (
     Fit,
     compute_misfit_by_run,
@@ -124,7 +124,28 @@ def judge_hypothesis(
         if gain > min(enough, rules.relinearisation_gain) or hopeless:
             break
     fitted = min(trials, key=lambda trial: trial.objective)
-    return assess_fit(evidence, base, base_held_out, hypothesis, fitted)
+    found = assess_fit(evidence, base, base_held_out, hypothesis, fitted)
+    if hypothesis.effect_class == "form" or len(hypothesis.names) == 1 or found.score <= rules.accept_score:
+        return found
+    others = _fit_from_second_numbers(evidence, base, hypothesis, fitted)
+    best = min((fitted, *others), key=lambda trial: trial.objective)
+    return found if best is fitted else assess_fit(evidence, base, base_held_out, hypothesis, best)
+
+
+def _fit_from_second_numbers(evidence: Evidence, base: Fit, hypothesis: Hypothesis, fitted: Fit) -> list[Fit]:
+    """Return fits of an effect of two numbers that start across the range of the second.
+
+    The misfit has a corner wherever a run passes a threshold, and a fit ends there.
+    """
+    width = hypothesis.upper[1] - hypothesis.lower[1]
+    firsts = (np.array([fitted.values[-2], hypothesis.lower[1] + s * width]) for s in (0.0, *SECOND_SHARES))
+    return [
+        fit_hypotheses(
+            evidence.train, fitted.parts, evidence.session_sigma, values=np.concatenate((base.values, first)),
+            session=base.session, iterations=12,
+        )
+        for first in firsts
+    ]  # fmt: skip
 
 
 def assess_fit(
@@ -160,22 +181,6 @@ def assess_fit(
         return candidate
     fall = sum_misfit_falls(base_held_out, compute_misfit_by_run(evidence.held_out, fitted))
     return replace(candidate, held_out_gain=fall / factor)
-
-
-def cross_validate_candidate(evidence: Evidence, base: Fit, candidate: Candidate) -> Candidate:
-    """Return the candidate with its gain by cross-validation, where the held-out runs do not decide.
-
-    Parameters
-    ----------
-    evidence : the runs, with derivatives that hold at the candidate
-    base : fit of the hypotheses accepted so far
-    candidate : judged on held-out runs
-    """
-    # what no effect of the library says, or what needs a number pulled beyond belief, must be felt in the held-out runs
-    if not candidate.is_open or candidate.pulls_session or candidate.hypothesis.effect_class == "form":
-        return candidate
-    fall = compute_cross_validated_fall(evidence, base, candidate.fitted)
-    return replace(candidate, cross_validated_gain=fall / candidate.inflation)
 
 
 def compute_own_inflation(evidence: Evidence, fitted: Fit, hypothesis: Hypothesis) -> float:
@@ -270,11 +275,6 @@ def refine_candidates(
             ]
             candidates += [judge_library_effect(j) for j in near[: rules.refined_look_alikes]]
     return sorted(candidates, key=lambda c: -c.score)
-
-
-def is_nested(small: Hypothesis, large: Hypothesis) -> bool:
-    """Return whether every parameter of ``small`` is also one of ``large``."""
-    return set(small.names) < set(large.names)
 
 
 def refit_without_part(base: Fit, index: int, evidence: Evidence) -> Fit:

@@ -1,5 +1,8 @@
 """Cross-validation over training runs, for candidates that the held-out runs neither confirm nor contradict."""
 
+from dataclasses import replace
+
+from tasks.identification.decision.attribution import Candidate
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.fit import (
     Fit,
@@ -9,7 +12,23 @@ from tasks.identification.inference.fit import (
 )
 
 
-def compute_cross_validated_fall(evidence: Evidence, base: Fit, fitted: Fit) -> float:
+def cross_validate_candidate(evidence: Evidence, base: Fit, candidate: Candidate) -> Candidate:
+    """Return the candidate with its gain by cross-validation, where the held-out runs do not decide.
+
+    Parameters
+    ----------
+    evidence : the runs, with derivatives that hold at the candidate
+    base : fit of the hypotheses accepted so far
+    candidate : judged on held-out runs
+    """
+    # what no effect of the library says, or what needs a number pulled beyond belief, must be felt in the held-out runs
+    if not candidate.is_open or candidate.pulls_session or candidate.hypothesis.effect_class == "form":
+        return candidate
+    fall = _compute_cross_validated_fall(evidence, base, candidate.fitted)
+    return replace(candidate, cross_validated_gain=fall / candidate.inflation)
+
+
+def _compute_cross_validated_fall(evidence: Evidence, base: Fit, fitted: Fit) -> float:
     """Return by how much a candidate lowers the misfit of training runs that its fit has not seen [1].
 
     Each run in turn is predicted by fits to the others, which start without the effect. Where the others do not show

@@ -1,5 +1,6 @@
 """Rivals of the named effects: explanations that training, resampled and unseen runs cannot tell from them."""
 
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -7,15 +8,16 @@ import numpy as np
 from tasks.identification.decision.attribution import (  # fmt: skip
     Candidate,
     Misfits,
-    cross_validate_candidate,
-    is_nested,
     judge_hypothesis,
     refine_candidates,
     refit_without_part,
 )
+from tasks.identification.decision.cross_validation import cross_validate_candidate
 from tasks.identification.decision.search import Round
+from tasks.identification.decision.session_numbers import find_alike_numbers, free_session_number
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.fit import Fit, compute_misfit_by_run, compute_misfit_falls
+from tasks.identification.inference.hypothesis import is_nested
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +59,8 @@ def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]
             own = cross_validate_candidate(evidence, rest, own)
             tried = tuple(refine_candidates(evidence, rest)) if own.hypothesis.effect_class != "form" else ()
         others = [c for c in tried if c.hypothesis.name != own.hypothesis.name]
+        alike = find_alike_numbers(evidence, own.hypothesis.names[0])
+        others += _free_numbers(evidence, rest, alike, {c.hypothesis.name for c in others})
         unseen = compute_misfit_by_run(evidence.held_out, rest)
         share = compute_win_share([own, *others], rest)
         shares = [compute_win_share([c, own, *[o for o in others if o is not c]], rest) for c in others]
@@ -64,7 +68,7 @@ def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]
             (c, wins)
             for c, wins in zip(others, shares, strict=True)
             if c.score > 0.0
-            and is_close(own, share, c, wins)
+            and (is_close(own, share, c, wins) or (c.hypothesis.names[0] in alike and not c.fitted.at_bound))
             and not is_nested(own.hypothesis, c.hypothesis)
             # an explanation that bends the session beyond belief is none beside one that does not
             and (own.pulls_session or not c.pulls_session)
@@ -74,6 +78,21 @@ def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]
             RivalComparison(own=own, share=share, others=tuple(zip(others, shares, strict=True)), near=near)
         )
     return compared
+
+
+def _free_numbers(
+    evidence: Evidence, rest: Fit, names: Sequence[str], known: Collection[str]
+) -> list[Candidate]:
+    """Return numbers of the vehicle that are not known yet, each freed in place of the one that is named.
+
+    Which of two numbers that look alike is pulled is decided by their tolerances alone.
+    """
+    judged = []
+    for name in names:
+        hypothesis = free_session_number(evidence, rest, name)
+        if hypothesis is not None and hypothesis.name not in known:
+            judged.append(judge_hypothesis(evidence, rest, None, hypothesis))
+    return judged
 
 
 def compute_win_share(candidates: list[Candidate], base: Fit, seed: int = 0) -> float:

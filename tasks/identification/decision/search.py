@@ -10,16 +10,21 @@ from tasks.campaign.campaign import SESSION
 from tasks.identification.decision.attribution import (
     Candidate,
     assess_fit,
-    cross_validate_candidate,
-    is_nested,
     judge_hypothesis,
     refine_candidates,
 )
+from tasks.identification.decision.cross_validation import cross_validate_candidate
 from tasks.identification.decision.forms import RIDGE
+from tasks.identification.decision.session_numbers import (
+    compute_joint_pull,
+    find_alike_numbers,
+    free_session_number,
+)
+from tasks.identification.decision.words import join_phrases
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.disturbance import Disturbance
 from tasks.identification.inference.fit import Fit, compute_misfit_by_run, fit_hypotheses, sum_misfit_falls
-from tasks.identification.inference.hypothesis import make_library_hypothesis
+from tasks.identification.inference.hypothesis import is_nested
 from tasks.identification.inference.linearisation import (
     compute_whitened_residuals,
     differentiate_at,
@@ -210,7 +215,7 @@ def scale_disturbances(explored: SearchState, splines: tuple[NDArray[np.float64]
 
 
 def find_retune(start: SearchState, reasons: list[str]) -> SearchState:
-    """Return the search state with a wrong number of the vehicle named, where a session nuisance is pulled too far.
+    """Return the search state with a wrong number of the vehicle named, where the runs pull one too far.
 
     Parameters
     ----------
@@ -218,19 +223,15 @@ def find_retune(start: SearchState, reasons: list[str]) -> SearchState:
     reasons : list to which sentences are appended
     """
     evidence, null = start.evidence, start.base
-    pulls = null.pulls
     judged = []
-    for place in np.flatnonzero(pulls > evidence.rules.retune_pull):
-        reasons.append(f"the runs pull {SESSION[place]} by {pulls[place]:.1f} of its tolerances")
-        effect = next(
-            e for e in evidence.effects if e.parameters[0].name == SESSION[place] and len(e.parameters) == 1
-        )
+    for name in _find_pulled_numbers(evidence, null, reasons):
+        hypothesis = free_session_number(evidence, null, name)
+        if hypothesis is None:
+            continue
         frozen = null.session.copy()
-        frozen[place] = 0.0
+        frozen[SESSION.index(name)] = 0.0
         held_out = compute_misfit_by_run(evidence.held_out, replace(null, session=frozen))
-        found = judge_hypothesis(
-            evidence, null, held_out, make_library_hypothesis(effect, float(null.session[place]))
-        )
+        found = judge_hypothesis(evidence, null, held_out, hypothesis)
         gained = sum_misfit_falls(held_out, compute_misfit_by_run(evidence.held_out, found.fitted))
         judged.append(replace(found, held_out_gain=gained / found.inflation))
     accepted = [c for c in judged if c.held_out_gain > evidence.rules.held_out_gain and c.gain > 0.0]
@@ -242,3 +243,23 @@ def find_retune(start: SearchState, reasons: list[str]) -> SearchState:
         base=best.fitted,
         rounds=(Round(base=null, tried=tuple(judged), accepted=best, evidence=evidence),),
     )
+
+
+def _find_pulled_numbers(evidence: Evidence, null: Fit, reasons: list[str]) -> list[str]:
+    """Return the numbers of the session that the runs pull beyond belief, alone or with those that look alike."""
+    limit, pulled = evidence.rules.retune_pull, []
+    for name, alone in zip(SESSION, null.pulls, strict=True):
+        if alone > limit:
+            reasons.append(f"the runs pull {name} by {alone:.1f} of its tolerances")
+            pulled.append(name)
+    if pulled:
+        return pulled
+    first = SESSION[int(np.argmax(null.pulls))]
+    names = [first, *find_alike_numbers(evidence, first)]
+    if (joint := compute_joint_pull(null, names)) <= limit:
+        return []
+    reasons.append(
+        f"the runs pull {join_phrases(names)}, which they hardly tell apart, together by {joint:.1f} of their"
+        " tolerances"
+    )
+    return [first]

@@ -5,10 +5,10 @@ from dataclasses import replace
 
 from tasks.identification.decision.attribution import (
     assess_fit,
-    cross_validate_candidate,
     refine_candidates,
     refit_without_part,
 )
+from tasks.identification.decision.cross_validation import cross_validate_candidate
 from tasks.identification.decision.rivals import RivalComparison
 from tasks.identification.decision.search import Round, SearchState
 from tasks.identification.inference.fit import Fit, compute_misfit_by_run

@@ -158,8 +158,8 @@ def find_missing_effects(
     if kind == "SET" and len(near) > len(others):
         reasons.append(
             f"{len(near) - len(others)} other explanation(s) lie within {rules.rival_span:g} units, make good"
-            f" {rules.rival_gain_share:.0%} of the gain or win too many resamples, and the held-out runs do not tell"
-            " them apart"
+            f" {rules.rival_gain_share:.0%} of the gain, win too many resamples or look the same to these runs, and the"
+            " held-out runs do not tell them apart"
         )
     reasons += filter(None, (say_confirmation(c.own) for c in compared))
     if not named and not reasons:

@@ -71,7 +71,7 @@ def say_rejection(tried: Sequence[Candidate]) -> str:
     tried : candidates of which none was accepted
     """
     if not tried:
-        return "no effect of the library acts on what these runs measured"
+        return "no effect of the library explains enough of what the model leaves over to be tried"
     best = max(tried, key=lambda c: c.score)
     name, rules = best.hypothesis.name, best.rules
     if best.score <= rules.accept_score:
