@@ -13,7 +13,7 @@ from synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
-from tasks.identification.decision.attribution import refine_candidates
+from tasks.identification.decision.attribution import judge_hypothesis, refine_candidates
 from tasks.identification.decision.cross_validation import cross_validate_candidate
 from tasks.identification.inference import derivatives
 from tasks.identification.inference.campaign_evidence import Evidence
@@ -21,6 +21,7 @@ from tasks.identification.inference.derivatives import differentiate_run
 from tasks.identification.inference.disturbance import Disturbance, compute_prior_precision
 from tasks.identification.inference.fit import fit_hypotheses
 from tasks.identification.inference.forward import RunModel, predict_channels, prepare_run
+from tasks.identification.inference.hypothesis import make_library_hypothesis
 from tasks.identification.inference.linearisation_points import linearise_at
 from tasks.identification.inference.noise import whiten_channels
 from tasks.vehicle.effects.table import EFFECT_TABLE, build_parameter_vector
@@ -203,3 +204,26 @@ def test_halving_the_step_changes_less_than_the_noise() -> None:
     theta = np.zeros(len(EFFECT_TABLE))
     difference = np.abs(predict_channels(model, theta) - predict_channels(model, theta, refinement=4))
     assert np.all(difference.max(axis=0) < 0.35 * NOISE)
+
+
+def test_a_fit_of_an_effect_with_a_threshold_does_not_hang_on_where_the_threshold_starts() -> None:
+    """From one threshold alone the misfit ends between 8459 and 8605."""
+    (wet,) = (e for e in load_effects() if e.name == "wet_friction_speed")
+    theta = build_parameter_vector({"wet_speed": 0.018, "wet_threshold": 3.0})
+    runs = tuple(
+        differentiate_run(
+            measured(
+                replace(plain_run(v, p, name=str(i)), weather="rain", precipitation_mm_h=10.0), theta, i
+            ),
+            np.zeros(7), NOISE, np.zeros(len(EFFECT_TABLE)), (wet,), TOLERANCES, QUIET,
+        )
+        for i, (v, p) in enumerate([(27.0, 2.4), (20.0, 2.2), (24.0, 0.0)])
+    )  # fmt: skip
+    evidence = replace(evidence_of(theta, RUNS[:1]), train=runs, held_out=runs[:1], effects=(wet,))
+    null = fit_hypotheses(evidence.train, (), evidence.session_sigma, iterations=6)
+    found = [
+        judge_hypothesis(evidence, null, None, make_library_hypothesis(wet, second=begin)).fitted.objective
+        for begin in (0.0, 15.0)
+    ]
+    assert max(found) < 8360.0
+    assert found[0] == pytest.approx(found[1], abs=10.0)
