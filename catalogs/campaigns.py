@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, field_validator
 
 from catalogs.campaign_files import (
     LARGEST_RUN,
@@ -58,6 +58,14 @@ class MeasuredHeader(CampaignHeader):
     not_measured: tuple[Text, ...] = ()
     brake_signal: Text | None = None
     brake_stands_for: Text | None = None
+
+    @field_validator("tolerances_1sigma")
+    @classmethod
+    def _are_all_given(cls, tolerances: TolerancesEntry) -> TolerancesEntry:
+        # an import writes what its map leaves open; here nothing is assumed
+        if missing := tolerances.list_assumed():
+            raise ValueError(f"{', '.join(missing)} must be given: one sigma of each number")
+        return tolerances
 
 
 def read_campaign(folder: str | Path) -> Campaign:

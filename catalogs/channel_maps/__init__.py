@@ -146,7 +146,7 @@ class ChannelMap(CatalogueEntry):
     conditions: Conditions = Conditions()
     runs: Annotated[tuple[RunEntry, ...], Field(validate_default=True)] = ()
     segment: SegmentEntry | None = None
-    tolerances_1sigma: Tolerances
+    tolerances_1sigma: Tolerances = Field(default_factory=Tolerances)
     notes: str = ""
 
     @property

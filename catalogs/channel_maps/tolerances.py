@@ -1,11 +1,16 @@
-"""How well the numbers of a measured session are known: one sigma each."""
+"""How well the numbers of a measured session are known: one sigma each, assumed where a map says nothing."""
 
-from typing import Annotated
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field
 
-from catalogs.quantities import CatalogueEntry
+from catalogs.documents import read_yaml
+from catalogs.quantities import CatalogueEntry, Scalar
 
+ASSUMED = Path(__file__).parents[1] / "assumed_tolerances.yaml"
 Sigma = Annotated[float, Field(strict=True, gt=0)]
 LARGEST_SHARE = 1.0
 """One sigma of a number over the number [1]: who gives 5 for 5 % would otherwise say that nothing is known of it."""
@@ -20,23 +25,47 @@ def _check_share(sigma: float) -> float:
 Share = Annotated[Sigma, AfterValidator(_check_share)]
 
 
+@cache
+def load_assumed_tolerances() -> dict[str, float]:
+    """Return what is assumed of a number that a map says nothing of, by name [the unit of the number]."""
+    content = read_yaml(ASSUMED, "set of assumed tolerances")
+    return {name: Scalar.model_validate(entry).value for name, entry in content.items()}
+
+
+def _assume(name: str) -> Callable[[], float]:
+    return lambda: load_assumed_tolerances()[name]
+
+
+def _number(name: str) -> Any:
+    return Field(default_factory=_assume(name))
+
+
 class RunTolerances(CatalogueEntry):
     """One-sigma doubts about a single run."""
 
-    initial_speed_m_s: Sigma
-    friction: Share
-    acceleration_bias_m_s2: Sigma
-    pitch_offset_deg: Sigma
+    initial_speed_m_s: Sigma = _number("initial_speed_m_s")
+    friction: Share = _number("friction")
+    acceleration_bias_m_s2: Sigma = _number("acceleration_bias_m_s2")
+    pitch_offset_deg: Sigma = _number("pitch_offset_deg")
 
 
 class Tolerances(CatalogueEntry):
     """One-sigma doubts about a session, relative save the grade."""
 
-    pressure_gain: Share
-    mass: Share
-    pitch_gain: Share
-    wheel_radius: Share
-    suspension_damping: Share
-    suspension_stiffness: Share
-    grade: Share
-    run: RunTolerances
+    pressure_gain: Share = _number("pressure_gain")
+    mass: Share = _number("mass")
+    pitch_gain: Share = _number("pitch_gain")
+    wheel_radius: Share = _number("wheel_radius")
+    suspension_damping: Share = _number("suspension_damping")
+    suspension_stiffness: Share = _number("suspension_stiffness")
+    grade: Share = _number("grade")
+    run: RunTolerances = Field(default_factory=RunTolerances)
+
+    def list_assumed(self) -> dict[str, float]:
+        """Return the tolerances that were assumed, by name; those of a run as ``run.NAME``."""
+        assumed = {
+            name: getattr(self, name) for name in type(self).model_fields if name not in self.model_fields_set
+        }
+        run = assumed.pop("run", self.run)
+        left = [name for name in RunTolerances.model_fields if name not in run.model_fields_set]
+        return assumed | {f"run.{name}": getattr(run, name) for name in left}

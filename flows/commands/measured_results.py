@@ -16,7 +16,9 @@ BUMP_FIGURES = ("rate_rmse", "rate_rms", "rate_correlation", "vertical_correlati
 def shorten_import(result: dict[str, Any]) -> dict[str, Any]:
     """Return the report of an import, or a narrow table of signals for each recording."""
     if "signals" not in result:
-        return result
+        assumed = result["assumed_tolerances_1sigma"]
+        told = ", ".join(f"{name} {sigma:g}" for name, sigma in assumed.items())
+        return result | {"assumed_tolerances_1sigma": told or "none"}
     return {
         file: [_shorten_signal(row, any(row["note"] for row in rows)) for row in rows]
         for file, rows in result["signals"].items()

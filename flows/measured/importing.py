@@ -39,7 +39,8 @@ def import_measurements(
     Returns
     -------
     Report on what was made: ``campaign``, ``runs[]``, ``channels``, ``slow_channels_hz`` (of the channels slower than
-    their runs), ``not_measured``, ``sources``; or ``signals``, a row for each in every recording.
+    their runs), ``not_measured``, ``assumed_tolerances_1sigma`` (what the map leaves open), ``sources``; or
+    ``signals``, a row for each in every recording.
 
     Raises
     ------
@@ -137,6 +138,7 @@ def write_campaign(
         "channels": list(channel_map.channels),
         "slow_channels_hz": measure_slow_rates([found.columns for _, found in made], rate),
         "not_measured": list(channel_map.not_measured),
+        "assumed_tolerances_1sigma": channel_map.tolerances_1sigma.list_assumed(),
         "sources": sources,
     }
     write_json(folder / "import.json", report)

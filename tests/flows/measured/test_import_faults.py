@@ -187,9 +187,9 @@ def test_a_run_stays_in_the_folder_of_the_measurements(tmp_path: Path, file: str
     assert "runs.0.file: must be a file in the folder" in text or "runs.0.file: String should have" in text
 
 
-def test_missing_tolerances_hide_neither_a_wrong_unit_nor_a_missing_signal(tmp_path: Path) -> None:
+def test_a_faulty_tolerance_hides_neither_a_wrong_unit_nor_a_missing_signal(tmp_path: Path) -> None:
     content = yaml.safe_load(MAP)
-    del content["tolerances_1sigma"]
+    content["tolerances_1sigma"]["mass"] = -1.0
     content["channels"]["speed"] |= {"unit": "bar"}
     content["channels"]["pitch"] |= {"source": "nick"}
     (tmp_path / "map.yaml").write_text(yaml.safe_dump(content))
@@ -197,7 +197,7 @@ def test_missing_tolerances_hide_neither_a_wrong_unit_nor_a_missing_signal(tmp_p
     with pytest.raises(InputError) as caught:
         import_measurements(source, map=str(tmp_path / "map.yaml"), out=str(tmp_path / "campaign"))
     text = str(caught.value)
-    assert "tolerances_1sigma is missing" in text
+    assert "tolerances_1sigma.mass: must be greater than 0" in text
     assert "channel speed: unit bar is of pressure" in text
     assert "signal nick is missing" in text
 

@@ -6,9 +6,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import yaml
 
 from catalogs.campaigns import read_campaign
 from catalogs.channel_maps import load_channel_map
+from catalogs.channel_maps.tolerances import RunTolerances, Tolerances, load_assumed_tolerances
 from catalogs.entries import entry_names
 from flows.measured.importing import import_measurements
 from tasks.campaign.campaign import CHANNELS
@@ -161,3 +163,31 @@ def test_the_measured_sets_come_in_through_their_maps(tmp_path: Path, outside_da
     comma = measured / "comma2k19" / "comma2k19_example1_100hz.parquet"
     report = import_measurements(str(comma), map="comma2k19", out=str(tmp_path / "comma"))
     assert report["not_measured"] == ["brake_pressure", "wheel_speed_front", "wheel_speed_rear"]
+
+
+@pytest.mark.parametrize(
+    ("given", "left", "mass"),
+    [
+        ({}, 11, 0.05),
+        ({"mass": 0.01, "run": {"friction": 0.02}}, 9, 0.01),
+    ],
+)
+def test_tolerances_that_a_map_leaves_open_are_assumed_and_told(
+    tmp_path: Path, given: dict[str, object], left: int, mass: float
+) -> None:
+    source = write_csv(tmp_path / "log.csv", log_signal(braking_columns()))
+    report = import_measurements(
+        source, map=write_map(tmp_path, tolerances_1sigma=given), out=str(tmp_path / "campaign")
+    )
+    told = report["assumed_tolerances_1sigma"]
+    assert len(told) == left
+    assert ("mass" in told) is ("mass" not in given)
+    assert told["pressure_gain"] == 0.3
+    written = yaml.safe_load((tmp_path / "campaign" / "campaign.yaml").read_text())["tolerances_1sigma"]
+    assert written["mass"] == mass
+    assert {f"run.{name}" for name in written["run"]} | set(written) - {"run"} >= set(told)
+
+
+def test_a_tolerance_is_assumed_of_every_number_of_a_session() -> None:
+    numbers = {*Tolerances.model_fields, *RunTolerances.model_fields} - {"run"}
+    assert set(load_assumed_tolerances()) == numbers
