@@ -61,7 +61,8 @@ def find_pairs(found: SearchState, compared: Sequence[RivalComparison]) -> list[
     """Return the members of two effects that together explain as much as the one that is named alone.
 
     Drag of the air and of the pads together look like a resistance that grows with speed. Runs that no fit has seen
-    must not tell the two from the one, nor contradict one of the two.
+    must not tell the two from the one, nor contradict one of the two. What explains as much beside the one as beside
+    the other is no part of an alternative, but a second thing that the model lacks.
 
     Parameters
     ----------
@@ -95,6 +96,7 @@ def find_pairs(found: SearchState, compared: Sequence[RivalComparison]) -> list[
             and not both.fitted.at_bound
             and is_close_on_unseen_runs(evidence, unseen, own, both)
             and not any(_is_contradicted(evidence, one.fitted, both) for one in (a, b))
+            and not any(_is_second(evidence, own, y, gain - x.gain) for x, y in ((a, b), (b, a)))
         ):
             # the same fit of both, with the other one last
             swapped = replace(
@@ -110,6 +112,12 @@ def find_pairs(found: SearchState, compared: Sequence[RivalComparison]) -> list[
             ]
             known |= {a.hypothesis.name, b.hypothesis.name}
     return alternatives
+
+
+def _is_second(evidence: Evidence, own: Candidate, member: Candidate, gain: float) -> bool:
+    """Return whether a member of a pair gains as much beside the named effect as beside the pair's other member."""
+    beside = judge_hypothesis(evidence, own.fitted, None, member.hypothesis).gain
+    return beside >= evidence.rules.rival_gain_share * gain
 
 
 def _is_contradicted(evidence: Evidence, alone: Fit, both: Candidate) -> bool:

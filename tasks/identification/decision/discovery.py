@@ -114,9 +114,20 @@ def search_forms(
             state,
             evidence=here,
             base=left.fitted,
-            rounds=(*state.rounds, Round(base=state.base, tried=(), accepted=left, evidence=here)),
+            rounds=(
+                *state.rounds,
+                Round(base=state.base, tried=_find_like(left, state), accepted=left, evidence=here),
+            ),
         )
     return state, near
+
+
+def _find_like(form: Candidate, state: SearchState) -> tuple[Candidate, ...]:
+    """Return the effects of the library that were tried in vain and act at a form's port by the same variable."""
+    known = form.hypothesis
+    return tuple(
+        c for c in state.tried if (c.hypothesis.port, c.hypothesis.variable) == (known.port, known.variable)
+    )
 
 
 def _acts_where(form: Candidate, rounds: tuple[Round, ...]) -> bool:

@@ -273,8 +273,11 @@ def _verdict_name(named: list[NamedEffect], near: list[tuple[str, NamedEffect]])
     if not named:
         return "NOTHING"
     classes = {effect.effect_class for effect in named}
-    if "form" in classes:
-        return "UNKNOWN_FORM"
+    forms = {(e.name, e.port, e.variable) for e in named if e.effect_class == "form"}
+    if forms:
+        # an effect of the library that explains as much at the same port by the same variable is not unknown
+        known = {(of, e.port, e.variable) for of, e in near if e.effect_class == "effect"}
+        return "SET" if forms & known else "UNKNOWN_FORM"
     if near:
         return "SET"
     if "effect" in classes:
