@@ -139,13 +139,13 @@ def classify_outcome(verdict: Verdict, truth: str | None, form: tuple[str, str] 
         return "right" if not names else "false discovery"
     if not names:
         return "refused"
-    forms = {(e.port, e.variable) for e in verdict.effects if e.effect_class == "form"}
+    if form is not None and verdict.verdict in ("UNKNOWN_FORM", "SET"):
+        right = form in {(e.port, e.variable) for e in verdict.effects if e.effect_class == "form"}
+        if verdict.verdict == "UNKNOWN_FORM":
+            return "right form" if right else "wrong form"
+        return "set with truth" if right else "set without truth"
     if verdict.verdict == "UNKNOWN_FORM":
-        if form is None:
-            return "form"
-        return "right form" if form in forms else "wrong form"
-    if verdict.verdict == "SET" and form in forms:
-        return "set with truth"
+        return "form"
     if verdict.verdict == "SET":
         contained = truth in {*names, *(rival.name for _, rival in verdict.rivals)}
         return "set with truth" if contained else "set without truth"

@@ -32,7 +32,14 @@ from tasks.vehicle.effects.table import EFFECT_TABLE, build_parameter_vector
 from tests.identification.synthetic import NOISE, TOLERANCES, measured, plain_run
 
 QUIET = Disturbance(scale=(5.0, 0.001, 5.0), time=(1.0, 0.3, 0.3))
-NAMES = ("aerodynamic_drag", "pad_drag", "rolling_resistance_speed", "retuned_pressure_gain", "brake_fade")
+NAMES = (
+    "aerodynamic_drag",
+    "pad_drag",
+    "rolling_resistance_speed",
+    "retuned_pressure_gain",
+    "brake_fade",
+    "brake_lag",
+)
 LIBRARY = {e.name: e for e in load_effects() if e.name in NAMES}
 
 
@@ -54,14 +61,16 @@ def evidence_of(**truth: float) -> tuple[Evidence, Fit]:
     return evidence, fit_hypotheses(derived, (), evidence.session_sigma)
 
 
-def name_effect(evidence: Evidence, null: Fit, name: str) -> tuple[SearchState, list[RivalComparison]]:
-    """One name as if it had been found, beside the two resistances that were tried in its place."""
+def name_effect(
+    evidence: Evidence, null: Fit, name: str, tried: tuple[str, str] = ("aerodynamic_drag", "pad_drag")
+) -> tuple[SearchState, list[RivalComparison]]:
+    """One name as if it had been found, beside two effects that were tried in its place."""
 
     def judge_effect(other: str) -> Candidate:
         return judge_hypothesis(evidence, null, None, make_library_hypothesis(LIBRARY[other]))
 
     own = judge_effect(name)
-    others = tuple((judge_effect(other), 0.0) for other in ("aerodynamic_drag", "pad_drag") if other != name)
+    others = tuple((judge_effect(other), 0.0) for other in tried if other != name)
     rounds = (Round(base=null, tried=(), accepted=own, evidence=evidence),)
     found = SearchState(evidence=evidence, base=own.fitted, rounds=rounds)
     return found, [RivalComparison(own=own, share=1.0, others=others, near=())]
@@ -81,6 +90,15 @@ def test_two_effects_that_together_explain_as_much_stand_beside_the_one_that_is_
 def test_two_effects_do_not_stand_beside_the_truth() -> None:
     evidence, null = evidence_of(rolling_speed=0.0009)
     assert find_pairs(*name_effect(evidence, null, "rolling_resistance_speed")) == []
+
+
+def test_what_the_car_lacks_besides_makes_no_pair_with_a_worse_explanation() -> None:
+    evidence, null = evidence_of(pad_drag=40.0, lag=0.1)
+    found, compared = name_effect(evidence, null, "pad_drag", ("aerodynamic_drag", "brake_lag"))
+    own, ((worse, _), (lag, _)) = compared[0].own, compared[0].others
+    both = judge_hypothesis(evidence, worse.fitted, None, lag.hypothesis)
+    assert worse.gain < own.gain < 0.5 * (null.objective - both.fitted.objective)
+    assert find_pairs(found, compared) == []
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from flows.measured import closing_benchmark
 from flows.measured.closing_benchmark_summary import pair_outcome, summarise_benchmark
 from tasks.campaign.planned_runs import TRAINING
 from tasks.identification.benchmark import (
+    classify_outcome,
     compute_exact_interval,
     make_synthetic_campaign,
     measure_interval_miss,
@@ -126,6 +127,32 @@ def row(truth: str | None, outcome: str, *, in_library: bool = True, covered: bo
 )
 def test_two_effects_at_once_are_counted_by_what_is_named(verdict, named, rivals, expected) -> None:
     assert pair_outcome(verdict, named, rivals, ["lag", "drag"]) == expected
+
+
+HUMP = ("brake_torque", "pressure")
+
+
+@pytest.mark.parametrize(
+    ("verdict", "named", "rivals", "form", "expected"),
+    [
+        ("UNKNOWN_FORM", [("form", *HUMP)], [], HUMP, "right form"),
+        ("UNKNOWN_FORM", [("form", "friction", "speed")], [], HUMP, "wrong form"),
+        ("SET", [("form", *HUMP)], ["lag"], HUMP, "set with truth"),
+        ("SET", [("effect", *HUMP)], ["lag"], HUMP, "set without truth"),
+        ("SET", [("form", *HUMP)], ["lag"], None, "set with truth"),
+        ("SET", [("form", *HUMP)], ["fade"], None, "set without truth"),
+        ("UNKNOWN_FORM", [("form", *HUMP)], [], None, "form"),
+    ],
+)
+def test_a_form_counts_by_its_port_and_variable_and_a_set_by_the_truth_in_it(
+    verdict, named, rivals, form, expected
+) -> None:
+    effects = [
+        SimpleNamespace(name="named", effect_class=kind, port=port, variable=x) for kind, port, x in named
+    ]
+    others = [("named", SimpleNamespace(name=name)) for name in rivals]
+    found = SimpleNamespace(verdict=verdict, effects=effects, rivals=others)
+    assert classify_outcome(found, "lag" if form is None else "hump", form) == expected
 
 
 def test_every_truth_is_in_two_pairs_and_no_pair_comes_twice() -> None:

@@ -1,5 +1,6 @@
 """Forms outside the library: which are named beside effects, and beside which the disturbances are scaled."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,6 +10,7 @@ from catalogs.decision_rules import load_decision_rules
 from tasks.identification.decision import discovery
 from tasks.identification.decision.attribution import Candidate
 from tasks.identification.decision.search import Round, SearchState
+from tasks.identification.decision.verdict import _verdict_name
 
 RULES = load_decision_rules()
 RUNS = SimpleNamespace(rules=RULES, session_sigma=np.ones(7))
@@ -16,7 +18,9 @@ RUNS = SimpleNamespace(rules=RULES, session_sigma=np.ones(7))
 
 def make_candidate(name: str, kind: str, gain: float, score: float = 30.0) -> Candidate:
     return Candidate(
-        hypothesis=SimpleNamespace(name=name, effect_class=kind, names=("a",), port="suspension_force"),
+        hypothesis=SimpleNamespace(
+            name=name, effect_class=kind, names=("a",), port="suspension_force", variable="suspension_speed"
+        ),
         fitted=SimpleNamespace(at_bound=False), gain=gain, inflation=1.3, score=score, held_out_gain=11.0,
         cross_validated_gain=0.0, informed=5, rules=RULES,
     )  # fmt: skip
@@ -41,6 +45,36 @@ def test_a_form_beside_an_effect_that_makes_good_nearly_all_alone_is_not_named(
     )
     assert (len(found.rounds) == 2) is kept
     assert any("makes good 95% of the gain" in reason for reason in reasons) is not kept
+
+
+@pytest.mark.parametrize(("variable", "kept"), [("suspension_speed", True), ("suspension_travel", False)])
+def test_an_effect_of_a_forms_port_and_variable_that_was_tried_in_vain_is_held_against_it(
+    variable: str, kept: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    form = make_candidate("suspension_force ~ a tanh(4x)", "form", 200.0)
+    tried = make_candidate("damper_asymmetry", "effect", 190.0, 12.0)
+    tried.hypothesis.variable = variable  # type: ignore[misc]
+    start = replace(make_state(form), rounds=(), tried=(tried,))
+    monkeypatch.setattr(discovery, "_find_credible_form", lambda *_: (RUNS, form))
+    found, _ = discovery.search_forms(start, start, [])
+    assert found.rounds[-1].accepted is form
+    assert (found.rounds[-1].tried == (tried,)) is kept
+
+
+@pytest.mark.parametrize(
+    ("kind", "port", "verdict"),
+    [
+        ("effect", "suspension_force", "SET"),
+        ("effect", "friction", "UNKNOWN_FORM"),
+        ("retune", "suspension_force", "UNKNOWN_FORM"),
+        ("form", "suspension_force", "UNKNOWN_FORM"),
+    ],
+)
+def test_a_form_whose_rival_the_library_holds_is_no_unknown_form(kind: str, port: str, verdict: str) -> None:
+    form = SimpleNamespace(name="a tanh(4x)", effect_class="form", port="suspension_force", variable="speed")
+    rival = SimpleNamespace(name="other", effect_class=kind, port=port, variable="speed")
+    assert _verdict_name([form], [(form.name, rival)]) == verdict  # type: ignore[list-item]
+    assert _verdict_name([form], [("another name", rival)]) == "UNKNOWN_FORM"  # type: ignore[list-item]
 
 
 @pytest.mark.parametrize(("score", "added"), [(46.0, True), (19.0, False)])
