@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from catalogs.decision_rules import load_decision_rules
-from tasks.identification.decision.rivals import is_close
+from tasks.identification.decision.rivals import _is_as_wrong, is_close
 
 RULES = load_decision_rules()
 
@@ -35,3 +35,14 @@ def test_a_rival_that_wins_many_resamples_is_near_where_the_named_effect_wins_to
 
 def test_a_named_effect_that_wins_just_the_share_that_is_asked_for_wins_enough():
     assert not is_close(candidate(124.0, 199.0), RULES.win_share, candidate(60.0, 100.0), 0.3)
+
+
+@pytest.mark.parametrize(
+    ("gain", "at_bound", "rival"), [(5.2, False, True), (5.2, True, False), (0.0, False, False)]
+)
+def test_a_number_that_looks_like_the_named_one_needs_no_score_to_be_its_rival(
+    gain: float, at_bound: bool, rival: bool
+) -> None:
+    number = candidate(-3.7, gain)
+    number.fitted = SimpleNamespace(at_bound=at_bound)
+    assert _is_as_wrong(number) is rival

@@ -67,8 +67,11 @@ def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]
         near = tuple(
             (c, wins)
             for c, wins in zip(others, shares, strict=True)
-            if c.score > 0.0
-            and (is_close(own, share, c, wins) or (c.hypothesis.names[0] in alike and not c.fitted.at_bound))
+            if (
+                _is_as_wrong(c)
+                if c.hypothesis.names[0] in alike
+                else c.score > 0.0 and is_close(own, share, c, wins)
+            )
             and not is_nested(own.hypothesis, c.hypothesis)
             # an explanation that bends the session beyond belief is none beside one that does not
             and (own.pulls_session or not c.pulls_session)
@@ -78,6 +81,11 @@ def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]
             RivalComparison(own=own, share=share, others=tuple(zip(others, shares, strict=True)), near=near)
         )
     return compared
+
+
+def _is_as_wrong(number: Candidate) -> bool:
+    """Return whether a number that looks like the named one may be the wrong one: as of that one, no score is asked."""
+    return number.gain > 0.0 and not number.fitted.at_bound
 
 
 def _free_numbers(
