@@ -75,17 +75,20 @@ def test_an_effect_whose_score_excludes_zero_has_an_interval_that_does(
     valley: Judged,
 ) -> None:
     evidence, candidate, none = valley
-    root = np.sqrt((none - candidate.fitted.objective) / candidate.inflation)
-    assert candidate.passes and root > compute_student_quantile(candidate) * candidate.rules.interval_widening
+    root = np.sqrt(none - candidate.fitted.objective)
+    wanted = compute_student_quantile(candidate) * candidate.rules.interval_widening * candidate.inflation
+    assert candidate.passes and root > wanted
     low, high = compute_profile_interval(candidate, evidence)
     assert low[0] > 0.0
     assert low[0] < 0.01 < high[0] and low[1] < 8.0 < high[1]
 
 
+@pytest.mark.parametrize("inflation", [1.0, 2.0])
 def test_at_an_end_of_the_interval_the_best_fit_is_worse_by_the_quantile(
-    sharp: Judged,
+    sharp: Judged, inflation: float
 ) -> None:
     evidence, candidate, _ = sharp
+    candidate = replace(candidate, inflation=inflation)
     h, best = candidate.hypothesis, candidate.fitted.objective
     for ends in compute_profile_interval(candidate, evidence):
         for j in (j for j in range(2) if h.lower[j] < ends[j] < h.upper[j]):
@@ -100,9 +103,18 @@ def test_at_an_end_of_the_interval_the_best_fit_is_worse_by_the_quantile(
                 rises.append(
                     fit_hypotheses(evidence.train, (held,), evidence.session_sigma, iterations=1).objective
                 )
-            root = np.sqrt((min(rises) - best) / candidate.inflation)
-            wanted = compute_student_quantile(candidate) * candidate.rules.interval_widening
+            root = np.sqrt(min(rises) - best)
+            wanted = compute_student_quantile(candidate) * candidate.rules.interval_widening * inflation
             assert root == pytest.approx(wanted, rel=0.15), (j, ends[j])
+
+
+def test_an_interval_is_as_many_times_as_long_as_the_runs_disagree(sharp: Judged) -> None:
+    candidate = replace(sharp[1], inflation=1.0)
+    ends, wide = (
+        np.ptp(np.array(compute_curvature_interval(replace(candidate, inflation=factor)))[:, 0])
+        for factor in (1.0, 1.5)
+    )
+    assert wide == pytest.approx(1.5 * ends)
 
 
 def test_intervals_stay_within_the_bounds_of_their_parameters(

@@ -65,10 +65,22 @@ def compute_student_quantile(candidate: Candidate) -> float:
     return float(stdtrit(max(candidate.informed - 1, 1), 0.975))
 
 
-def compute_curvature_interval(candidate: Candidate) -> Bounds:
-    """Return intervals from the curvature at the estimate, cut at the bounds.
+def compute_widening(candidate: Candidate) -> float:
+    """Return the factor on standard errors for what the likelihood does not hold [1].
 
-    They are widened by the runs' disagreement, and by the rules for what the likelihood does not hold.
+    The runs' disagreement counts twice. Its root is the scatter between them, which is the part of the model's error
+    that differs from run to run. What is common to all runs moves an estimate without any scatter, and is taken to be
+    as large beside the noise.
+
+    Parameters
+    ----------
+    candidate : refined and judged candidate
+    """
+    return candidate.inflation * candidate.rules.interval_widening
+
+
+def compute_curvature_interval(candidate: Candidate) -> Bounds:
+    """Return intervals from the curvature at the estimate, cut at the bounds and widened by `compute_widening`.
 
     Parameters
     ----------
@@ -81,8 +93,7 @@ def compute_curvature_interval(candidate: Candidate) -> Bounds:
     h = candidate.hypothesis
     k = len(h.names)
     values = candidate.fitted.values[-k:]
-    widening = candidate.inflation * candidate.rules.interval_widening**2
-    variance = np.maximum(np.diag(candidate.fitted.covariance)[-k:], 0.0) * widening
+    variance = np.maximum(np.diag(candidate.fitted.covariance)[-k:], 0.0) * compute_widening(candidate) ** 2
     # the session's tolerance of the same number adds to the uncertainty of the vehicle's
     tolerance = [candidate.fitted.session_sigma[SESSION.index(n)] if n in SESSION else 0.0 for n in h.names]
     reach = np.sqrt(variance + np.square(tolerance)) * compute_student_quantile(candidate)
@@ -92,10 +103,10 @@ def compute_curvature_interval(candidate: Candidate) -> Bounds:
 def compute_profile_interval(candidate: Candidate, evidence: Evidence) -> Bounds:
     """Return intervals of an effect of several parameters from its profile likelihood.
 
-    A value belongs to the interval if the best fit with that value is worse by less than t^2 times the inflation, t
-    widened by the rules (Venzon and Moolgavkar 1988, doi:10.2307/2347496). Where one parameter acts only together with
-    another, the curvature at the estimate does not tell whether there is an effect. The profile does, in agreement with
-    the score: its deviance at 0 is twice the gain.
+    A value belongs to the interval if the best fit with that value is worse by less than the square of t times
+    `compute_widening` (Venzon and Moolgavkar 1988, doi:10.2307/2347496). Where one parameter acts only together with
+    another, the curvature at the estimate does not tell whether there is an effect. The profile does: its deviance at 0
+    is twice the gain.
 
     Parameters
     ----------
@@ -127,14 +138,14 @@ def _find_limit(
 ) -> float:
     """Return the value between estimate and bound where the root deviance reaches the quantile, by false position."""
     k = len(candidate.hypothesis.names)
-    wanted = compute_student_quantile(candidate) * candidate.rules.interval_widening
+    wanted = compute_student_quantile(candidate) * compute_widening(candidate)
     inside, outside = float(centre.values[place - k]), float(bound)
     if inside == outside:
         return outside
 
     def compute_root_deviance(x: float) -> float:
         rise = _fit_pinned(centre, evidence, place - k, x).objective - centre.objective
-        return float(np.sqrt(max(rise, 0.0) / candidate.inflation))
+        return float(np.sqrt(max(rise, 0.0)))
 
     at_inside, at_outside = 0.0, compute_root_deviance(outside)
     if at_outside <= wanted:
