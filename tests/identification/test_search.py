@@ -214,7 +214,7 @@ def test_a_large_gain_is_linearised_anew_though_it_scores_below_a_name(
 
     def make_candidate(score: float) -> SimpleNamespace:
         return SimpleNamespace(
-            hypothesis=SimpleNamespace(name="curve", names=("b",)), fitted=None, gain=520.0, score=score,
+            hypothesis=SimpleNamespace(name="curve", names=("b",), port="brake_torque"), fitted=None, gain=520.0, score=score,
             passes=score > 20.0, pulls_session=False,
         )  # fmt: skip
 
@@ -227,3 +227,39 @@ def test_a_large_gain_is_linearised_anew_though_it_scores_below_a_name(
     monkeypatch.setattr(search, "cross_validate_candidate", lambda _, __, candidate: candidate)
     found = search.search_library(start, gated=True)
     assert bool(found.rounds) is arrives
+
+
+@pytest.mark.parametrize(
+    ("inflation", "gain", "port", "left"),
+    [
+        (
+            4.1,
+            750.0,
+            "suspension_force",
+            True,
+        ),  # a bump stop beside dampers of another law: 9 % of what both explain
+        (4.1, 2000.0, "suspension_force", False),
+        (1.0, 750.0, "suspension_force", False),  # the runs agree about the dampers
+        (4.1, 750.0, "longitudinal_force", False),  # no damper leaves a drag over
+    ],
+)
+def test_a_second_effect_may_be_what_a_name_leaves_over_about_which_the_runs_disagree(
+    inflation: float, gain: float, port: str, left: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rules = replace(load_decision_rules(), most_effects=2)
+    runs = SimpleNamespace(rules=rules)
+
+    def make_candidate(name: str, gain: float, inflation: float, port: str) -> SimpleNamespace:
+        return SimpleNamespace(
+            hypothesis=SimpleNamespace(name=name, names=(name,), port=port), fitted=None, gain=gain,
+            score=gain / inflation, inflation=inflation, passes=True, pulls_session=False, held_out_gain=11.0,
+        )  # fmt: skip
+
+    dampers = make_candidate("damper_asymmetry", 7624.0, inflation, "suspension_force")
+    tried = iter(([dampers], [make_candidate("second", gain, 1.4, port)]))
+    monkeypatch.setattr(search, "refine_candidates", lambda *_, **__: next(tried))
+    monkeypatch.setattr(search, "relinearise_candidate", lambda evidence, _, near, **__: (evidence, near))
+    monkeypatch.setattr(search, "cross_validate_candidate", lambda _, __, candidate: candidate)
+    found = search.search_library(search.SearchState(evidence=runs, base=None), gated=True)  # type: ignore[arg-type]
+    assert [r.accepted.hypothesis.name for r in found.rounds][1:] == ([] if left else ["second"])
+    assert [c.hypothesis.name for c in found.tried] == (["second"] if left else [])

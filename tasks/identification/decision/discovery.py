@@ -238,6 +238,12 @@ def search_library_and_forms(
     null = fit_hypotheses(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
     start = SearchState(evidence=evidence, base=null)
     found = search_library(start, gated=True, explored=explored)
+    reasons += [
+        f"{c.hypothesis.name} would fit beside a name of its port, about which the runs disagree, but explains no more"
+        " than an error of that may leave over: not named"
+        for c in found.tried
+        if c.passes
+    ]
     if not found.rounds:
         found = replace(find_retune(start, reasons), tried=found.tried)
     # about the same parts again, in other words, the residual has the same splines

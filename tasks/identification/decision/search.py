@@ -133,7 +133,11 @@ def search_library(start: SearchState, *, gated: bool, explored: SearchState | N
         tried.sort(key=lambda c: -c.score)
         if gated:
             tried = _confirm_open(state, tried, places)
-        passing = [c for c in tried if (c.passes if gated else c.score > rules.accept_score)]
+        passing = [
+            c
+            for c in tried
+            if (c.passes and not is_left_by_names(c, state) if gated else c.score > rules.accept_score)
+        ]
         if not passing:
             return replace(state, tried=tuple(tried))
         # an explanation that pulls a number of the session beyond belief gives way to one that does not
@@ -161,6 +165,23 @@ def search_library(start: SearchState, *, gated: bool, explored: SearchState | N
             rounds=(*state.rounds, Round(base=state.base, tried=tuple(tried), accepted=best, evidence=here)),
         )
     return state
+
+
+def is_left_by_names(candidate: Candidate, state: SearchState) -> bool:
+    """Return whether a candidate may be what names of its port leave over because they are not the car's exactly.
+
+    Where the runs disagree about a name, its own error explains as much as the rules leave open between two
+    explanations: dampers of another law leave on humps what a bump stop would.
+
+    Parameters
+    ----------
+    candidate : judged beside the names
+    state : with the names
+    """
+    rules, port = state.evidence.rules, candidate.hypothesis.port
+    named = [r.accepted for r in state.rounds if r.accepted.hypothesis.port == port]
+    gain = sum(c.gain for c in named if c.inflation > rules.disagreement)
+    return gain > 0.0 and gain >= rules.rival_gain_share * (gain + candidate.gain)
 
 
 def _confirm_open(
