@@ -214,8 +214,8 @@ def test_a_large_gain_is_linearised_anew_though_it_scores_below_a_name(
 
     def make_candidate(score: float) -> SimpleNamespace:
         return SimpleNamespace(
-            hypothesis=SimpleNamespace(name="curve", names=("b",), port="brake_torque"), fitted=None, gain=520.0, score=score,
-            passes=score > 20.0, pulls_session=False,
+            hypothesis=SimpleNamespace(name="curve", names=("b",), port="brake_torque"), fitted=None, gain=520.0,
+            score=score, passes=score > 20.0, pulls_session=False,
         )  # fmt: skip
 
     rules = load_decision_rules()
