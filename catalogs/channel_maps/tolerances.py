@@ -1,6 +1,5 @@
 """How well the numbers of a measured session are known: one sigma each, assumed where a map says nothing."""
 
-from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any
@@ -32,33 +31,29 @@ def load_assumed_tolerances() -> dict[str, float]:
     return {name: Scalar.model_validate(entry).value for name, entry in content.items()}
 
 
-def _assume(name: str) -> Callable[[], float]:
-    return lambda: load_assumed_tolerances()[name]
-
-
-def _number(name: str) -> Any:
-    return Field(default_factory=_assume(name))
+def _assume(name: str) -> Any:
+    return Field(default_factory=lambda: load_assumed_tolerances()[name])
 
 
 class RunTolerances(CatalogueEntry):
     """One-sigma doubts about a single run."""
 
-    initial_speed_m_s: Sigma = _number("initial_speed_m_s")
-    friction: Share = _number("friction")
-    acceleration_bias_m_s2: Sigma = _number("acceleration_bias_m_s2")
-    pitch_offset_deg: Sigma = _number("pitch_offset_deg")
+    initial_speed_m_s: Sigma = _assume("initial_speed_m_s")
+    friction: Share = _assume("friction")
+    acceleration_bias_m_s2: Sigma = _assume("acceleration_bias_m_s2")
+    pitch_offset_deg: Sigma = _assume("pitch_offset_deg")
 
 
 class Tolerances(CatalogueEntry):
     """One-sigma doubts about a session, relative save the grade."""
 
-    pressure_gain: Share = _number("pressure_gain")
-    mass: Share = _number("mass")
-    pitch_gain: Share = _number("pitch_gain")
-    wheel_radius: Share = _number("wheel_radius")
-    suspension_damping: Share = _number("suspension_damping")
-    suspension_stiffness: Share = _number("suspension_stiffness")
-    grade: Share = _number("grade")
+    pressure_gain: Share = _assume("pressure_gain")
+    mass: Share = _assume("mass")
+    pitch_gain: Share = _assume("pitch_gain")
+    wheel_radius: Share = _assume("wheel_radius")
+    suspension_damping: Share = _assume("suspension_damping")
+    suspension_stiffness: Share = _assume("suspension_stiffness")
+    grade: Share = _assume("grade")
     run: RunTolerances = Field(default_factory=RunTolerances)
 
     def list_assumed(self) -> dict[str, float]:

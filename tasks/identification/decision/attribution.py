@@ -142,7 +142,7 @@ def _fit_from_second_numbers(evidence: Evidence, base: Fit, hypothesis: Hypothes
     return [
         fit_hypotheses(
             evidence.train, fitted.parts, evidence.session_sigma, values=np.concatenate((base.values, first)),
-            session=base.session, iterations=12,
+            session=base.session, iterations=4 + 4 * len(first),
         )
         for first in firsts
     ]  # fmt: skip

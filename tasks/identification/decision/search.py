@@ -136,7 +136,7 @@ def search_library(start: SearchState, *, gated: bool, explored: SearchState | N
         passing = [
             c
             for c in tried
-            if (c.passes and not is_left_by_names(c, state) if gated else c.score > rules.accept_score)
+            if (c.passes and not _is_left_by_names(c, state) if gated else c.score > rules.accept_score)
         ]
         if not passing:
             return replace(state, tried=tuple(tried))
@@ -167,16 +167,11 @@ def search_library(start: SearchState, *, gated: bool, explored: SearchState | N
     return state
 
 
-def is_left_by_names(candidate: Candidate, state: SearchState) -> bool:
+def _is_left_by_names(candidate: Candidate, state: SearchState) -> bool:
     """Return whether a candidate may be what names of its port leave over because they are not the car's exactly.
 
     Where the runs disagree about a name, its own error explains as much as the rules leave open between two
     explanations: dampers of another law leave on humps what a bump stop would.
-
-    Parameters
-    ----------
-    candidate : judged beside the names
-    state : with the names
     """
     rules, port = state.evidence.rules, candidate.hypothesis.port
     named = [r.accepted for r in state.rounds if r.accepted.hypothesis.port == port]

@@ -12,6 +12,7 @@ from catalogs.campaigns import read_campaign
 from catalogs.channel_maps import load_channel_map
 from catalogs.channel_maps.tolerances import RunTolerances, Tolerances, load_assumed_tolerances
 from catalogs.entries import entry_names
+from flows.commands.measured_results import shorten_import
 from flows.measured.importing import import_measurements
 from tasks.campaign.campaign import CHANNELS
 from tasks.errors import InputError
@@ -191,3 +192,10 @@ def test_tolerances_that_a_map_leaves_open_are_assumed_and_told(
 def test_a_tolerance_is_assumed_of_every_number_of_a_session() -> None:
     numbers = {*Tolerances.model_fields, *RunTolerances.model_fields} - {"run"}
     assert set(load_assumed_tolerances()) == numbers
+
+
+def test_the_terminal_tells_what_was_assumed_in_one_line() -> None:
+    told = {"pressure_gain": 0.3, "run.friction": 0.1}
+    brief = shorten_import({"campaign": "a", "assumed_tolerances_1sigma": told})
+    assert brief["assumed_tolerances_1sigma"] == "pressure_gain 0.3, run.friction 0.1"
+    assert shorten_import({"assumed_tolerances_1sigma": {}})["assumed_tolerances_1sigma"] == "none"
