@@ -43,24 +43,27 @@ class MotionProtocol:
 
 
 def smooth_signal(values: Floats, window: int | None, order: int = 2) -> Floats:
-    """Smooth by Savitzky and Golay; without a window return a copy.
+    """Smooth by Savitzky and Golay what is known; without a window return a copy.
 
     Parameters
     ----------
-    values : [F] [any]
+    values : [F] NaN where they are not known: before or after, and not within, those that are [any]
     window : odd, above the order, None for no smoothing [frames]
     order : of the polynomial [1]
 
     Raises
     ------
     InputError
-        If there are fewer frames than the window holds.
+        If fewer frames are known than the window holds.
     """
+    smoothed = values.copy()
     if window is None:
-        return values.copy()
-    if len(values) < window:
-        raise InputError(f"A smoothing window of {window} frames needs as many; the clip has {len(values)}.")
-    return savgol_filter(values, window, order)
+        return smoothed
+    known = np.isfinite(values)
+    if known.sum() < window:
+        raise InputError(f"A smoothing window of {window} frames needs as many; known are {known.sum()}.")
+    smoothed[known] = savgol_filter(values[known], window, order)
+    return smoothed
 
 
 def normalised_progress(forward: Floats, window: int | None, order: int = 2) -> Floats:

@@ -55,6 +55,17 @@ def test_a_clip_without_both_flanks_is_refused() -> None:
         geometry_error(TIMES, HUMP, HUMP, 7.0, None)
 
 
+@pytest.mark.parametrize("window", [None, 5, 7, 9])
+def test_a_reference_that_ends_behind_the_windows_scores_as_a_whole_one(window: int | None) -> None:
+    ended = np.where(TIMES <= 4.8, HUMP, np.nan)
+    whole = geometry_error(TIMES, HUMP, HUMP, 2.2, window)
+    assert geometry_error(TIMES, HUMP, ended, 2.2, window) == whole
+    # its own smoothing feels the end, which lies half a window behind the flank
+    assert geometry_error(TIMES, ended, ended, 2.2, window) == pytest.approx(whole, abs=1e-9)
+    with pytest.raises(InputError, match="is to 4.20 s"):
+        geometry_error(TIMES, HUMP, np.where(TIMES <= 4.25, HUMP, np.nan), 2.2, window)
+
+
 def test_progress_knows_neither_scale_nor_sign_and_never_falls() -> None:
     jittered = -3.7 * STOP + np.where(np.arange(81) % 7 == 0, 0.2, 0.0)
     progress = normalised_progress(jittered, 5)
@@ -86,6 +97,6 @@ def test_retention_takes_off_the_braking_and_ignores_sign_and_scale() -> None:
 
 
 def test_a_clip_shorter_than_the_smoothing_window_is_told() -> None:
-    with pytest.raises(InputError, match="9 frames needs as many; the clip has 8"):
+    with pytest.raises(InputError, match="9 frames needs as many; known are 8"):
         smooth_signal(STOP[:8], 9)
     assert smooth_signal(STOP[:8], 7).shape == (8,)
