@@ -124,8 +124,9 @@ def tell_search(trace: Trace | JointTrace) -> dict[str, Any]:
     planned_for = verdict.experiment.between[0] if verdict.experiment else None
     suggested = next((effect for effect in verdict.tried if effect.name == planned_for), None)
     sentence = tell_verdict(
-        verdict.effects, rivals, library, verdict.error, verdict.manoeuvre_error, suggested
-    )
+        verdict.effects, rivals, library, verdict.error, verdict.manoeuvre_error, suggested,
+        bool(verdict.disagreement),
+    )  # fmt: skip
     told = {"sentence": sentence, "calibrated": [effect_json(effect, library) for effect in trace.calibrated]}
     if isinstance(trace, Trace):
         residual = compute_residual_rmse((*train, *held_out))

@@ -1,7 +1,5 @@
 """Two searches for what a model lacks, and which of them judges a campaign."""
 
-from contextlib import suppress
-
 from catalogs.decision_rules import load_decision_rules
 from catalogs.joint_numbers import load_joint_numbers
 from tasks.campaign.campaign import Campaign
@@ -30,7 +28,10 @@ def judge_campaign(
     effects : library of candidates
     """
     rules, numbers = load_decision_rules(), load_joint_numbers()
+    disagreement = ""
     if not needs_joint_fit(measured, rules.joint):
-        with suppress(ForeignCarError):
+        try:
             return find_single_effects(measured, model, road, effects, numbers, rules)
-    return judge_jointly(measured, model, road, numbers, rules)
+        except ForeignCarError as error:
+            disagreement = str(error)
+    return judge_jointly(measured, model, road, numbers, rules, disagreement=disagreement)

@@ -135,7 +135,7 @@ def make_error(after: float) -> dict[str, ChannelError]:
 
 
 def test_a_named_effect_about_which_the_runs_disagree_is_left_to_the_joint_fit() -> None:
-    with pytest.raises(ForeignCarError):
+    with pytest.raises(ForeignCarError, match="disagree about brake_lag by a factor of"):
         judged({"lag": 0.08}, design=BUMPS, rules=replace(RULES, disputed_inflation=0.5))
 
 
@@ -158,7 +158,7 @@ class TestRunsThatDisagreeUntilAFormIsInTheModel:
             judged({}, outside="pitch_by_deceleration", rules=self.DISAGREEING)
 
     def test_runs_that_disagree_beside_every_form_are_left_to_the_joint_fit(self) -> None:
-        with pytest.raises(ForeignCarError):
+        with pytest.raises(ForeignCarError, match="disagree with the model by a factor of"):
             judged({}, outside="pitch_by_deceleration", rules=replace(RULES, foreign_inflation=0.9))
 
     def test_what_moves_the_body_alone_is_taken_back_where_they_disagree_about_it(self) -> None:

@@ -54,6 +54,11 @@ def test_what_only_the_training_runs_show_is_suggested_and_not_named() -> None:
     assert tell_verdict((), (), (), {}, {}) == "These runs show nothing that the model lacks."
 
 
+def test_no_name_beside_runs_that_the_model_misses_is_no_claim_that_nothing_is_missing() -> None:
+    told = tell_verdict((), (), (), {}, {}, misses=True)
+    assert told == "The model misses these runs by more than their noise, and nothing that can be named explains it."
+
+
 def test_an_error_is_said_without_an_exponent() -> None:
     error = ChannelError(
         frozen=121.4, retuned=99.7, after=0.056, ci_low=0.0, ci_high=1.0, change_low=-1.0, change_high=0.0, wins=2,

@@ -106,6 +106,7 @@ class Verdict:
     experiment : planned run that separates the first effect best from its closest alternative
     forked : names of runs left out because halving the integration step changes their prediction
     reasons : sentences that explain the verdict
+    disagreement : why single effects could not be told; empty where they could, or were not looked for
     """
 
     verdict: VerdictName
@@ -127,6 +128,7 @@ class Verdict:
     experiment: Experiment | None
     forked: tuple[str, ...]
     reasons: tuple[str, ...]
+    disagreement: str = ""
 
 
 def make_estimate(effect: Effect, parameter: Parameter, error: float) -> NamedEffect:

@@ -17,7 +17,7 @@ from tasks.identification.decision.forms import (
     make_form_hypotheses,
     rewhiten_splines,
 )
-from tasks.identification.decision.screening import compute_inflation
+from tasks.identification.decision.screening import compute_inflation, find_disagreeing_runs
 from tasks.identification.decision.search import (
     Round,
     SearchState,
@@ -26,6 +26,7 @@ from tasks.identification.decision.search import (
     scale_disturbances,
     search_library,
 )
+from tasks.identification.decision.words import join_phrases
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.discrepancy import estimate_run_noise, set_run_noise
 from tasks.identification.inference.fit import Fit, compute_misfit_by_run, fit_hypotheses
@@ -220,11 +221,11 @@ def search_library_and_forms(
     evidence = set_run_noise(evidence, estimate_run_noise(evidence, null))
     null = fit_hypotheses(evidence.train, (), evidence.session_sigma, session=null.session, iterations=6)
     library = search_library(SearchState(evidence=evidence, base=null), gated=False)
-    foreign = compute_inflation(library.evidence, library.base, None) > evidence.rules.foreign_inflation
+    foreign = _tell_foreign(library)
     splines = differentiate_by_splines(library.evidence, library.base)
     explored = _add_best_form(library, splines)
-    if compute_inflation(explored.evidence, explored.base, None) > evidence.rules.foreign_inflation:
-        raise ForeignCarError
+    if still := _tell_foreign(explored):
+        raise ForeignCarError(still)
     # what the best explanation follows again is no noise
     noise = estimate_run_noise(explored.evidence, explored.base)
     evidence, explored = _change_runs(evidence, explored, lambda runs: set_run_noise(runs, noise))
@@ -250,9 +251,22 @@ def search_library_and_forms(
     same = [p.name for p in found.base.parts] == [p.name for p in explored.base.parts]
     found, near = search_forms(found, start, reasons, splines if same else None)
     if foreign and all(r.accepted.hypothesis.effect_class != "form" for r in found.rounds):
-        raise ForeignCarError
+        raise ForeignCarError(foreign)
     settled = settle_disputes(found, reasons)
     return start, settled, near if settled is found else None
+
+
+def _tell_foreign(found: SearchState) -> str:
+    """Return by how much the runs disagree, where that is another car's equations; else an empty text."""
+    most = found.evidence.rules.foreign_inflation
+    inflation = compute_inflation(found.evidence, found.base, None)
+    if inflation <= most:
+        return ""
+    runs = find_disagreeing_runs(found.evidence, found.base)[:2]
+    return (
+        f"the runs disagree with the model by a factor of {inflation:.1f} whatever the library adds (noise alone gives 1,"
+        f" single effects can be told up to {most:g}){f', most in {join_phrases(runs)}' if runs else ''}"
+    )
 
 
 def _change_runs(

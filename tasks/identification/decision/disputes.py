@@ -17,7 +17,7 @@ BODY_INSTRUMENTS = ("pitch", "pitch_rate", "vertical")
 
 
 class ForeignCarError(Exception):
-    """The runs disagree about every direction even with the best effects: the model's equations do not fit the car."""
+    """The model's equations do not fit the car, even with the best effects; its text says by how much."""
 
 
 def settle_disputes(found: SearchState, reasons: list[str]) -> SearchState:
@@ -41,7 +41,10 @@ def settle_disputes(found: SearchState, reasons: list[str]) -> SearchState:
         inflation = compute_own_inflation(evidence, found.base, part)
         if inflation > evidence.rules.disputed_inflation:
             if not moves_body_alone(part):
-                raise ForeignCarError
+                raise ForeignCarError(
+                    f"the runs disagree about {part.name} by a factor of {inflation:.1f} (a name needs at most"
+                    f" {evidence.rules.disputed_inflation:g})"
+                )
             reasons.append(
                 f"{part.name} would fit, but the runs disagree about it by a factor of {inflation:.1f} (a name needs at"
                 f" most {evidence.rules.disputed_inflation:g}): not named"

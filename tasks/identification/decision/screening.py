@@ -71,18 +71,37 @@ def compute_inflation(evidence: Evidence, at: Fit, own: NDArray[np.float64] | No
     at : fit whose residuals are used
     own : float64 [R] z of the direction itself, or None for the null's level alone
     """
-    z = np.full((len(evidence.train), len(evidence.effects)), np.nan)
-    for i, (run, r) in enumerate(zip(evidence.train, at.residuals, strict=True)):
-        q, qr = run.library_q, run.project_on_nuisances(r)
-        information = np.einsum("ij,ij->j", run.library, run.library) - np.einsum("ij,ij->j", q, q)
-        alive = information * np.array([e.parameters[0].step for e in evidence.effects]) ** 2 > 0.05
-        z[i, alive] = ((run.library.T @ r - q.T @ qr) / np.sqrt(np.maximum(information, 1e-30)))[alive]
+    z = _compute_run_scores(evidence, at)
     count = np.sum(np.isfinite(z), axis=0)
     mean_square = np.nansum(z**2, axis=0)[count >= 4] / count[count >= 4]
     level = max(float(np.median(mean_square)), 1.0) if mean_square.size else 1.0
     if own is None or len(own) < 3:
         return level
     return max(level, (float(np.sum(own**2)) + 6.0 * level) / (len(own) - 1 + 6.0))
+
+
+def find_disagreeing_runs(evidence: Evidence, at: Fit) -> list[str]:
+    """Return the training runs of which the library's directions would explain something beyond noise, the most first.
+
+    Parameters
+    ----------
+    evidence : the runs
+    at : fit whose residuals are used
+    """
+    z = np.ma.masked_invalid(_compute_run_scores(evidence, at))
+    typical = np.ma.median(z**2, axis=1).filled(0.0)
+    return [evidence.train[i].model.run.name for i in np.argsort(-typical, kind="stable") if typical[i] > 1.0]
+
+
+def _compute_run_scores(evidence: Evidence, at: Fit) -> NDArray[np.float64]:
+    """Return the score of every run in every library direction, float64 [R, E]; NaN where a run says nothing of it."""
+    z = np.full((len(evidence.train), len(evidence.effects)), np.nan)
+    for i, (run, r) in enumerate(zip(evidence.train, at.residuals, strict=True)):
+        q, qr = run.library_q, run.project_on_nuisances(r)
+        information = np.einsum("ij,ij->j", run.library, run.library) - np.einsum("ij,ij->j", q, q)
+        alive = information * np.array([e.parameters[0].step for e in evidence.effects]) ** 2 > 0.05
+        z[i, alive] = ((run.library.T @ r - q.T @ qr) / np.sqrt(np.maximum(information, 1e-30)))[alive]
+    return z
 
 
 def find_look_alikes(evidence: Evidence, index: int) -> list[int]:

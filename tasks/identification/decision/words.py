@@ -29,6 +29,7 @@ def tell_verdict(
     error: Mapping[str, ChannelError],
     manoeuvres: Mapping[str, ChannelError],
     suggested: NamedEffect | None = None,
+    misses: bool = False,
 ) -> str:
     """Return the verdict in plain words.
 
@@ -39,12 +40,15 @@ def tell_verdict(
     library : effects that may be named
     error, manoeuvres : on runs to which no number was fitted
     suggested : what the training runs show and the held-out runs neither confirm nor contradict, if nothing is named
+    misses : whether the runs disagree with the model by more than single effects can be told beside
     """
     if not effects and suggested is not None:
         return (
             "These runs prove nothing that the model lacks. The training runs suggest that"
             f" {say_effect(suggested, library)}; the held-out runs do not confirm it."
         )
+    if not effects and misses:
+        return "The model misses these runs by more than their noise, and nothing that can be named explains it."
     if not effects:
         return "These runs show nothing that the model lacks."
     told = [say_effect(effect, library) for effect in effects]

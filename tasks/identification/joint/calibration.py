@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from tasks.campaign.campaign import SESSION, Campaign
+from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
 from tasks.identification.decision.disputes import ForeignCarError
 from tasks.identification.inference.noise import estimate_channel_noise
 from tasks.identification.joint.fit import JointFit, fit_jointly, measure_misfit, suggest_starts
@@ -99,7 +99,11 @@ def calibrate_gain(
     misfit = measure_misfit(fitted, train)
     seen = np.flatnonzero(np.isfinite(misfit))
     if np.any(misfit[seen] > rules.foreign_misfit * noise[seen]):
-        raise ForeignCarError
+        worst = int(seen[np.argmax(misfit[seen] / noise[seen])])
+        raise ForeignCarError(
+            f"no brake gain makes the car the model's: the {CHANNELS[worst].replace('_', ' ')} misses by"
+            f" {misfit[worst] / noise[worst]:.1f} times its noise (at most {rules.foreign_misfit:g})"
+        )
     gain = next(number for number in shown if number.name == GAIN)
     wheels = any(name.startswith("wheel_speed") for name in campaign.channels)
     held = ("mass",) if wheels else ("mass", "wheel_radius")

@@ -1,7 +1,6 @@
 """Single effects of a car that its file knows but for its brake gain, and of one whose driver held his speed."""
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -58,17 +57,19 @@ def find_single_effects(
         found = trace.end.base
         return measure_drive(train, *compose_parameters(found.parts, found.values, found.session), share)
 
-    drive, whole = measure_drive(train, np.zeros(len(EFFECT_TABLE)), (), share), None
+    drive, whole, foreign = measure_drive(train, np.zeros(len(EFFECT_TABLE)), (), share), None, ForeignCarError()
     if drive <= rules.joint.driven_acceleration:
-        with suppress(ForeignCarError):
+        try:
             whole = search(campaign)
             drive = measure_drive_beside(whole)
+        except ForeignCarError as error:
+            foreign = error
     if whole is not None and drive <= rules.joint.driven_acceleration:
         return whole
     trace = search(begin_at_brake(campaign, vehicle, surface, share))
     drive = max(drive, measure_drive_beside(trace))
     if drive <= rules.joint.driven_acceleration:
-        raise ForeignCarError
+        raise foreign
     return replace(
         trace, verdict=replace(trace.verdict, reasons=(*trace.verdict.reasons, tell_driven(drive)))
     )

@@ -79,6 +79,7 @@ def judge_jointly(
     numbers: Sequence[JointNumber],
     rules: DecisionRules,
     *,
+    disagreement: str = "",
     progress: Callable[[str], None] = lambda stage: None,
 ) -> JointTrace:
     """Calibrate a car on its training runs, take away what does not earn its place, and name what is left.
@@ -89,6 +90,7 @@ def judge_jointly(
     vehicle, surface : the model that is judged
     numbers : that a fit may move
     rules : of the decision
+    disagreement : why single effects could not be told; empty where they were not looked for
     progress : called with the name of each stage as it begins
     """
     joint = rules.joint
@@ -104,7 +106,7 @@ def judge_jointly(
     # at a better fit a number may be no longer certain
     fitted = eliminate_uncertain_numbers(train, settled, joint)
     progress("held-out error")
-    reasons: list[str] = []
+    reasons = [disagreement] if disagreement else []
     fitted = drop_what_predicts_worse(train, held_out, fitted, joint, reasons)
     retuned = refit_numbers(train, fitted, tuple(n for n in fitted.numbers if n.group in CALIBRATED))
     predicted = predict_held_out(held_out, retuned, fitted)
@@ -143,6 +145,7 @@ def judge_jointly(
         experiment=None,
         forked=(),
         reasons=tuple(reasons),
+        disagreement=disagreement,
     )  # fmt: skip
     return JointTrace(
         verdict=verdict,

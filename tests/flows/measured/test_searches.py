@@ -10,24 +10,17 @@ from tasks.identification.decision.disputes import ForeignCarError
 
 @pytest.mark.parametrize(
     ("says_little", "foreign", "judge"),
-    [
-        (False, None, "one"),
-        (False, "find_single_effects", "joint"),
-        (True, None, "joint"),
-    ],
+    [(False, False, "one"), (False, True, "joint, because the runs disagree"), (True, False, "joint, because ")],
 )
 def test_the_search_is_chosen_by_what_is_known_and_by_whether_the_runs_agree(
     monkeypatch, says_little, foreign, judge
 ):
-    def answer_as(name: str, answer: object) -> object:
-        def answer_or_refuse(*_: object, **__: object) -> object:
-            if foreign == name:
-                raise ForeignCarError
-            return answer
-
-        return answer_or_refuse
+    def find_one(*_: object) -> str:
+        if foreign:
+            raise ForeignCarError("the runs disagree")
+        return "one"
 
     monkeypatch.setattr(searches, "needs_joint_fit", lambda *_: says_little)
-    for name, answer in (("find_single_effects", "one"), ("judge_jointly", "joint")):
-        monkeypatch.setattr(searches, name, answer_as(name, answer))
+    monkeypatch.setattr(searches, "find_single_effects", find_one)
+    monkeypatch.setattr(searches, "judge_jointly", lambda *_, disagreement: f"joint, because {disagreement}")
     assert searches.judge_campaign(SimpleNamespace(), SimpleNamespace(), SimpleNamespace(), ()) == judge

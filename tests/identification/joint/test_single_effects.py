@@ -120,7 +120,7 @@ def test_runs_are_searched_from_the_brake_on_where_their_driver_held_the_speed(
 
 def test_a_foreign_car_that_coasts_is_left_to_the_joint_fit(monkeypatch):
     tried = answer_in_turn(monkeypatch, (0.0, 0.0), whole_is_foreign=True)
-    with pytest.raises(ForeignCarError):
+    with pytest.raises(ForeignCarError, match="the runs disagree"):
         find_single_effects(make_campaign({}, held=False), KNOWN, SURFACE, (), (), RULES)
     assert tried == ["whole", "begun"]
 
@@ -133,7 +133,7 @@ def answer_in_turn(monkeypatch, drives, whole_is_foreign: bool) -> list[str]:
         begun = len(campaign.runs[0].pressure) < 390
         tried.append("begun" if begun else "whole")
         if whole_is_foreign and not begun:
-            raise ForeignCarError
+            raise ForeignCarError("the runs disagree")
         base = SimpleNamespace(parts=(), values=np.empty(0), session=np.zeros(7))
         return Trace(verdict=Told(), start=None, end=SimpleNamespace(base=base), compared=())
 
