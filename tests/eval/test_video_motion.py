@@ -62,7 +62,7 @@ def test_a_reference_that_ends_behind_the_windows_scores_as_a_whole_one(window: 
     assert geometry_error(TIMES, HUMP, ended, 2.2, window) == whole
     # its own smoothing feels the end, which lies half a window behind the flank
     assert geometry_error(TIMES, ended, ended, 2.2, window) == pytest.approx(whole, abs=1e-9)
-    with pytest.raises(InputError, match="is to 4.20 s"):
+    with pytest.raises(InputError, match=r"is to 4\.20 s"):
         geometry_error(TIMES, HUMP, np.where(TIMES <= 4.25, HUMP, np.nan), 2.2, window)
 
 

@@ -56,7 +56,10 @@ def test_what_only_the_training_runs_show_is_suggested_and_not_named() -> None:
 
 def test_no_name_beside_runs_that_the_model_misses_is_no_claim_that_nothing_is_missing() -> None:
     told = tell_verdict((), (), (), {}, {}, misses=True)
-    assert told == "The model misses these runs by more than their noise, and nothing that can be named explains it."
+    assert (
+        told
+        == "The model misses these runs by more than their noise, and nothing that can be named explains it."
+    )
 
 
 def test_an_error_is_said_without_an_exponent() -> None:

@@ -264,8 +264,8 @@ def _tell_foreign(found: SearchState) -> str:
         return ""
     runs = find_disagreeing_runs(found.evidence, found.base)[:2]
     return (
-        f"the runs disagree with the model by a factor of {inflation:.1f} whatever the library adds (noise alone gives 1,"
-        f" single effects can be told up to {most:g}){f', most in {join_phrases(runs)}' if runs else ''}"
+        f"the runs disagree with the model by a factor of {inflation:.1f} whatever the library adds (noise alone gives"
+        f" 1, single effects can be told up to {most:g}){f', most in {join_phrases(runs)}' if runs else ''}"
     )
 
 

@@ -48,7 +48,9 @@ def tell_verdict(
             f" {say_effect(suggested, library)}; the held-out runs do not confirm it."
         )
     if not effects and misses:
-        return "The model misses these runs by more than their noise, and nothing that can be named explains it."
+        return (
+            "The model misses these runs by more than their noise, and nothing that can be named explains it."
+        )
     if not effects:
         return "These runs show nothing that the model lacks."
     told = [say_effect(effect, library) for effect in effects]

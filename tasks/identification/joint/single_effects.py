@@ -57,7 +57,8 @@ def find_single_effects(
         found = trace.end.base
         return measure_drive(train, *compose_parameters(found.parts, found.values, found.session), share)
 
-    drive, whole, foreign = measure_drive(train, np.zeros(len(EFFECT_TABLE)), (), share), None, ForeignCarError()
+    drive = measure_drive(train, np.zeros(len(EFFECT_TABLE)), (), share)
+    whole, foreign = None, ForeignCarError()
     if drive <= rules.joint.driven_acceleration:
         try:
             whole = search(campaign)

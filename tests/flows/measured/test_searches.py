@@ -10,7 +10,11 @@ from tasks.identification.decision.disputes import ForeignCarError
 
 @pytest.mark.parametrize(
     ("says_little", "foreign", "judge"),
-    [(False, False, "one"), (False, True, "joint, because the runs disagree"), (True, False, "joint, because ")],
+    [
+        (False, False, "one"),
+        (False, True, "joint, because the runs disagree"),
+        (True, False, "joint, because "),
+    ],
 )
 def test_the_search_is_chosen_by_what_is_known_and_by_whether_the_runs_agree(
     monkeypatch, says_little, foreign, judge

@@ -82,7 +82,7 @@ def test_a_car_that_no_gain_makes_the_models_is_left_to_the_joint_fit():
         )
         return replace(run, response=response)
 
-    with pytest.raises(ForeignCarError, match="the speed misses by .* times its noise"):
+    with pytest.raises(ForeignCarError, match="the speed misses by"):
         calibrate_campaign(make_campaign(tuple(shake_speed(run) for run in make_runs(0.0))))
 
 
