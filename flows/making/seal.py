@@ -222,11 +222,10 @@ def preview_sheet(layout: Layout, pictures_at: Path, plan: Plan, receipts: Seque
     frames = [frame for frame in PREVIEW_FRAMES if frame < plan.settings.frames]
     rows = []
     for receipt in pick_evenly(receipts, PREVIEW_CLIPS):
-        pictures = read_clip(pictures_at, receipt["index"], "rgb")
+        pictures = list(read_clip(pictures_at, receipt["index"], "rgb", frames))
         columns = read_columns(layout.staged(receipt["clip_id"], "frames"))
         label = receipt["label"] + (" (quarantined)" if is_quarantined(receipt) else "")
-        rows.append((label, [pictures[frame] for frame in frames],
-                     {"speed": columns["speed"], "pitch": columns["pitch"]}))  # fmt: skip
+        rows.append((label, pictures, {"speed": columns["speed"], "pitch": columns["pitch"]}))
     return encode_png(draw_contact_sheet(rows, frames, plan.settings.frame_rate_hz))
 
 

@@ -152,4 +152,4 @@ def _draw_still(layout: Layout, clip: Mapping[str, Any], station: float, caption
     pitch = np.rad2deg(columns["pitch"][frame])
     if columns["station"][-1] < station:
         caption = f"{caption}, not reached"
-    return f"{caption}  {pitch:.2f} deg", read_clip(layout.frames, clip["index"], "rgb")[frame]
+    return f"{caption}  {pitch:.2f} deg", read_clip(layout.frames, clip["index"], "rgb", [frame])[0]

@@ -4,7 +4,7 @@ A shard has one writer. Zarr takes an absent shard for fill values, black pictur
 one that is absent is damage. Every chunk ends in a CRC-32C, because Blosc alone lets flipped bits through.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import prod
 from pathlib import Path
 from typing import Any, Literal
@@ -104,19 +104,28 @@ def write_clip(path: Path, index: int, buffers: Mapping[str, np.ndarray]) -> Non
         _write_files(path / name, files)
 
 
-def read_clip(path: Path, index: int, name: str) -> np.ndarray:
+def read_clip(path: Path, index: int, name: str, frames: Sequence[int] | None = None) -> np.ndarray:
     """One clip's frames of one array, decoded and checksum-verified.
+
+    Parameters
+    ----------
+    path : of the group
+    index : of the clip
+    name : of the array
+    frames : that are read, in their order; None reads all
 
     Raises
     ------
     InputError
-        If the metadata are not those that muSync writes, there is no such clip, or its pictures are damaged.
+        If the metadata are not those that muSync writes, there is no such clip or frame, or its pictures are damaged.
     """
     shape = check_array(read_local_metadata(path), name, path)
     if not 0 <= index < shape[0]:
         raise InputError(f"{path}/{name}: has {shape[0]} clips; there is no clip {index}")
     try:
-        return read_frames(path, name, shape, index, slice(0, shape[1]))
+        if frames is None:
+            return read_frames(path, name, shape, index, slice(0, shape[1]))
+        return np.concatenate([read_frames(path, name, shape, index, slice(f, f + 1)) for f in frames])
     except (ValueError, RuntimeError, OSError) as error:
         raise InputError(
             f"{path}/{name}: clip {index} must be readable; {shorten(error)}: musync repair makes it again"

@@ -16,6 +16,7 @@ from flows.running.orchestration import run_as_stage
 from flows.running.runner import (
     ALLOCATOR,
     SPAWNED,
+    WATCH,
     choose_runner,
     open_executor,
     run_unordered,
@@ -23,7 +24,13 @@ from flows.running.runner import (
 )
 from manifests.provenance import SOURCE_ROOT
 from tasks.errors import InputError
-from tests.flows.running.calls import end_worker, list_variables, square_or_fail, tell_process_id
+from tests.flows.running.calls import (
+    end_worker,
+    list_settings,
+    list_variables,
+    square_or_fail,
+    tell_process_id,
+)
 
 
 @pytest.fixture(scope="module")
@@ -124,6 +131,11 @@ def test_a_runner_that_does_not_exist_is_refused_and_not_taken_for_dask(runner, 
 def test_local_workers_keep_the_memory_that_the_next_frame_needs(executors):
     found = executors["dask"].submit(list_variables, tuple(ALLOCATOR)).result()
     assert found == {name: str(value) for name, value in ALLOCATOR.items()}
+
+
+def test_local_workers_watch_themselves_seldom(executors):
+    found = executors["dask"].submit(list_settings, tuple(WATCH)).result()
+    assert found == WATCH
 
 
 def test_each_worker_process_sees_one_gpu_of_those_visible(executors):

@@ -9,6 +9,7 @@ from flows.store.frame_metadata import check_array, read_local_metadata
 from flows.store.frames import COMPRESSIONS, create_arrays, read_clip, read_frames, write_clip
 from flows.store.layout import Layout
 from flows.store.shards import read_chunks
+from tasks.errors import InputError
 
 SHAPE = (5, 16, 24)
 
@@ -47,6 +48,12 @@ def test_frames_are_those_that_zarr_reads(layout, name):
             read_frames(layout.frames, name, shape, index, span)
     with pytest.raises(ValueError, match="the shard is missing"):
         read_frames(layout.frames, name, shape, 0, slice(0, 2))
+
+
+def test_chosen_frames_of_a_clip_are_read_in_their_order(layout):
+    np.testing.assert_array_equal(read_clip(layout.frames, 1, "rgb", [4, 0]), make_buffers()["rgb"][[4, 0]])
+    with pytest.raises(InputError, match="there are 2 clips of 5 frames"):
+        read_clip(layout.frames, 1, "rgb", [0, 5])
 
 
 def test_a_clip_of_fill_values_alone_has_its_shards_too(layout):
