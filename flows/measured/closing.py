@@ -69,6 +69,10 @@ def close_loop(
         result["reasons"].append(
             f"the held-out runs of this campaign have been read {earlier} time(s) before: this is no first look"
         )
+    if held := find_unused_tolerances(name):
+        result["reasons"].append(
+            f"the file's tolerances of {', '.join(held)} move nothing: a verdict holds these numbers"
+        )
     found = replace(trace.verdict, effects=(*trace.verdict.effects, *trace.calibrated))
     text, missing = grown_vehicle(name, found, _reached_ranges(trace))
     result["vehicle_file"] = None
@@ -100,6 +104,17 @@ def session_tolerances(vehicle: str) -> dict[str, float]:
         for name, fields in CARRIED.items()
         if given.keys() & fields
     }
+
+
+def find_unused_tolerances(vehicle: str) -> list[str]:
+    """Return the numbers and effects of a vehicle file whose tolerances are those of no number that a session moves.
+
+    Parameters
+    ----------
+    vehicle : catalogue name or file
+    """
+    moved = set().union(*CARRIED.values())
+    return [name for name in load_tolerances(vehicle) if name not in moved]
 
 
 def _reached_ranges(trace: Trace | JointTrace) -> dict[str, tuple[float, float]]:

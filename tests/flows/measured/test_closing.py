@@ -16,7 +16,7 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_provenance
 from flows.cli import app
 from flows.making.plan import make_plan
-from flows.measured.closing import close_loop, verdict_json
+from flows.measured.closing import close_loop, find_unused_tolerances, verdict_json
 from flows.measured.closing_ledger import record_reading
 from flows.measured.friction_pulls import FRICTION_OFFSET, find_pulled_runs, tell_friction_pulls
 from flows.measured.grown_vehicle import grown_vehicle
@@ -107,6 +107,18 @@ def test_a_lag_in_the_data_is_named_with_its_value_and_better_predictions(closed
     assert speed["after"] < 0.5 * speed["frozen"] and speed["ci_low"] <= speed["after"] <= speed["ci_high"]
     distance = verdict["manoeuvre_error"]["stopping_distance"]
     assert distance["unit"] == "m" and distance["after"] < 0.5 * distance["frozen"]
+
+
+def test_a_tolerance_that_no_verdict_uses_is_told(tmp_path: Path) -> None:
+    numbers = {
+        name: {"value": value, "unit": unit, "source": "guess", "tolerance": 0.1 * value}
+        for name, value, unit in (("cg_height", 0.55, "m"), ("wheel_radius", 0.33, "m"))
+    }
+    drag = {"value": 0.6, "unit": "m2", "source": "data sheet", "tolerance": 0.06}
+    file = tmp_path / "car.yaml"
+    file.write_text(yaml.safe_dump({"extends": "paper-reference", **numbers, "effects": {"drag_area": drag}}))
+    assert find_unused_tolerances(str(file)) == ["cg_height", "drag_area"]
+    assert find_unused_tolerances("paper-reference") == []
 
 
 def test_runs_that_grip_as_the_mapping_says_pull_no_friction(closed: Path) -> None:
