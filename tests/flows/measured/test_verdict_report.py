@@ -80,6 +80,18 @@ def text(judged: tuple[JointTrace, Campaign]) -> str:
     return write_verdict_page(trace, facts(trace), campaign)
 
 
+def test_where_nothing_is_named_the_verdict_says_whether_the_model_misses_the_runs(
+    judged: tuple[JointTrace, Campaign],
+) -> None:
+    nothing = replace(judged[0].verdict, effects=(), rivals=())
+    sentences = [
+        tell_search(replace(judged[0], verdict=replace(nothing, disagreement=why)))["sentence"]
+        for why in ("", "the runs disagree")
+    ]
+    assert sentences[0] == "These runs show nothing that the model lacks."
+    assert sentences[1].startswith("The model misses these runs")
+
+
 def test_the_page_says_the_verdict_its_numbers_rivals_and_what_to_do_next(
     text: str, judged: tuple[JointTrace, Campaign]
 ) -> None:

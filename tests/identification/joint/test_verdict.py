@@ -92,6 +92,14 @@ def test_the_answer_does_not_depend_on_the_numbers_that_the_file_starts_from():
     assert 0.4 * (1.0 + found["retuned_pressure_gain"][1]) == pytest.approx(1.3, abs=0.02)
 
 
+def test_why_single_effects_could_not_be_told_is_the_first_reason():
+    numbers = [n for n in load_joint_numbers() if n.name == "pressure_gain"]
+    why = "the runs disagree"
+    told = judge_jointly(campaign_of({}), VEHICLE, SURFACE, numbers, RULES, disagreement=why).verdict
+    assert told.reasons[0] == told.disagreement == why
+    assert why not in judge_jointly(campaign_of({}), VEHICLE, SURFACE, numbers, RULES).verdict.reasons
+
+
 def test_a_car_that_is_as_its_file_says_lacks_nothing():
     trace = judge(campaign_of({}))
     assert trace.verdict.verdict == "NOTHING" and not named_intervals(trace)
