@@ -28,7 +28,7 @@ COMMANDS = (
         function="flows.studies.ablation:run_ablation",
         options=(
             define_option("out", str, "Folder for ablation.json, .parquet and .svg."),
-            define_option("vehicle", str, VEHICLE.help, "multibody-grown", known=VEHICLE.known),
+            define_option("vehicle", str, VEHICLE.help, "paper-reference", known=VEHICLE.known),
             MODE,
             define_option(
                 "traces",

@@ -31,7 +31,7 @@ Rows = list[dict[str, Any]]
 
 
 def run_ablation(
-    *, out: str, vehicle: str = "multibody-grown", mode: Mode | None = None, traces: str | None = None
+    *, out: str, vehicle: str = "paper-reference", mode: Mode | None = None, traces: str | None = None
 ) -> dict[str, Any]:
     """Cut one coupling at a time and report the figures that change.
 

@@ -75,6 +75,7 @@ def test_only_the_coupled_car_dives_before_the_hump_and_reaches_it_late(
 
 def test_without_traces_the_oracle_is_said_not_to_have_run(made: tuple[dict[str, Any], Path]) -> None:
     result, out = made
+    assert (result["vehicle"], result["mode"]) == ("paper-reference", "paper")
     assert result["reference"]["note"] == "not run: no reference traces given"
     assert pq.read_table(out / "ablation.parquet").column_names == [
         "time",
@@ -87,7 +88,7 @@ def test_the_full_model_follows_the_reference_and_no_cut_one_does(outside_data: 
     traces = outside_data / "reference" / "multibody"
     if not traces.is_dir():
         pytest.skip(f"no reference traces at {traces}")
-    figures = run_ablation(out=str(tmp_path), traces=str(traces))["reference"]
+    figures = run_ablation(out=str(tmp_path), vehicle="multibody-grown", traces=str(traces))["reference"]
     assert figures["full_pitch_rmse_deg"] < 0.05
     assert all(figures[f"{name}_pitch_rmse_deg"] > 0.4 for name in COUPLINGS if name != "full")
 
