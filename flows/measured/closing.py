@@ -199,6 +199,7 @@ def verdict_json(verdict: Verdict) -> dict[str, Any]:
             }
             for channel, c in verdict.correlation.items()
         },
+        "disagreement": verdict.disagreement,
         "reasons": list(verdict.reasons),
         "tried": [effect_json(effect, library) for effect in verdict.tried],
         "session_pulls_sigma": {

@@ -33,6 +33,8 @@ MEANING = {
     "SENSOR": "no physics is missing; an instrument has an error",
     "NOTHING": "nothing is proven to be missing",
 }
+MISSED = "what is missing cannot be named"
+"""What no name means where the runs disagree with the model beyond their noise."""
 
 
 def write_verdict_page(trace: Trace | JointTrace, result: Mapping[str, Any], campaign: Campaign) -> str:
@@ -68,7 +70,7 @@ def write_verdict_page(trace: Trace | JointTrace, result: Mapping[str, Any], cam
             "error_rates": tell_error_rates([effect["name"] for effect in result["effects"]]),
         }
     return pages.get_template(template).render(
-        campaign=campaign, result=result, meaning=MEANING[result["verdict"]], steps=find_next_steps(result, campaign),
+        campaign=campaign, result=result, meaning=_tell_meaning(result), steps=find_next_steps(result, campaign),
         figures=figures, style=style, scripts=scripts, policy=make_policy(scripts=scripts), **told,
     )  # fmt: skip
 
@@ -96,11 +98,12 @@ def find_next_steps(result: Mapping[str, Any], campaign: Campaign) -> list[tuple
             )
         )
     elif result["verdict"] == "NOTHING":
-        wanted = (
-            "stops at the limit of friction, from several speeds on each surface,"
-            if find_pulled_runs(result)
-            else "runs that reach further than these, faster and harder,"
-        )
+        if result["disagreement"]:
+            wanted = "more runs in the conditions of those that the model misses, at several speeds,"
+        elif find_pulled_runs(result):
+            wanted = "stops at the limit of friction, from several speeds on each surface,"
+        else:
+            wanted = "runs that reach further than these, faster and harder,"
         steps.append((f"Record {wanted} and import them with the others:", IMPORT))
     grown = result["vehicle_file"]
     name = grown or campaign.vehicle
@@ -117,6 +120,11 @@ def find_next_steps(result: Mapping[str, Any], campaign: Campaign) -> list[tuple
         )
     )
     return steps
+
+
+def _tell_meaning(result: Mapping[str, Any]) -> str:
+    missed = result["verdict"] == "NOTHING" and result["disagreement"]
+    return MISSED if missed else MEANING[result["verdict"]]
 
 
 def _find_separations(trace: JointTrace) -> list[str | None]:

@@ -18,7 +18,7 @@ from catalogs.vehicles import load_vehicle
 from flows.measured.closing import tell_search, verdict_json
 from flows.measured.residuals import predict_runs
 from flows.measured.verdict_figures import find_alike_numbers, format_plain_unit, make_brake_curve
-from flows.measured.verdict_report import find_next_steps, write_verdict_page
+from flows.measured.verdict_report import MISSED, find_next_steps, write_verdict_page
 from tasks.campaign.campaign import Campaign
 from tasks.campaign.planned_runs import RunPlan
 from tasks.identification.benchmark import make_synthetic_campaign
@@ -90,6 +90,9 @@ def test_where_nothing_is_named_the_verdict_says_whether_the_model_misses_the_ru
     ]
     assert sentences[0] == "These runs show nothing that the model lacks."
     assert sentences[1].startswith("The model misses these runs")
+    missed = replace(judged[0], verdict=replace(nothing, verdict="NOTHING", disagreement="the runs disagree"))
+    page = write_verdict_page(missed, facts(missed), judged[1])
+    assert MISSED in page and "more runs in the conditions of those that the model misses" in page
 
 
 def test_the_page_says_the_verdict_its_numbers_rivals_and_what_to_do_next(
