@@ -34,7 +34,7 @@ MEANING = {
     "NOTHING": "nothing is proven to be missing",
 }
 MISSED = "what is missing cannot be named"
-"""What no name means where the runs disagree with the model beyond their noise."""
+"""Meaning of NOTHING where the runs disagree with the model by more than their noise."""
 
 
 def write_verdict_page(trace: Trace | JointTrace, result: Mapping[str, Any], campaign: Campaign) -> str:
