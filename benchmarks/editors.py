@@ -114,8 +114,9 @@ def add_noise(frames: Frames, seed: int) -> Frames:
 
 def warp_road(frames: Frames) -> Frames:
     """Frames whose road swims: below the horizon each row is shifted up and down by a wave that runs with time."""
-    y, x = np.mgrid[:HEIGHT, :WIDTH].astype(np.float32)
-    road = np.clip((y - 0.55 * HEIGHT) / (0.1 * HEIGHT), 0, 1)
+    height, width = frames.shape[1:3]
+    y, x = np.mgrid[:height, :width].astype(np.float32)
+    road = np.clip((y - 0.55 * height) / (0.1 * height), 0, 1)
     return np.stack([
         cv2.remap(frame, x, y + WARP_PX * road * np.sin(0.6 * k + y / 15), cv2.INTER_LINEAR,
                   borderMode=cv2.BORDER_REPLICATE)
@@ -131,7 +132,8 @@ def paint(frames: Frames, mask: NDArray[np.bool_]) -> Frames:
 def write_video(path: Path, frames: Frames, rate: float, codec: str = "FFV1") -> None:
     """Write frames, without loss unless another codec is named."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*codec), rate, (WIDTH, HEIGHT))
+    height, width = frames.shape[1:3]
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*codec), rate, (width, height))
     if not writer.isOpened():
         raise RuntimeError(f"{path}: OpenCV cannot write {codec} here")
     for frame in frames:

@@ -148,7 +148,7 @@ COMMANDS = (
                 "paper",
                 known="catalogs/video_protocols/*.yaml",
             ),
-            define_option("out", str, "Folder for judge-set.json and judge-set.md."),
+            define_option("out", str, "Folder for judge-set.json, judge-set.md and motion.svg."),
             define_option(
                 "learned",
                 str | None,

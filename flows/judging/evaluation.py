@@ -7,6 +7,7 @@ from typing import Any, get_args
 import pyarrow as pa
 
 from catalogs.learned_judges import load_judges
+from flows.judging.dataset_motion import list_motion_panels
 from flows.judging.evaluation_means import mean_rows
 from flows.judging.evaluation_page import render_page
 from flows.judging.evaluation_rows import figure_row, group_weather_families
@@ -97,6 +98,10 @@ def evaluate_dataset(
     rows += learned_rows(view, clips, judges)
     rows += [figure_row(name, "-", "-", None, "1", note=note) for name, note in NOT_RUN.items()]
     rows += list(mean_rows(rows, clips))
+    curves = {
+        name: list_motion_panels(clips, standard, event_window)
+        for name, standard in zip(("telemetry", "reference"), standards, strict=False)
+    }
     codec = "lossless" if crf is None else f"H.264 crf {crf}"
     run_id = manifest["run_id"]
     result = {
@@ -104,7 +109,7 @@ def evaluate_dataset(
     }  # fmt: skip
     results.write_json("evaluation.json", result)
     write_parquet(pa.Table.from_pylist(rows, SCHEMA), results.path("evaluation.parquet"))
-    results.write("evaluation.html", render_page(clips, rows, run_id, codec))
+    results.write("evaluation.html", render_page(clips, rows, curves, run_id, codec))
     return result
 
 

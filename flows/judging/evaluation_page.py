@@ -1,7 +1,7 @@
 """The evaluation as one HTML page that needs no other file: plots as SVG, tables, thumbnails."""
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 
 from flows.drawing import as_svg, escape_formulas
 from flows.judging.judged_clip import JudgedClip, Row
+from flows.judging.motion_curves import COLOURS, MotionPanel, draw_motion
 from flows.pages import make_policy
 
-COLOURS = {"photometric": "#1f6fb2", "pnp": "#c0392b", "essential": "#2e8b57"}
 STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; max-width: 70rem; margin: 2rem auto; padding: 0 1rem; color: #1b1b1b; }
 h1 { font-size: 1.5rem; } h2 { font-size: 1.1rem; margin-top: 2rem; border-bottom: 1px solid #ddd; }
@@ -70,13 +70,20 @@ def describe_metric(name: str) -> str:
     return f"{meaning}; against independent traces" if own != name and meaning else meaning
 
 
-def render_page(clips: Sequence[JudgedClip], rows: Sequence[Row], run_id: str, codec: str) -> str:
+def render_page(
+    clips: Sequence[JudgedClip],
+    rows: Sequence[Row],
+    curves: Mapping[str, Sequence[MotionPanel]],
+    run_id: str,
+    codec: str,
+) -> str:
     """Return the HTML of the whole page.
 
     Parameters
     ----------
     clips : as their judges saw them
     rows : every figure
+    curves : panels of recovered motion, by what it is compared with
     run_id : of the dataset
     codec : what the pictures went through before they were judged
     """
@@ -92,6 +99,7 @@ def render_page(clips: Sequence[JudgedClip], rows: Sequence[Row], run_id: str, c
         " visual seed and then over seeds.</p>", _render_summary(rows, names),
         "<h2>Pitch: claimed and recovered</h2>",
         _render_figure(_pitch_plot(clips), f"Claimed (black) and recovered; the first {SHOWN_CLIPS} clips at most."),
+        *_render_motion(curves),
         *_render_geometry(rows),
         "<h2>Clips</h2>", _render_thumbnails(clips),
         "<h2>Every figure</h2>",
@@ -194,6 +202,14 @@ def _pitch_plot(clips: Sequence[JudgedClip]) -> Figure:
         axis.set_axis_off()
     axes[0].legend(fontsize=6)
     return figure
+
+
+def _render_motion(curves: Mapping[str, Sequence[MotionPanel]]) -> list[str]:
+    """The section on the response to weather and road; nothing for a dataset without a dry twin or a feature."""
+    shown = {meant: panels for meant, panels in curves.items() if panels}
+    caption = "Mean over visual seeds, with one standard deviation where there are several; shaded: the event window."
+    figures = [_render_figure(draw_motion(panels, meant), caption) for meant, panels in shown.items()]
+    return ["<h2>Response to weather and road</h2>", *figures] if figures else []
 
 
 def _render_geometry(rows: Sequence[Row]) -> list[str]:

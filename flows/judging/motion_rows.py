@@ -8,7 +8,7 @@ import numpy as np
 from catalogs.gates import load_gates
 from flows.judging.evaluation_rows import figure_row, find_control
 from flows.judging.judged_clip import JudgedClip, Row
-from flows.judging.standards import MeantMotion, Standard, opening_of
+from flows.judging.standards import MeantMotion, Standard, opening_of, require_whole_way
 from tasks.errors import InputError
 from tasks.eval.motion_agreement import rms
 from tasks.eval.poses.motion import RecoveredMotion, motion_of_telemetry
@@ -98,8 +98,8 @@ def weather_rows(clips: Sequence[JudgedClip], standard: Standard) -> Iterator[Ro
         forward = motion.normalised_path, other.normalised_path
         for window in WINDOWS:
             try:
-                _need_whole(meant)
-                _need_whole(dry)
+                require_whole_way(meant)
+                require_whole_way(dry)
                 floor = weather_error(station, control_station, station, control_station, window)
                 error = None if failure else weather_error(
                     forward[0][:, 0], forward[1][:, 0], station, control_station, window
@@ -132,7 +132,7 @@ def geometry_rows(
         height = clip.facts["hazard_height_m"]
         if height == 0:
             continue
-        opening = PAPER_OPENING if event_window == "paper" else opening_of(clip, meant)
+        opening = find_opening(clip, meant, event_window)
         name = f"e_geometry_{'hump' if height > 0 else 'depression'}{standard.suffix}"
         failure = _describe_failure(motion)
         for window in WINDOWS:
@@ -149,6 +149,18 @@ def geometry_rows(
             yield figure_row(
                 name, method, clip.facts["label"], error, "1", note=note, window=window, floor=floor
             )
+
+
+def find_opening(clip: JudgedClip, meant: MeantMotion, event_window: EventWindow) -> float:
+    """Return when the event window of a clip opens [s]; infinity if its car never meets the feature.
+
+    Parameters
+    ----------
+    clip : with a road feature
+    meant : motion
+    event_window : of E_geometry
+    """
+    return PAPER_OPENING if event_window == "paper" else opening_of(clip, meant)
 
 
 def motion_of(clip: JudgedClip, method: str) -> RecoveredMotion | None:
@@ -173,13 +185,6 @@ def _list_judged(clips: Sequence[JudgedClip], standard: Standard) -> Iterator[Ju
             yield clip, method, motion, meant
         if standard.suffix and (told := motion_of(clip, TELEMETRY)) is not None:
             yield clip, TELEMETRY, told, meant
-
-
-def _need_whole(meant: MeantMotion) -> None:
-    if not np.isfinite(meant.station).all():
-        raise InputError(
-            f"case {meant.name} ends at {meant.end:g} s, before the clip, and its car still rolls"
-        )
 
 
 def _describe_case(meant: MeantMotion, *, ends: bool = False) -> str:

@@ -155,6 +155,24 @@ def opening_of(clip: JudgedClip, meant: MeantMotion) -> float:
     return float(np.interp(edge, meant.station[known], clip.times[known]))
 
 
+def require_whole_way(meant: MeantMotion) -> None:
+    """Check that the station of a motion is known at every frame.
+
+    Parameters
+    ----------
+    meant : motion
+
+    Raises
+    ------
+    InputError
+        If its trace ends while the car rolls.
+    """
+    if not np.isfinite(meant.station).all():
+        raise InputError(
+            f"case {meant.name} ends at {meant.end:g} s, before the clip, and its car still rolls"
+        )
+
+
 def _scenario_of(row: Mapping[str, Any]) -> Scenario:
     """The scenario of a clip from its row, in which null and NaN both mean that there is no value."""
     values: dict[str, Any] = {name: row[name] for name in SCENARIO_FIELDS}

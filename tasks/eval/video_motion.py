@@ -132,13 +132,24 @@ def weather_error(
     station, control_station : [F] the reference's, at the same times [m]
     window : smoothing of the recovered coordinates [frames]
     """
-    seen = normalised_progress(forward, window) - normalised_progress(control_forward, window)
-    meant = reference_progress(station) - reference_progress(control_station)
-    return rms(seen - meant)
+    seen = compare_progress(forward, control_forward, window)
+    return rms(seen - (reference_progress(station) - reference_progress(control_station)))
 
 
-def event_response(times: Floats, pitch: Floats, opening: float, protocol: MotionProtocol) -> Floats:
-    """Return the pitch in the event window less the line through its two flanks, [N] in the unit of `pitch`.
+def compare_progress(forward: Floats, control_forward: Floats, window: int | None) -> Floats:
+    """Return the change of normalised progress from the dry control [1].
+
+    Parameters
+    ----------
+    forward, control_forward, window : as in `weather_error`
+    """
+    return normalised_progress(forward, window) - normalised_progress(control_forward, window)
+
+
+def isolate_event(
+    times: Floats, pitch: Floats, opening: float, protocol: MotionProtocol
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """Return the pitch less the line through the flanks of the event window, and which frames lie in it, [F].
 
     Parameters
     ----------
@@ -172,7 +183,18 @@ def event_response(times: Floats, pitch: Floats, opening: float, protocol: Motio
         )
     flanks = before | after
     slope, level = np.polyfit(since[flanks], pitch[flanks], 1)
-    return pitch[event] - (level + slope * since[event])
+    return pitch - (level + slope * since), event
+
+
+def event_response(times: Floats, pitch: Floats, opening: float, protocol: MotionProtocol) -> Floats:
+    """Return the pitch in the event window less the line through its two flanks, [N] in the unit of `pitch`.
+
+    Parameters
+    ----------
+    times, pitch, opening, protocol : as in `isolate_event`
+    """
+    response, event = isolate_event(times, pitch, opening, protocol)
+    return response[event]
 
 
 def geometry_error(

@@ -9,12 +9,15 @@ import numpy as np
 from catalogs.learned_judges import load_judges
 from catalogs.sentences import cap_problems
 from catalogs.video_protocols import VideoProtocol, load_video_protocol
+from flows.drawing import as_svg
 from flows.judging.claims import read_claim
 from flows.judging.evaluation_means import average_within_seeds
 from flows.judging.foreign_sources import read_camera
 from flows.judging.judged_clip import Row
+from flows.judging.motion_curves import draw_motion
 from flows.judging.video_sets.files import VideoSet, find_set
 from flows.judging.video_sets.motion import JudgedSet, Key, SetMotion, look_at_clip
+from flows.judging.video_sets.motion_panels import list_set_panels
 from flows.judging.video_sets.picture_rows import PIXELS
 from flows.judging.video_sets.rows import set_rows
 from flows.running.orchestration import run_as_stage
@@ -32,6 +35,8 @@ COLUMNS = (
 )  # fmt: skip
 """Figures of the table, in the order of the paper's tables vggt_motion, geometry_visual_consistency and
 visual_quality_full_supp."""
+MOTION = "motion.svg"
+"""The paper's figure of recovered motion, drawn of the set."""
 MEASURED, FLOOR, PRINTED = "measured", "floor of a perfect pose", "printed"
 POSED = ("e_weather", "e_geometry_hump", "e_geometry_depression", "motion_retention", "e_path")
 """Figures that rest on a pose method; the others are of the pixels alone."""
@@ -46,7 +51,7 @@ def judge_video_set(
     ----------
     folder : of the set, as `flows.judging.video_sets.files.find_set` reads it
     protocol : name or file of a video protocol
-    out : folder for judge-set.json and judge-set.md
+    out : folder for judge-set.json, judge-set.md and motion.svg
     learned : YAML of local checkpoints of learned judges
     window : smoothing of the table's motion figures; 0 for none, None for the protocol's [frames]
 
@@ -55,7 +60,7 @@ def judge_video_set(
     InputError
         For every file that cannot be read, or that no clip of the protocol has; or for another window.
     """
-    results = Outputs(out, "judge-set", "judge-set.json", "judge-set.md")
+    results = Outputs(out, "judge-set", "judge-set.json", "judge-set.md", MOTION)
     chosen = load_video_protocol(protocol)
     smoothing = int(chosen.smoothing_window.value) if window is None else window
     known = [width or 0 for width in WINDOWS]
@@ -69,7 +74,10 @@ def judge_video_set(
         "missing": list_missing(judged), "unprinted": list(chosen.unprinted), "rows": rows,
     }  # fmt: skip
     results.write_json("judge-set.json", result)
-    results.write("judge-set.md", write_markdown(table, smoothing))
+    panels = list_set_panels(judged, smoothing or None)
+    if panels:
+        results.write(MOTION, as_svg(draw_motion(panels, "claimed")))
+    results.write("judge-set.md", write_markdown(table, smoothing, MOTION if panels else ""))
     return result
 
 
@@ -150,18 +158,24 @@ def list_missing(judged: JudgedSet) -> list[Row]:
     return found
 
 
-def write_markdown(table: Sequence[Row], window: int) -> str:
+def write_markdown(table: Sequence[Row], window: int, figure: str = "") -> str:
     """Return the table as Markdown, a model a row, without columns that nobody has a figure of.
 
     Parameters
     ----------
     table : rows of `measured_table` and `printed_table`
     window : of the motion figures [frames]
+    figure : file of the motion curves, shown below; empty for none
     """
     head = ("model", "by", "method", *(name for name in COLUMNS if any(row[name] for row in table)))
     lines = [head, ["---"] * len(head), *([format_cell(row[name]) for name in head] for row in table)]
     smoothed = f"Motion is smoothed over {window} frames." if window else "Motion is not smoothed."
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + f"\n\n{smoothed}\n"
+    shown = (
+        f"\n![Recovered motion, mean and deviation over seeds, against the claims]({figure})\n"
+        if figure
+        else ""
+    )
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + f"\n\n{smoothed}\n{shown}"
 
 
 def format_cell(value: Any) -> str:

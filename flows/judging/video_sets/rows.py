@@ -8,8 +8,14 @@ from numpy.typing import NDArray
 from catalogs.gates import load_foreign_gates
 from flows.judging.evaluation_rows import figure_row
 from flows.judging.judged_clip import Row
+from flows.judging.video_sets.conditions import (
+    find_control_clip,
+    pair_with_control,
+    require_control_clip,
+    sample_claimed_pitch,
+)
 from flows.judging.video_sets.files import SOURCE
-from flows.judging.video_sets.motion import JudgedSet, SetMotion, check_motion
+from flows.judging.video_sets.motion import JudgedSet, SetMotion
 from flows.judging.video_sets.picture_rows import edit_rows, learned_rows_of
 from tasks.errors import InputError
 from tasks.eval.foreign_video import judge_motion, sample_claim
@@ -19,7 +25,6 @@ from tasks.eval.video_motion import (
     geometry_error,
     motion_retention,
     path_error,
-    resample_onto_grid,
     weather_error,
 )
 
@@ -52,13 +57,9 @@ def clip_rows(judged: JudgedSet, seen: SetMotion) -> Iterator[Row]:
     if task == "weather" and name != judged.protocol.weather_control:
         yield from _weather_rows(judged, seen)
     if task == "geometry" and name != judged.protocol.geometry_control:
-        claim = judged.claims.get(seen.clip.clip)
 
         def compute(window: int | None) -> tuple[float, float]:
-            check_motion(seen)
-            if claim is None:
-                raise InputError(f"not run: claims/{seen.clip.clip}.parquet is missing")
-            meant = np.interp(seen.times, claim.time, claim.pitch, right=np.nan)
+            meant = sample_claimed_pitch(judged, seen)
             opening = judged.protocol.event_opening.value
             return (
                 geometry_error(seen.times, seen.motion.pitch, meant, opening, window),
@@ -116,39 +117,21 @@ def retention_rows(judged: JudgedSet, model: str, seed: str, method: str) -> Ite
 
 
 def _weather_rows(judged: JudgedSet, seen: SetMotion) -> Iterator[Row]:
-    protocol, clip = judged.protocol, seen.clip
-    name = f"weather/{protocol.weather_control}"
-    own = judged.find(clip.model, clip.seed, name, clip.method)
-    control = own or judged.find(SOURCE, "", name, clip.method)
-    claims = [judged.claims.get(key) for key in (clip.clip, name)]
-    steps = round(protocol.weather_duration.value / protocol.weather_interval.value)
-    grid = np.linspace(0.0, steps * protocol.weather_interval.value, steps + 1)
-    from_source = "" if own else "against the source's control: the model made none"
-
-    def need_control() -> SetMotion:
-        check_motion(seen)
-        if control is None:
-            raise InputError(f"not run: {name} is missing, of the model and of the source")
-        check_motion(control)
-        return control
+    clip, (control, own) = seen.clip, find_control_clip(judged, seen)
+    from_source = "" if own or control is None else "against the source's control: the model made none"
 
     def compute(window: int | None) -> tuple[float, float]:
-        other = need_control()
-        if (meant := claims[0]) is None or (dry := claims[1]) is None:
-            raise InputError(f"not run: claims of {clip.clip} and {name} are needed")
-        way, dry_way = (
-            resample_onto_grid(m.times, m.motion.normalised_path[:, 0], grid) for m in (seen, other)
-        )
-        station, dry_station = (resample_onto_grid(c.time, c.station, grid) for c in (meant, dry))
+        pair = pair_with_control(judged, seen)
         return (
-            weather_error(way, dry_way, station, dry_station, window),
-            weather_error(station, dry_station, station, dry_station, window),
+            weather_error(pair.way, pair.dry_way, pair.station, pair.dry_station, window),
+            weather_error(pair.station, pair.dry_station, pair.station, pair.dry_station, window),
         )
 
     yield from _windowed_rows("e_weather", seen, compute, from_source)
     error, note = None, from_source
     try:
-        error = path_error(seen.motion.normalised_path[:, :2], need_control().motion.normalised_path[:, :2])
+        other = require_control_clip(judged, seen)
+        error = path_error(seen.motion.normalised_path[:, :2], other.motion.normalised_path[:, :2])
     except InputError as fault:
         note = str(fault)
     yield figure_row("e_path", clip.method, clip.clip, error, "1", note=note, floor=0.0)

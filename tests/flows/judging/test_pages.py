@@ -8,6 +8,7 @@ import pytest
 
 from flows.judging.evaluation_page import render_page
 from flows.judging.evaluation_rows import figure_row
+from flows.judging.motion_curves import PITCH, MotionPanel
 from flows.pages import make_policy
 
 HOSTILE = [
@@ -66,5 +67,8 @@ def test_the_evaluation_takes_labels_as_text(hostile):
         figure_row("pitch_rmse", hostile, hostile, 1.0, "deg", note=hostile),
         figure_row("e_geometry_hump", hostile, hostile, 1.0, "1", floor=0.5, note=hostile),
     ]
-    found = assert_text_alone(render_page([clip], rows, hostile, hostile), hostile)
+    panel = MotionPanel(
+        title=hostile, quantity=PITCH, times=times, meant=np.zeros(5), recovered={hostile: np.zeros((2, 5))}
+    )
+    found = assert_text_alone(render_page([clip], rows, {hostile: [panel]}, hostile, hostile), hostile)
     assert sum(text == hostile for text in found.text) > 5
