@@ -19,6 +19,7 @@ from flows.registry import COMMANDS
 from manifests.provenance import SOURCE_ROOT
 from reference_pages.pages import WRITERS
 from tasks.conventions import CHANNELS_BY_NAME
+from tests.conftest import DATA
 from tests.documents import DOCS, DOCUMENTS, list_blocks, list_command_lines, list_named_commands
 
 OURS = {"musync", "flows", "manifests", "catalogs", "tasks"}
@@ -138,3 +139,14 @@ def test_columns_of_the_glossary_are_columns():
     )
     of_files = {"slip_stiffness", "pitch_scale", "coast_deceleration", "wheel_radius"}
     assert {name for row in rows for name in re.findall(r"`(\w+)`", row)} - of_files <= set(CHANNELS_BY_NAME)
+
+
+def test_every_table_and_figure_of_the_paper_has_its_row():
+    told = (DOCS / "evidence/paper.md").read_text()
+    labels = set(re.findall(r"\b(?:tab|fig):\w+", told))
+    kinds = [label.partition(":")[0] for label in labels]
+    assert (kinds.count("tab"), kinds.count("fig")) == (15, 14)
+    paper = DATA / "paper/musync-gs.tex"
+    if not paper.is_file():
+        pytest.skip("the paper's source is absent; only the number of its tables and figures was checked")
+    assert labels == set(re.findall(r"\\label\{((?:tab|fig):\w+)\}", paper.read_text()))

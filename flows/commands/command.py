@@ -148,7 +148,10 @@ CAMERA = define_option(
     known="catalogs/cameras/*.yaml",
 )
 OUT = define_option(
-    "out", str | None, "Folder for the result as a JSON file; by default no file is written.", None
+    "out",
+    str | None,
+    "Folder for the result as a JSON file, its figures and its page, where it has any; by default nothing is written.",
+    None,
 )
 BACKEND = define_option(
     "backend",

@@ -27,7 +27,7 @@ COMMANDS = (
         sentence="Cut one coupling at a time (the paper's Section 4.4): stops over the weather, pitch at a hump.",
         function="flows.studies.ablation:run_ablation",
         options=(
-            define_option("out", str, "Folder for ablation.json, .parquet and .svg."),
+            define_option("out", str, "Folder for ablation.json, .parquet, .svg and .html."),
             define_option("vehicle", str, VEHICLE.help, "paper-reference", known=VEHICLE.known),
             MODE,
             define_option(

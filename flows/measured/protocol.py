@@ -13,6 +13,7 @@ from catalogs.vehicles import load_vehicle
 from flows.drawing import as_svg
 from flows.measured.dive_figure import draw_dives
 from flows.store.outputs import Outputs
+from flows.studies.report import Drawing, StudyTable, write_study_page
 from tasks.campaign.attrition import tabulate_attrition
 from tasks.campaign.selection import Judged, select_events
 from tasks.studies.brake_dive import pitch_mode, with_model
@@ -24,7 +25,7 @@ SCORE_UNITS = {
 }  # fmt: skip
 
 
-DIVES = "dives.svg"
+DIVES, PAGE = "dives.svg", "brake_protocol.html"
 
 
 def brake_protocol(
@@ -43,8 +44,8 @@ def brake_protocol(
     protocol : protocol by name or YAML file
     vehicle : to start from, by name or YAML file; None takes the campaign's
     all_events : go on with every candidate, whatever rules it breaks; the table stays as it is
-    out : folder for ``brake_protocol.json``, ``attrition.csv`` and ``dives.svg``, where two drives have events; None
-        writes none
+    out : folder for ``brake_protocol.json``, ``brake_protocol.html``, ``attrition.csv`` and, where two drives have
+        events, ``dives.svg``; None writes none
 
     Returns
     -------
@@ -56,7 +57,7 @@ def brake_protocol(
     InputError
         If the campaign lacks what the protocol needs.
     """
-    results = Outputs(out, "brake-protocol", "brake_protocol.json", "attrition.csv", DIVES)
+    results = Outputs(out, "brake-protocol", "brake_protocol.json", "attrition.csv", DIVES, PAGE)
     rules = load_protocol(protocol)
     recorded = read_drives(campaign)
     base = load_vehicle(vehicle or recorded.vehicle)
@@ -91,13 +92,36 @@ def brake_protocol(
     writer.writeheader()
     writer.writerows(table)
     results.write("attrition.csv", text.getvalue())
+    drawings = []
     if folds:
-        variant = result["macro"][-1][
-            "variant"
-        ]  # both pitch and its rate calibrate, where the rate was measured
-        shown = [fold for fold in result["folds"] if fold["variant"] == variant]
-        results.write(DIVES, as_svg(draw_dives(shown)))
+        # of the last variant pitch and its rate calibrate, where the rate was measured
+        variant = result["macro"][-1]["variant"]
+        drawing = as_svg(draw_dives([fold for fold in result["folds"] if fold["variant"] == variant]))
+        results.write(DIVES, drawing)
+        drawings = [
+            Drawing(caption="Dive of each drive, predicted from the others, and its mean", svg=drawing)
+        ]
+    results.write(PAGE, _write_page(result, drawings))
     return result
+
+
+def _write_page(result: dict[str, Any], drawings: list[Drawing]) -> str:
+    folds = [
+        {name: value for name, value in fold.items() if name != "mean_trajectory"} for fold in result["folds"]
+    ]
+    units = ", ".join(f"{name} [{unit}]" for name, unit in SCORE_UNITS.items())
+    return write_study_page(
+        f"Brake dives of {result['campaign']}",
+        f"The paper's Appendix C.5: of {result['candidates']} candidate events in {result['drives']} drives"
+        f" {result['retained']} keep all rules. Each drive is predicted from a calibration on the others."
+        f" {result.get('note', '')}",
+        [
+            StudyTable(title="Mean over drives", rows=result["macro"], note=units),
+            StudyTable(title="Drives", rows=folds),
+            StudyTable(title="Rules, and how many events break each", rows=result["attrition"]),
+        ],
+        drawings,
+    )
 
 
 def _event_row(judged: Judged) -> dict[str, Any]:

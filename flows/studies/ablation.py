@@ -19,6 +19,7 @@ from flows.making.driving import simulate_drive
 from flows.store.outputs import Outputs
 from flows.store.telemetry import write_parquet
 from flows.studies.ablation_figure import ablation_figure
+from flows.studies.report import Drawing, StudyTable, write_study_page
 from tasks.errors import InputError
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.parameters import Vehicle
@@ -37,7 +38,7 @@ def run_ablation(
 
     Parameters
     ----------
-    out : folder for ablation.json, ablation.parquet (the pitch curves) and ablation.svg
+    out : folder for ablation.json, ablation.parquet (the pitch curves), ablation.svg and ablation.html
     vehicle : catalogue name or file
     mode : paper or coupled; None takes the one a frozen vehicle was fitted in, and paper for any other
     traces : folder of reference traces whose pitch stands for the oracle; None leaves it out
@@ -52,7 +53,7 @@ def run_ablation(
     InputError
         If the traces do not hold the condition that is compared.
     """
-    results = Outputs(out, "ablation", "ablation.json", "ablation.parquet", "ablation.svg")
+    results = Outputs(out, "ablation", "ablation.json", "ablation.parquet", "ablation.svg", "ablation.html")
     study, car, surface = load_ablation(), load_vehicle(vehicle), load_surface("dense-asphalt")
     provenance = vehicle_provenance(vehicle)
     chosen: Mode = mode or (provenance.mode if provenance else "paper")
@@ -80,7 +81,19 @@ def run_ablation(
     table = {"time": time} | {f"pitch_deg_{name.replace('-', '_')}": c for name, c in curves.items()}
     write_parquet(pa.table(table), results.path("ablation.parquet"))
     figure = ablation_figure(stops, time, curves, {row["variant"]: row for row in pitch})
-    results.write("ablation.svg", as_svg(figure))
+    drawing = as_svg(figure)
+    results.write("ablation.svg", drawing)
+    page = write_study_page(
+        "What each coupling is for",
+        f"The paper's Section 4.4 with {vehicle}, {chosen} mode: one coupling is cut at a time. The reference is"
+        " an independent simulator's pitch, where traces were given.",
+        [
+            StudyTable(title="Pitch against the reference", rows=[reference]),
+            StudyTable(title=f"Pitch, {study.pitch.name}", rows=pitch),
+        ],
+        [Drawing(caption="Stopping distance and pitch, coupling by coupling", svg=drawing)],
+    )
+    results.write("ablation.html", page)
     return result
 
 

@@ -1,6 +1,7 @@
 """Studies of the vehicle model: the surface-parameter sensitivity, agreement with reference traces, speed."""
 
 import time
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from importlib import import_module
 from pathlib import Path
@@ -13,6 +14,7 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_provenance
 from flows.drawing import as_svg
 from flows.store.outputs import Outputs
+from flows.studies.report import Drawing, StudyTable, write_study_page
 from flows.studies.sensitivity_figure import draw_sensitivity
 from flows.studies.trajectory_figure import draw_trajectories
 from tasks.errors import InputError
@@ -35,14 +37,28 @@ STOP_FIGURES = ("braking_time_error_s", "slip_distance_error_m")
 
 def run_sensitivity(*, out: str | None = None) -> dict[str, Any]:
     """The paper's Appendix E: envelopes and rank correlations, beside the printed figures."""
-    results = Outputs(out, "sensitivity", "sensitivity.json", "sensitivity.svg")
+    results = Outputs(out, "sensitivity", "sensitivity.json", "sensitivity.svg", "sensitivity.html")
     protocol, printed = load_sensitivity_study()
     vehicle, surface = load_vehicle("paper-reference"), load_surface("dense-asphalt")
     started = time.process_time()
     result = sensitivity_study(vehicle, surface, protocol)
     result |= {"cpu_s": time.process_time() - started, "beside_print": beside_print(result, printed)}
     results.write_json("sensitivity.json", result)
-    results.write("sensitivity.svg", as_svg(draw_sensitivity(result["curves"], result["beside_print"])))
+    drawing = as_svg(draw_sensitivity(result["curves"], result["beside_print"]))
+    results.write("sensitivity.svg", drawing)
+    page = write_study_page(
+        "Sensitivity to the surface parameters",
+        "The paper's Appendix E: the numbers of the surface mapping are drawn within their bounds, and every draw is"
+        " driven to the stop. Printed figures agree if they are met to their last digit.",
+        [StudyTable(title="Beside the printed figures", rows=result["beside_print"])],
+        [
+            Drawing(
+                caption="Friction and stopping distance over the rate, 5th to 95th percentile; crosses: printed.",
+                svg=drawing,
+            )
+        ],
+    )
+    results.write("sensitivity.html", page)
     return result
 
 
@@ -56,7 +72,7 @@ def measure_agreement(
     traces : folder with cases.json and NAME.parquet or */NAME.parquet
     vehicle : catalogue name or file
     mode : paper or coupled; None takes the one a frozen vehicle was fitted in, and paper for any other
-    out : folder for ``agreement.json`` and a figure of each case, ``CASE.svg``; None writes none
+    out : folder for ``agreement.json``, ``agreement.html`` and a figure of each case, ``CASE.svg``; None writes none
 
     Raises
     ------
@@ -64,16 +80,23 @@ def measure_agreement(
         Listing every case whose trace or condition is missing.
     """
     reference = read_reference(Path(traces))
-    results = Outputs(out, "agreement", "agreement.json", *(f"{case.case}.svg" for case, _ in reference))
+    files = (f"{case.case}.svg" for case, _ in reference)
+    results = Outputs(out, "agreement", "agreement.json", "agreement.html", *files)
     model, provenance = load_vehicle(vehicle), vehicle_provenance(vehicle)
     chosen: Mode = mode or (provenance.mode if provenance else "paper")
     result = {"vehicle": vehicle, "mode": chosen} | agreement_of(model, reference, chosen)
     results.write_json("agreement.json", result)
+    drawings = []
     for (case, columns), row in zip(reference, result["cases"] if out else (), strict=False):
         rides = {f"{vehicle}, {chosen} mode": simulate_case(model, case, columns, chosen)}
         if (vehicle, chosen) != PAPER:
             rides[", ".join(PAPER) + " mode"] = simulate_case(load_vehicle(PAPER[0]), case, columns, "paper")
-        results.write(f"{case.case}.svg", as_svg(draw_trajectories(case.case, columns, rides, row["window"])))
+        drawing = as_svg(draw_trajectories(case.case, columns, rides, row["window"]))
+        results.write(f"{case.case}.svg", drawing)
+        drawings.append(
+            Drawing(caption=f"{case.case}: reference, models, and what is left of each", svg=drawing)
+        )
+    results.write("agreement.html", _write_agreement_page(result, drawings))
     return result
 
 
@@ -81,7 +104,7 @@ def agreement_of(model: Vehicle, reference: list[tuple[ReferenceCase, Traces]], 
     """Agreement of a vehicle with reference cases: a row a case, the groups of each split, the mean over all.
 
     Groups are those of the paper's tables: flat, hump, depression and all cases, and what a case varies: weather, brake
-    or road. ``beside_print`` has the paper's figure of the same split and group.
+    or road. ``beside_print`` has the paper's figure of the same split and group, or of the case itself.
 
     Parameters
     ----------
@@ -115,8 +138,34 @@ def agreement_of(model: Vehicle, reference: list[tuple[ReferenceCase, Traces]], 
         "cases": rows,
         "groups": groups,
         "mean": _make_plain(overall),
-        "beside_print": put_beside_print(groups),
+        "beside_print": put_beside_print([*groups, *map(_stand_as_group, rows)]),
     }
+
+
+def _write_agreement_page(result: Mapping[str, Any], drawings: Sequence[Drawing]) -> str:
+    groups = [
+        {"split": group["split"], "group": group["group"], "cases": group["count"]}
+        | {name: group[name] for name in result["mean"]}
+        | {f"largest {name}": value for name, value in group["maximum"].items()}
+        for group in result["groups"]
+    ]
+    return write_study_page(
+        "Agreement with reference traces",
+        f"Vehicle {result['vehicle']}, {result['mode']} mode, by the paper's Appendix A.2: on the reference's own time"
+        " stamps, with the static pitch, without shift or fit. The paper's reference is CarSim; another one answers the"
+        " same question of other data, so figures beside each other are no ranking.",
+        [
+            StudyTable(title="Beside the paper's figures", rows=result["beside_print"]),
+            StudyTable(title="Groups: mean and largest", rows=groups),
+            StudyTable(
+                title="Cases",
+                rows=[
+                    row | {"window": "{:.2f} to {:.2f} s".format(*row["window"])} for row in result["cases"]
+                ],
+            ),
+        ],
+        drawings,
+    )
 
 
 def simulate_case(model: Vehicle, case: ReferenceCase, columns: Traces, mode: Mode) -> Rollout:
@@ -152,6 +201,11 @@ def run_benchmarks(name: str | None = None, *, out: str | None = None) -> dict[s
     ]
     results.write_json("bench.json", {"rows": rows})
     return {"rows": rows}
+
+
+def _stand_as_group(row: dict[str, Any]) -> dict[str, Any]:
+    """A case as a group of one, for the cases that the paper prints one by one."""
+    return row | {"group": row["case"], "count": 1, "maximum": {}, "road_cases_brake": False}
 
 
 def _average_stops(rows: list[dict[str, Any]]) -> dict[str, float]:

@@ -1,5 +1,7 @@
 """The paper's conditions and its surface study, as the catalogue holds them."""
 
+from decimal import Decimal
+
 import pytest
 
 from catalogs.scenario import scenario_problems
@@ -50,6 +52,30 @@ def test_the_printed_groups_add_up_to_the_printed_means():
         for figure, mean in whole.mean.items():
             total = sum(group.count * group.mean[figure] for group in groups) / whole.count
             assert total == pytest.approx(mean, rel=0.03), f"{split} {figure}"
+
+
+def test_the_printed_cases_are_the_held_out_conditions_and_add_up_to_their_groups():
+    """Table carsim_ood_per_case_supp beside Table carsim_validation: means and maxima to the printed digits."""
+    printed = printed_agreement()["held-out"]
+    conditions = {one.name: one.scenario for one in load_conditions() if one.split == "held-out"}
+    assert set(conditions) == set(printed) - {"weather", "brake", "road", "all"}
+
+    def half_digit(value: float) -> float:
+        return 0.51 * 10.0 ** int(Decimal(str(value)).as_tuple().exponent)
+
+    def group_of(name: str) -> str:
+        scenario = conditions[name]
+        return "road" if scenario.hazard_height_m else "weather" if scenario.weather != "dry" else "brake"
+
+    for group in ("weather", "brake", "road", "all"):
+        cases = [printed[name].mean for name in conditions if group in ("all", group_of(name))]
+        for figure, mean in printed[group].mean.items():
+            values = [case[figure] for case in cases]
+            assert sum(values) / len(values) == pytest.approx(mean, abs=half_digit(mean)), f"{group} {figure}"
+            if group != "all":
+                assert max(values) == pytest.approx(printed[group].maximum[figure], rel=0.04), (
+                    f"{group} {figure}"
+                )
 
 
 def test_a_group_stands_beside_the_figure_of_its_split_alone():

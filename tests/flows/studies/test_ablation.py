@@ -20,6 +20,13 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], Path
     return run_ablation(out=str(out)), out
 
 
+def test_the_page_has_the_figure_and_the_pitch_of_every_variant(made):
+    result, out = made
+    page = (out / "ablation.html").read_text()
+    assert (out / "ablation.svg").read_text() in page
+    assert all(f"{row['peak_pitch_deg']:.4g}" in page for row in result["pitch"])
+
+
 def stops(result: dict[str, Any], variant: str, weather: str) -> dict[float, float]:
     return {
         round(row["precipitation_mm_h"], 6): row["stopping_distance_m"]

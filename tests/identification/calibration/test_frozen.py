@@ -76,6 +76,28 @@ def test_an_edited_frozen_file_is_refused(frozen, edit):
         load_vehicle(path)
 
 
+def test_the_page_of_an_agreement_has_a_drawing_and_a_row_for_each_case(frozen, tmp_path):
+    traces, path = frozen
+    cases = measure_agreement(str(traces), vehicle=str(path), out=str(tmp_path))["cases"]
+    page = (tmp_path / "agreement.html").read_text()
+    assert page.count("<svg") == len(cases) > 0
+    assert all(
+        page.count(f">{row['case']}<") == 1 and f"{row['pitch_rmse_deg']:.4g}" in page for row in cases
+    )
+
+
+def test_a_case_that_the_paper_prints_stands_beside_its_own_row(frozen, tmp_path):
+    """Table carsim_ood_per_case_supp prints Rain 5 with a pitch RMSE of .10208 deg."""
+    traces, _ = frozen
+    (case,) = json.loads((traces / "cases.json").read_text())
+    shutil.move(traces / "development" / "wet.parquet", traces / "flat-rain5.parquet")
+    (traces / "cases.json").write_text(json.dumps([case | {"case": "flat-rain5", "split": "held-out"}]))
+    result = measure_agreement(str(traces))
+    rows = {row["figure"]: row for row in result["beside_print"] if row["group"] == "flat-rain5"}
+    assert rows["pitch_rmse_deg"]["paper_mean"] == 0.10208 and rows["event_error"]["paper_mean"] == 0.28361
+    assert rows["pitch_rmse_deg"]["mean"] == result["cases"][0]["pitch_rmse_deg"]
+
+
 def test_agreement_drives_a_frozen_vehicle_in_the_mode_it_was_fitted_in(frozen):
     traces, path = frozen
     assert measure_agreement(str(traces), vehicle=str(path))["mode"] == "coupled"
