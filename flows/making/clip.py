@@ -191,6 +191,7 @@ def render_frames(
             parameters=catalogue.weather_parameters,
             seed=seed,
             anchors=_anchors_of(scenario, plan, catalogue),
+            refracts=plan.settings.composition == "paper",
         ),
         select_backend(plan.backend),
         relief=relief,

@@ -71,12 +71,14 @@ class ClipConditions:
     parameters : optical parameters of the weather, of the catalogue
     seed : visual seed; it moves particles and snow, and nothing else [1]
     anchors : states of the two anchors that the paper's composition blends; none for a picture of its own rate
+    refracts : whether films on the road refract, as in the paper's composition
     """
 
     state: SurfaceState
     parameters: WeatherParameters
     seed: int
     anchors: tuple[SurfaceState, ...] = ()
+    refracts: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,6 +92,7 @@ class ClipWeather:
     seed : visual seed of the clip [1]
     overcast : None under a clear sky
     anchors : weathers of the two anchors, in one scene and of one seed, that the paper's composition blends
+    refracts : whether the film on the road refracts
     """
 
     state: SurfaceState
@@ -97,6 +100,7 @@ class ClipWeather:
     seed: int
     overcast: Overcast | None
     anchors: "tuple[ClipWeather, ...]" = ()
+    refracts: bool = False
 
     @property
     def reads_normals(self) -> bool:
@@ -186,6 +190,7 @@ def weather_scene(
             parameters=p,
             seed=seed,
             overcast=make_overcast(look, one, p, seed, environment, white, field, focal_px),
+            refracts=conditions.refracts,
         )
         for one in (state, *conditions.anchors)
     )
@@ -234,6 +239,7 @@ def apply_weather(
             parameters=film,
             seed=weather.seed,
             rate_mm_h=state.precipitation_mm_h,
+            refracts=weather.refracts,
         )
         light = LightOnRoad(environment=overcast.environment, sky=sky, extinction=air.extinction)
         dry = recompose_layers(picture, layers)

@@ -1,12 +1,16 @@
 """The grid's choice of composition: part of what decides a clip, and refused where it has no meaning."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from catalogs.grids import load_grid
+from flows.making import clip, replay
 from flows.making.plan import freeze_grid
 from tasks.errors import InputError
+from tasks.render.clip import render_clip
+from tests.toy_street import write_toy_grid
 
 
 def planned(**settings):
@@ -25,3 +29,18 @@ def test_8_bit_composition_is_refused_for_a_camera_that_needs_linear_light(camer
     planned(camera=camera)
     with pytest.raises(InputError, match=f"composition: paper .* {camera} .* composition: linear"):
         planned(camera=camera, composition="paper")
+
+
+@pytest.mark.parametrize(("composition", "refracts"), [("paper", True), ("linear", False)])
+def test_films_refract_in_the_papers_composition_alone(tmp_path, monkeypatch, composition, refracts):
+    grid = Path(write_toy_grid(tmp_path, frames=2))
+    grid.write_text(grid.read_text() + f"composition: {composition}\n")
+    asked = []
+
+    def render(scene, camera, motion, conditions, *args, **options):
+        asked.append(conditions.refracts)
+        return render_clip(scene, camera, motion, conditions, *args, **options)
+
+    monkeypatch.setattr(clip, "render_clip", render)
+    replay.replay_audit(str(grid), seeds=2)
+    assert set(asked) == {refracts}

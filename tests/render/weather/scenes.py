@@ -22,13 +22,14 @@ FOCAL_PX = 120.0
 def weather_over(
     street: Gaussians, environment: np.ndarray, state: SurfaceState, parameters: WeatherParameters,
     seed: int = 1, route: Route | None = None, relief: RoadRelief | None = None,
-    anchors: tuple[SurfaceState, ...] = (),
+    anchors: tuple[SurfaceState, ...] = (), refracts: bool = False,
 ) -> tuple[Gaussians, ClipWeather]:  # fmt: skip
     """The street in a weather, and the weather."""
     clear = ClearScene(gaussians=street, environment=environment, route=route, relief=relief)
-    return weather_scene(
-        clear, ClipConditions(state=state, parameters=parameters, seed=seed, anchors=anchors), FOCAL_PX
+    conditions = ClipConditions(
+        state=state, parameters=parameters, seed=seed, anchors=anchors, refracts=refracts
     )
+    return weather_scene(clear, conditions, FOCAL_PX)
 
 
 def see_sky(environment: np.ndarray, view: Shutter) -> np.ndarray:

@@ -3,7 +3,7 @@
 Pavement and earth beside it drain: water fills their pores, so that they are darker, but no film stands on them.
 
 Refraction moves the texture below by under a tenth of a pixel at 480x320, and changes one road pixel in seven by one
-grey level: it is left out.
+grey level: it is drawn where it is asked for.
 """
 
 from dataclasses import dataclass, replace
@@ -27,6 +27,7 @@ from tasks.render.weather.wet.puddles import (
     water_surface,
 )
 from tasks.render.weather.wet.reflection import mirrored_scene
+from tasks.render.weather.wet.refraction import compute_film_shift, see_through_film
 from tasks.render.weather.wet.road_view import RoadView
 
 
@@ -60,12 +61,14 @@ class RoadFilm:
     parameters : optics of the wet road
     seed : visual seed of the clip [1]
     rate_mm_h : rate of the rain that strikes it [mm/h]
+    refracts : whether the texture below is drawn where the film shows it
     """
 
     depth_mm: float
     parameters: RoadFilmParameters
     seed: int
     rate_mm_h: float = 0.0
+    refracts: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -186,6 +189,10 @@ def wet_layer(
         p.water.ripple_slope, p.rough_slope, p.refractive_index, p.diffuse_reflectance,
         LUMINANCE / float(LUMINANCE @ sky.white), gain, add,
     )  # fmt: skip
+    if film.refracts:
+        shift = compute_film_shift(view, 1e-3 * film.depth_mm, p.refractive_index)
+        below = see_through_film(picture, view, shift) - picture
+        add += gain * water.smooth[..., None] * below
     return Layer(name="wet", gain=gain, add=add)
 
 
