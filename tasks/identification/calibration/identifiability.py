@@ -13,7 +13,12 @@ from tasks.identification.calibration.jacobian import (
 )
 from tasks.identification.calibration.procedure import Procedure, Stage
 from tasks.identification.calibration.residual import CalibrationCase, compute_residuals, simulate_case
-from tasks.identification.calibration.scalars import CalibrationScalar, list_calibration_scalars, read_scalar
+from tasks.identification.calibration.scalars import (
+    CalibrationScalar,
+    list_calibration_scalars,
+    read_scalar,
+    set_scalars,
+)
 from tasks.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
@@ -21,6 +26,9 @@ CONFOUNDED = 0.95
 """Correlation from which two scalars count as confounded [1]."""
 DETERMINED = 0.5
 """Share of the prior's standard deviation below which a scalar counts as determined [1]."""
+REACHES = (-3.0, -1.5, 1.5, 3.0)
+"""Standard deviations from its value at which a scalar must be determined too [1]: where another part takes over, as
+where brakes no longer reach the tyre's limit, the derivatives at the value promise what is not there."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +43,8 @@ class ScalarKnowledge:
     sd : standard deviation, with all others unknown too [unit]
     sd_alone : standard deviation, with all others known [unit]
     share_of_prior : sd over that of a uniform distribution between the bounds [1]
-    determined : whether that share is below `DETERMINED`
+    determined : whether that share is below `DETERMINED`, at the value and with the derivatives by the scalar
+        three standard deviations to either side of it, and halfway there
     """
 
     name: str
@@ -87,14 +96,40 @@ def compute_identifiability(
     bounds = [procedure.bounds[s.group] for s in scalars]
     widths = np.array([b.upper - b.lower for b in bounds])
     prior_sd = widths / np.sqrt(12.0)
-    if procedure.tolerance is None:
-        information = compute_fisher(_compute_joint_rows(vehicle, cases, procedure, scalars) * prior_sd)
-    else:
-        rows = compute_stage_rows(vehicle, cases, procedure, scalars)
-        owned = [np.array([s.group in stage.groups for s in scalars]) for stage in procedure.stages]
-        information = compute_staged_information([stage * prior_sd for stage in rows], owned)
+    staged = procedure.tolerance is not None
+    list_rows = compute_stage_rows if staged else _compute_joint_rows
+    owned = [
+        np.array([s.group in stage.groups for s in scalars]) for stage in procedure.stages
+    ] if staged else [np.full(len(scalars), True)]  # fmt: skip
+    rows = [part * prior_sd for part in list_rows(vehicle, cases, procedure, scalars)]
     x = np.array([read_scalar(vehicle, s) for s in scalars])
-    return summarise_information(information, scalars, x, [b.unit for b in bounds], widths)
+    report = summarise_information(
+        compute_staged_information(rows, owned), scalars, x, [b.unit for b in bounds], widths
+    )
+
+    def stays_determined(index: int, known: ScalarKnowledge) -> bool:
+        """Whether the derivatives by a scalar determine it at all of `REACHES` as well."""
+        scalar, limits = scalars[index], bounds[index]
+        for reach in REACHES:
+            value = np.clip(
+                known.value + reach * known.sd, limits.lower + limits.step, limits.upper - limits.step
+            )
+            there = [part.copy() for part in rows]
+            column = list_rows(set_scalars(vehicle, {scalar: float(value)}), cases, procedure, [scalar])
+            for part, derivative in zip(there, column, strict=True):
+                part[: len(derivative), index] = derivative[:, 0] * prior_sd[index]
+            covariance = np.linalg.inv(compute_staged_information(there, owned))
+            if not np.sqrt(covariance[index, index]) < DETERMINED:
+                return False
+        return True
+
+    return replace(
+        report,
+        scalars=tuple(
+            replace(known, determined=known.determined and stays_determined(index, known))
+            for index, known in enumerate(report.scalars)
+        ),
+    )
 
 
 def compute_fisher(rows: Floats) -> Floats:
@@ -204,21 +239,20 @@ def _compute_joint_rows(
     cases: Sequence[CalibrationCase],
     procedure: Procedure,
     scalars: Sequence[CalibrationScalar],
-) -> Floats:
-    """Return the derivatives of every response in every case by all scalars, shape (m, n) [1 / unit]."""
+) -> list[Floats]:
+    """Return the derivatives of every response in every case by scalars, one array of shape (m, n) [1 / unit]."""
     everything = Stage(
         name="all", groups=procedure.groups, responses=("speed", "pitch", "slip", "wheel_load", "stop"),
         kinds=("flat", "hump", "depression"), phase="event",
     )  # fmt: skip
     x = np.array([read_scalar(vehicle, s) for s in scalars])
     coasting = replace(everything, responses=("speed_drop",), phase="start")
-    return np.vstack(
-        [
-            compute_stage_jacobian(vehicle, cases, everything, procedure, scalars, x),
-            compute_stage_jacobian(vehicle, cases, coasting, procedure, scalars, x),
-            build_smoothness_rows(scalars, procedure),
-        ]
-    )
+    rows = [
+        compute_stage_jacobian(vehicle, cases, everything, procedure, scalars, x),
+        compute_stage_jacobian(vehicle, cases, coasting, procedure, scalars, x),
+        build_smoothness_rows(scalars, procedure),
+    ]
+    return [np.vstack(rows)]
 
 
 def summarise_information(

@@ -9,8 +9,8 @@ from benchmarks.known_truth.coverage import ScalarOutcome, format_coverage
 from benchmarks.known_truth.traces import add_errors, draw_truth, list_development_cases, make_known_cases
 from catalogs.calibration import load_procedure
 from catalogs.vehicles import load_vehicle
-from tasks.identification.calibration.identifiability import compute_identifiability
-from tasks.identification.calibration.scalars import list_calibration_scalars, read_scalar
+from tasks.identification.calibration.identifiability import DETERMINED, compute_identifiability
+from tasks.identification.calibration.scalars import list_calibration_scalars, read_scalar, set_scalars
 from tasks.identification.calibration.staged import calibrate_vehicle
 
 LONGITUDINAL = {"coast_deceleration", "efficiency", "slip_stiffness"}
@@ -98,3 +98,22 @@ def test_only_determined_scalars_count_for_the_coverage():
     first, *rows = format_coverage(outcomes).splitlines()
     assert first == "all determined: 1 of 2, 50.0%"
     assert "determined in 2 of 2, covered 1 of 2" in rows[0] and "determined in 0 of 1, covered -" in rows[1]
+
+
+@pytest.mark.parametrize(
+    ("efficiency", "determined"), [(0.85, True), (0.90, False), (0.93, False), (0.97, False)]
+)
+def test_a_scalar_is_undetermined_where_the_brakes_take_over_within_three_standard_deviations(
+    start, longitudinal, efficiency, determined
+):
+    """At rain of 2 mm/h the brakes limit the stop from 0.95 on; below, derivatives at the value alone would do."""
+    procedure, interval = longitudinal
+    (scalar,) = (
+        s for s in list_calibration_scalars(start, procedure.groups) if s.name == "efficiency rain 0.595585"
+    )
+    car = set_scalars(start, {scalar: efficiency})
+    conditions = [case for case in list_development_cases() if case.case in ("flat-rain2", "flat-rain10")]
+    cases = make_known_cases(car, conditions, procedure, interval)
+    (known,) = (s for s in compute_identifiability(car, cases, procedure).scalars if s.name == scalar.name)
+    assert known.determined == determined
+    assert (known.share_of_prior < DETERMINED) == (efficiency < 0.95)
