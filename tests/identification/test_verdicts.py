@@ -12,6 +12,7 @@ from catalogs.effects.truths import load_truths
 from catalogs.studies.closing import load_closing_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
+from tasks.campaign.campaign import CHANNELS
 from tasks.campaign.planned_runs import EXPERIMENTS, RICH, RunPlan, make_planned_run
 from tasks.identification.benchmark import make_synthetic_campaign
 from tasks.identification.decision import discovery
@@ -239,3 +240,12 @@ class TestACarThatIsGrown:
         grown = load_vehicle("multibody-grown")
         assert {"stick_ratio", "enveloping_length", "scrub_stiffness"} <= set(grown.effects)
         assert names(judged({"lag": 0.08}, vehicle=grown, driven=grown, design=LEVEL)) == ["brake_lag"]
+
+
+@pytest.mark.parametrize(
+    ("channels", "seen"), [(CHANNELS, True), (("speed", "longitudinal_acceleration"), False)]
+)
+def test_an_effect_by_slip_needs_a_wheel_speed(channels, seen):
+    library = load_effects()
+    found = {effect.name for effect in library if decision._is_visible(effect, channels)}
+    assert found == {e.name for e in library} - (set() if seen else {"relaxation_length"})

@@ -96,7 +96,13 @@ def find_missing_effects(
         campaign,
         vehicle,
         surface,
-        tuple(e for e in effects if not _is_fixed(e, vehicle) and e.parameters[0].name not in hardly_known),
+        tuple(
+            e
+            for e in effects
+            if not _is_fixed(e, vehicle)
+            and e.parameters[0].name not in hardly_known
+            and _is_visible(e, campaign.channels)
+        ),
         rules,
         hardly_known,
     )
@@ -252,6 +258,15 @@ def _object_to_last(
 def _is_fixed(effect: Effect, vehicle: Vehicle) -> bool:
     """Whether the vehicle has an effect of several parameters already: those cannot be found as a change of it."""
     return len(effect.parameters) > 1 and any(vehicle.effects.get(p.name) for p in effect.parameters)
+
+
+def _is_visible(effect: Effect, channels: Sequence[str]) -> bool:
+    """Whether an effect that depends on slip has the wheel speed that slip is made of.
+
+    Without one it is a lag of the car's force, and any other lag of a car with other equations passes for it: of
+    eight logs of the double-track car without an effect, speed and acceleration alone named three relaxation lengths.
+    """
+    return effect.variable != "slip" or any(name.startswith("wheel_speed") for name in channels)
 
 
 def _to_tell_apart(
