@@ -51,10 +51,7 @@ def list_motion_panels(
 def _group_seeds(clips: Iterable[JudgedClip]) -> list[Family]:
     families: dict[str, Family] = {}
     for clip in clips:
-        label = clip.facts["label"]
-        families.setdefault(label.removesuffix(f"seed-{read_visual_seed(label)}").rstrip("/"), []).append(
-            clip
-        )
+        families.setdefault(_name_condition(clip), []).append(clip)
     return list(families.values())
 
 
@@ -90,7 +87,7 @@ def _show_weather(family: Family, clips: list[JudgedClip], standard: Standard) -
         if changes:
             recovered[method] = np.array(changes)
     return MotionPanel(
-        title=f"{_name_condition(family)}, less dry",
+        title=f"{_name_condition(family[0])}, less dry",
         quantity=PROGRESS,
         times=pairs[0][0].times,
         meant=stations[0] - stations[1],
@@ -111,7 +108,7 @@ def _show_event(family: Family, standard: Standard, event_window: EventWindow) -
         found = [isolate(one.motions[method].pitch) for one in family if _is_whole(one, method)]
         if found:
             recovered[method] = np.array(found)
-    return make_event_panel(_name_condition(family), clip.times, isolate(meant.pitch), recovered, opening)
+    return make_event_panel(_name_condition(family[0]), clip.times, isolate(meant.pitch), recovered, opening)
 
 
 def _is_whole(clip: JudgedClip, method: str) -> bool:
@@ -125,6 +122,7 @@ def _find_meant(clip: JudgedClip, standard: Standard) -> MeantMotion:
     return meant
 
 
-def _name_condition(family: Family) -> str:
-    label: str = family[0].facts["label"]
+def _name_condition(clip: JudgedClip) -> str:
+    """Return a clip's label without its visual seed."""
+    label: str = clip.facts["label"]
     return label.removesuffix(f"seed-{read_visual_seed(label)}").rstrip("/")

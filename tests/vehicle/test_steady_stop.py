@@ -64,7 +64,7 @@ def largest_move(a: Rollout, b: Rollout) -> float:
     return float(max(moved))
 
 
-def drive(
+def drive_condition(
     vehicle: Vehicle, scenario: Scenario, more: tuple[float, float], steady: SteadyStop | None
 ) -> Rollout:
     """Drive with so much more friction and initial speed [m/s]."""
@@ -77,18 +77,20 @@ def drive(
     )  # fmt: skip
 
 
-def sweep(vehicle: Vehicle, conditions: list[Scenario], steady: SteadyStop | None) -> list[float]:
+def list_moves(vehicle: Vehicle, conditions: list[Scenario], steady: SteadyStop | None) -> list[float]:
     """Largest move of each condition under a millionth of friction and of speed, both ways."""
     found = []
     millionths = ((1e-6, 0), (-1e-6, 0), (0, 1e-6), (0, -1e-6))
     for held in (replace(one, hold_speed=True) for one in conditions):
-        base = drive(vehicle, held, (0, 0), steady)
-        found.append(max(largest_move(base, drive(vehicle, held, more, steady)) for more in millionths))
+        base = drive_condition(vehicle, held, (0, 0), steady)
+        found.append(
+            max(largest_move(base, drive_condition(vehicle, held, more, steady)) for more in millionths)
+        )
     return found
 
 
 def test_a_millionth_of_friction_or_speed_moves_no_label_of_a_steady_stop(vehicle):
-    found = sweep(vehicle, BRAKED, STEADY)
+    found = list_moves(vehicle, BRAKED, STEADY)
     assert len(found) == 27
     assert max(found) < LARGEST, found
 
@@ -96,7 +98,7 @@ def test_a_millionth_of_friction_or_speed_moves_no_label_of_a_steady_stop(vehicl
 def test_a_stop_on_the_other_side_of_a_tick_moves_its_speed_by_no_more_than_the_published_stop_speed(vehicle):
     """Appendix B sets a speed of 0.05 m/s to zero; on snow of 3 mm the stop then passes the tick at 8.468 s."""
     scenario = replace(next(one for one in BRAKED if one.precipitation_mm_h == 3), hold_speed=True)
-    a, b = (drive(vehicle, scenario, (mu, 0), STEADY) for mu in (0, -1e-6))
+    a, b = (drive_condition(vehicle, scenario, (mu, 0), STEADY) for mu in (0, -1e-6))
     moved = np.abs(a.columns["speed"] - b.columns["speed"])
     one_stands = (a.columns["speed"] > 0) != (b.columns["speed"] > 0)
     assert one_stands.sum() == 1
@@ -105,7 +107,7 @@ def test_a_stop_on_the_other_side_of_a_tick_moves_its_speed_by_no_more_than_the_
 
 
 def test_it_moves_every_literal_stop(vehicle):
-    found = sweep(vehicle, BRAKED[::4], None)
+    found = list_moves(vehicle, BRAKED[::4], None)
     assert min(found) > 10 * LARGEST, found
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from catalogs.gates import load_foreign_gates
 from flows.judging.evaluation_rows import figure_row
 from flows.judging.judged_clip import Row
-from flows.judging.video_sets.conditions import (
+from flows.judging.video_sets.compared_motion import (
     find_control_clip,
     pair_with_control,
     require_control_clip,

@@ -132,17 +132,6 @@ def compute_identifiability(
     )
 
 
-def compute_fisher(rows: Floats) -> Floats:
-    """Return the Fisher information of residuals and of a prior of standard deviation 1, shape (n, n) [1].
-
-    Parameters
-    ----------
-    rows : derivatives of the residuals by scalars in units of their prior's standard deviation, shape (m, n) [1]
-    """
-    information: Floats = rows.T @ rows + np.eye(rows.shape[1])
-    return information
-
-
 def compute_staged_information(rows: Sequence[Floats], owned: Sequence[NDArray[np.bool_]]) -> Floats:
     """Return the information about the values at which stages come to rest that hold each other's scalars.
 
@@ -170,7 +159,7 @@ def compute_stage_equations(
 
     Parameters
     ----------
-    rows : of each stage, derivatives of its residuals as in ``compute_fisher``, shape (m, n) [1]
+    rows : of each stage, derivatives of its residuals by scalars in units of their prior's deviation, shape (m, n) [1]
     owned : of each stage, the scalars that it moves, shape (n,)
 
     Returns

@@ -11,7 +11,6 @@ from catalogs.references import read_reference
 from flows.measured.calibration import calibrate_on_traces, calibration_case
 from flows.studies.vehicle_model import agreement_of
 from tasks.identification.calibration.identifiability import (
-    compute_fisher,
     compute_staged_information,
     summarise_information,
 )
@@ -19,6 +18,11 @@ from tasks.identification.calibration.jacobian import build_smoothness_rows, com
 from tasks.identification.calibration.scalars import list_calibration_scalars, read_scalar, set_scalars
 from tasks.identification.calibration.staged import StageRecord, accept_jointly, compute_joint_loss, run_stage
 from tasks.identification.calibration.staged import calibrate_vehicle as run_stages
+
+
+def compute_fisher(rows: np.ndarray) -> np.ndarray:
+    """Information of residuals and of a prior of standard deviation 1, written out."""
+    return rows.T @ rows + np.eye(rows.shape[1])
 
 
 def procedure_file(folder: Path, base: str, stages: list[dict], passes: int = 2) -> str:

@@ -1,4 +1,4 @@
-"""What a clip of a set and its claim are compared as: progress on the common grid, pitch at the clip's frames."""
+"""A clip of a set brought beside its control and its claim: progress on the common grid, pitch at the clip's frames."""
 
 from dataclasses import dataclass
 
