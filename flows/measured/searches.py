@@ -5,9 +5,8 @@ from catalogs.joint_numbers import load_joint_numbers
 from tasks.campaign.campaign import Campaign
 from tasks.identification.decision.disputes import ForeignCarError
 from tasks.identification.decision.verdict import Trace
-from tasks.identification.joint.along_road import look_along_road
+from tasks.identification.joint.along_road import find_effects_in_two_looks
 from tasks.identification.joint.calibration import needs_joint_fit
-from tasks.identification.joint.single_effects import find_single_effects
 from tasks.identification.joint.verdict import JointTrace, judge_jointly
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import Effect
@@ -32,8 +31,7 @@ def judge_campaign(
     disagreement = ""
     if not needs_joint_fit(measured, rules.joint):
         try:
-            first = find_single_effects(measured, model, road, effects, numbers, rules)
-            return look_along_road(first, measured, model, road, effects, numbers, rules)
+            return find_effects_in_two_looks(measured, model, road, effects, numbers, rules)
         except ForeignCarError as error:
             disagreement = str(error)
     return judge_jointly(measured, model, road, numbers, rules, disagreement=disagreement)

@@ -1,4 +1,4 @@
-"""A second look by speed and accelerometer alone, where the runs disagree about the wheels and the body."""
+"""Single effects by all channels, and by speed and accelerometer alone where wheels and body are not the model's."""
 
 from dataclasses import replace
 
@@ -19,8 +19,7 @@ ALONG_ROAD = ("speed", "longitudinal_acceleration")
 """Channels of the motion along the road, which every effect that changes a stop moves."""
 
 
-def look_along_road(
-    first: Trace,
+def find_effects_in_two_looks(
     campaign: Campaign,
     vehicle: Vehicle,
     surface: SurfaceParameters,
@@ -28,54 +27,70 @@ def look_along_road(
     numbers: tuple[JointNumber, ...],
     rules: DecisionRules,
 ) -> Trace:
-    """Judge a campaign again by its motion along the road, where all its channels name nothing and disagree.
+    """Look for single effects by all channels; where these disagree and name nothing, by the motion along the road.
 
     A car whose tyres, anti-lock brake or suspension are not the model's moves its wheels and its body as no effect of
-    the library does. The runs then disagree about every effect, also about one that the speed alone shows plainly. A
-    name of the second look must not predict any channel worse than the first allows, and must not act on the body
-    alone: the channels that show it were not asked.
+    the library does. The runs then disagree about every effect, also about one that the speed alone shows plainly.
 
     Parameters
     ----------
-    first : verdict by all channels
     campaign : measured runs with their split
     vehicle, surface : the model that is judged
     effects : library of candidates
     numbers : that a joint fit may move
     rules : of the decision
 
-    Returns
-    -------
-    The second verdict where it names something, with errors of all channels; else the first.
+    Raises
+    ------
+    ForeignCarError
+        If single effects can be told by neither; `judge_jointly` can.
+    """
+    try:
+        first = find_single_effects(campaign, vehicle, surface, effects, numbers, rules)
+    except ForeignCarError as error:
+        second = _look_along_road(campaign, vehicle, surface, effects, numbers, rules, str(error))
+        if second is None:
+            raise
+        return second
+    disagreement = compute_inflation(first.start.evidence, first.start.base, None)
+    if first.verdict.effects or disagreement <= rules.disagreement:
+        return first
+    why = f"the runs disagree with the model by a factor of {disagreement:.1f} (noise alone gives 1)"
+    return _look_along_road(campaign, vehicle, surface, effects, numbers, rules, why) or first
+
+
+def _look_along_road(
+    campaign: Campaign,
+    vehicle: Vehicle,
+    surface: SurfaceParameters,
+    effects: tuple[Effect, ...],
+    numbers: tuple[JointNumber, ...],
+    rules: DecisionRules,
+    why: str,
+) -> Trace | None:
+    """Return the verdict by speed and accelerometer, with errors of all channels; None if it names nothing that holds.
+
+    A name must not act on the body alone, because the channels that show that were not asked, and must not predict
+    the held-out runs worse in any of them than the vehicle file does.
     """
     kept = tuple(name for name in ALONG_ROAD if name in campaign.channels)
-    before = compute_inflation(first.start.evidence, first.start.base, None)
-    if first.verdict.effects or kept == campaign.channels or before <= rules.disagreement:
-        return first
-    alone = join_phrases(name.replace("_", " ") for name in kept)
+    if kept == campaign.channels:
+        return None
     try:
         second = find_single_effects(
             replace(campaign, channels=kept), vehicle, surface, effects, numbers, rules
         )
     except ForeignCarError:
-        return first
-    named = second.end.base.parts
-    if not named or any(moves_body_alone(part) for part in named):
-        return first
-    error, manoeuvres = compute_held_out_errors(first.start.evidence, first.start.base, second.end.base)
-    names = join_phrases(effect.name for effect in second.verdict.effects)
-    if worse := find_worse_channels(error, rules.worse_limit):
-        return _add_reason(
-            first,
-            f"by {alone} alone {names} would be named, but it predicts {join_phrases(worse)} of the held-out runs worse"
-            " than the frozen model: not named",
-        )
-    return _add_reason(
-        replace(second, verdict=replace(second.verdict, error=error, manoeuvre_error=manoeuvres)),
-        f"all channels together name nothing, because the runs disagree about the wheels and the body by a factor of"
-        f" {before:.1f} (noise alone gives 1): this verdict is by {alone} alone; the errors are of all channels",
+        return None
+    start, found = second.start, second.end.base
+    if not found.parts or any(moves_body_alone(part) for part in found.parts):
+        return None
+    error, manoeuvres = compute_held_out_errors(start.evidence, start.base, found, campaign.is_measured)
+    if find_worse_channels(error, rules.worse_limit):
+        return None
+    alone = join_phrases(name.replace("_", " ") for name in kept)
+    reason = f"by all channels nothing can be named, because {why}; by {alone} alone it can; errors are of all channels"
+    verdict = replace(
+        second.verdict, error=error, manoeuvre_error=manoeuvres, reasons=(reason, *second.verdict.reasons)
     )
-
-
-def _add_reason(trace: Trace, reason: str) -> Trace:
-    return replace(trace, verdict=replace(trace.verdict, reasons=(reason, *trace.verdict.reasons)))
+    return replace(second, verdict=verdict)

@@ -1,4 +1,4 @@
-"""The search for one effect at a time judges a campaign, then looks again; foreign cars go to the joint fit."""
+"""The search for one effect at a time judges a campaign; a car whose runs disagree goes to the joint fit."""
 
 from types import SimpleNamespace
 
@@ -11,7 +11,7 @@ from tasks.identification.decision.disputes import ForeignCarError
 @pytest.mark.parametrize(
     ("says_little", "foreign", "judge"),
     [
-        (False, False, "one, looked at again"),
+        (False, False, "one"),
         (False, True, "joint, because the runs disagree"),
         (True, False, "joint, because "),
     ],
@@ -25,7 +25,6 @@ def test_the_search_is_chosen_by_what_is_known_and_by_whether_the_runs_agree(
         return "one"
 
     monkeypatch.setattr(searches, "needs_joint_fit", lambda *_: says_little)
-    monkeypatch.setattr(searches, "find_single_effects", find_one)
-    monkeypatch.setattr(searches, "look_along_road", lambda first, *_: f"{first}, looked at again")
+    monkeypatch.setattr(searches, "find_effects_in_two_looks", find_one)
     monkeypatch.setattr(searches, "judge_jointly", lambda *_, disagreement: f"joint, because {disagreement}")
     assert searches.judge_campaign(SimpleNamespace(), SimpleNamespace(), SimpleNamespace(), ()) == judge

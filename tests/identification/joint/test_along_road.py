@@ -1,4 +1,4 @@
-"""A second look by speed and accelerometer alone: when it is taken, and what its name must bear."""
+"""Single effects in two looks: by all channels, then by speed and accelerometer, where the runs disagree."""
 
 from dataclasses import replace
 
@@ -13,107 +13,131 @@ from tasks.identification.decision.disputes import ForeignCarError
 from tasks.identification.decision.verdict import Trace, find_missing_effects
 from tasks.identification.inference.hypothesis import make_library_hypothesis
 from tasks.identification.joint import along_road
-from tasks.identification.joint.along_road import ALONG_ROAD, look_along_road
+from tasks.identification.joint.along_road import ALONG_ROAD, find_effects_in_two_looks
+from tasks.identification.joint.single_effects import find_single_effects
 from tasks.vehicle.effects.table import build_parameter_vector
 from tests.identification.synthetic import SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
 RULES, NUMBERS = load_decision_rules(), load_joint_numbers()
 LAG = 0.05
 STOPS = ((27.0, 1.2), (20.0, 2.0), (24.0, 1.6), (16.0, 1.8), (29.0, 1.9), (22.0, 1.3))
-ROAD = tuple(e for e in load_effects() if e.name in ("brake_lag", "aerodynamic_drag"))
+LIBRARY = tuple(e for e in load_effects() if e.name in ("brake_lag", "aerodynamic_drag"))
 (DAMPER,) = (e for e in load_effects() if e.name == "damper_asymmetry")
+FOREIGN = ForeignCarError("the runs disagree about the wheels")
 
 
 @pytest.fixture(scope="module")
-def recorded() -> tuple[Campaign, Trace]:
-    """Stops of a car with a lag, all channels measured, and a verdict of them that names nothing."""
+def campaign() -> Campaign:
+    """Stops of a car with a lag, all channels measured."""
     runs = []
     for i, (speed, pressure) in enumerate(STOPS):
         run = replace(plain_run(speed, pressure, name=f"run-{i}"), held_out=i > 2)
         response = measured(run, build_parameter_vector({"lag": LAG}), i).run.response
         runs.append(replace(run, pressure=run.pressure[: len(response)], response=response))
-    campaign = Campaign(
+    return Campaign(
         name="stops", vehicle="paper-reference", runs=tuple(runs), tolerances=TOLERANCES, content_hash="",
         split_hash="",
     )  # fmt: skip
-    found = find_missing_effects(campaign, VEHICLE, SURFACE, ROAD, RULES)
-    nothing = replace(found.verdict, verdict="NOTHING", effects=())
-    return campaign, replace(found, verdict=nothing, end=found.start, compared=())
 
 
-def look(recorded: tuple[Campaign, Trace], monkeypatch, inflation: float = 3.0) -> Trace:
-    campaign, first = recorded
-    monkeypatch.setattr(along_road, "compute_inflation", lambda *_: inflation)
-    return look_along_road(first, campaign, VEHICLE, SURFACE, ROAD, NUMBERS, RULES)
+@pytest.fixture(scope="module")
+def lagging(campaign) -> Trace:
+    """The lag, found by speed and accelerometer alone."""
+    bare = replace(campaign, channels=ALONG_ROAD)
+    return find_missing_effects(bare, VEHICLE, SURFACE, LIBRARY, RULES)
 
 
-def answer(monkeypatch, trace: Trace | None) -> list[Campaign]:
-    """Answers in place of the second search, and the campaigns that it was asked about."""
-    asked = []
+@pytest.fixture(scope="module")
+def nothing(lagging) -> Trace:
+    """A verdict that names nothing."""
+    verdict = replace(lagging.verdict, verdict="NOTHING", effects=())
+    return replace(lagging, verdict=verdict, end=lagging.start, compared=())
 
-    def search(campaign, *_):
-        asked.append(campaign)
-        if trace is None:
-            raise ForeignCarError("the runs disagree")
-        return trace
+
+def answer(
+    monkeypatch, *answers: Trace | ForeignCarError, disagreement: float = 3.0
+) -> list[tuple[str, ...]]:
+    """Answers in place of searches, one after the other, and the channels that each was asked about."""
+    asked, left = [], list(answers)
+
+    def search(runs, *_):
+        asked.append(runs.channels)
+        found = left.pop(0)
+        if isinstance(found, ForeignCarError):
+            raise found
+        return found
 
     monkeypatch.setattr(along_road, "find_single_effects", search)
+    monkeypatch.setattr(along_road, "compute_inflation", lambda *_: disagreement)
     return asked
 
 
-def test_a_name_of_the_motion_along_the_road_is_found_and_its_error_is_of_all_channels(recorded, monkeypatch):
-    second = look(recorded, monkeypatch)
+def search(campaign: Campaign) -> Trace:
+    return find_effects_in_two_looks(campaign, VEHICLE, SURFACE, LIBRARY, NUMBERS, RULES)
+
+
+def test_a_name_of_the_second_look_has_its_interval_and_errors_of_all_channels(
+    campaign, nothing, monkeypatch
+):
+    def search_then_find(runs, *rest):
+        return nothing if runs.channels == CHANNELS else find_single_effects(runs, *rest)
+
+    monkeypatch.setattr(along_road, "find_single_effects", search_then_find)
+    monkeypatch.setattr(along_road, "compute_inflation", lambda *_: 3.0)
+    second = search(campaign)
     (found,) = second.verdict.effects
     assert found.name == "brake_lag"
     assert found.parameters[0].ci_low < LAG < found.parameters[0].ci_high
     assert set(second.verdict.error) == set(CHANNELS) and "peak_pitch" in second.verdict.manoeuvre_error
-    assert (
-        second.verdict.error["wheel_speed_front"].after
-        < 0.5 * second.verdict.error["wheel_speed_front"].frozen
-    )
-    assert "by speed and longitudinal acceleration alone" in second.verdict.reasons[0]
-    assert "factor of 3.0" in second.verdict.reasons[0]
+    wheel = second.verdict.error["wheel_speed_front"]
+    assert wheel.after < 0.5 * wheel.frozen
     seen = [np.isfinite(run.sigma) for run in second.start.evidence.train]
     assert all(tuple(np.array(CHANNELS)[channels]) == ALONG_ROAD for channels in seen)
 
 
-def test_runs_that_agree_are_not_looked_at_again(recorded, monkeypatch):
-    asked = answer(monkeypatch, None)
-    assert look(recorded, monkeypatch, inflation=RULES.disagreement) is recorded[1]
-    assert not asked
-    assert look(recorded, monkeypatch, inflation=RULES.disagreement + 0.1) is recorded[1]
-    assert [campaign.channels for campaign in asked] == [ALONG_ROAD]
+def test_the_reason_says_why_there_was_a_second_look_and_by_which_channels(
+    campaign, lagging, nothing, monkeypatch
+):
+    answer(monkeypatch, nothing, lagging)
+    assert "disagree with the model by a factor of 3.0" in search(campaign).verdict.reasons[0]
+    answer(monkeypatch, FOREIGN, lagging)
+    (reason, *_) = search(campaign).verdict.reasons
+    assert str(FOREIGN) in reason and "by speed and longitudinal acceleration alone it can" in reason
 
 
-def test_a_verdict_that_names_something_stays(recorded, monkeypatch):
-    asked = answer(monkeypatch, None)
-    named = replace(recorded[1], verdict=replace(recorded[1].verdict, effects=("a name",)))
-    assert look((recorded[0], named), monkeypatch) is named
-    assert not asked
+def test_a_first_look_that_names_something_or_whose_runs_agree_is_the_verdict(
+    campaign, lagging, nothing, monkeypatch
+):
+    answer(monkeypatch, lagging)
+    assert search(campaign) is lagging
+    asked = answer(monkeypatch, nothing, disagreement=RULES.disagreement)
+    assert search(campaign) is nothing and asked == [CHANNELS]
+    asked = answer(monkeypatch, nothing, nothing, disagreement=RULES.disagreement + 0.1)
+    assert search(campaign) is nothing and asked == [CHANNELS, ALONG_ROAD]
 
 
-def test_without_wheels_and_body_there_is_no_second_look(recorded, monkeypatch):
-    asked = answer(monkeypatch, None)
-    bare = replace(recorded[0], channels=ALONG_ROAD)
-    assert look((bare, recorded[1]), monkeypatch) is recorded[1]
-    assert not asked
+def test_without_wheels_and_body_there_is_no_second_look(campaign, nothing, monkeypatch):
+    bare = replace(campaign, channels=ALONG_ROAD)
+    asked = answer(monkeypatch, nothing)
+    assert search(bare) is nothing and asked == [ALONG_ROAD]
 
 
-def test_a_second_look_that_names_nothing_or_the_body_leaves_the_first(recorded, monkeypatch):
-    first = recorded[1]
-    answer(monkeypatch, first)
-    assert look(recorded, monkeypatch) is first
-    base = first.end.base
-    of_body = replace(base, parts=(make_library_hypothesis(DAMPER),), values=np.array([0.3]))
-    answer(monkeypatch, replace(first, end=replace(first.end, base=of_body)))
-    assert look(recorded, monkeypatch) is first
+@pytest.mark.parametrize("name", ["nothing", "a damper beside the lag", "a foreign car"])
+def test_a_second_look_that_names_nothing_or_the_body_leaves_the_first(
+    campaign, lagging, nothing, monkeypatch, name
+):
+    found = lagging.end.base
+    parts, values = (*found.parts, make_library_hypothesis(DAMPER)), np.append(found.values, 1e-4)
+    beside = replace(lagging, end=replace(lagging.end, base=replace(found, parts=parts, values=values)))
+    second = {"nothing": nothing, "a damper beside the lag": beside, "a foreign car": FOREIGN}[name]
+    answer(monkeypatch, nothing, second)
+    assert search(campaign) is nothing
+    answer(monkeypatch, FOREIGN, second)
+    with pytest.raises(ForeignCarError, match="disagree about the wheels"):
+        search(campaign)
 
 
-def test_a_name_that_predicts_other_channels_worse_is_not_named(recorded, monkeypatch):
-    second = look(recorded, monkeypatch)
-    late = replace(second.end, base=replace(second.end.base, values=np.array([10.0 * LAG])))
-    answer(monkeypatch, replace(second, end=late))
-    kept = look(recorded, monkeypatch)
-    assert not kept.verdict.effects
-    assert "brake_lag would be named" in kept.verdict.reasons[0]
-    assert "worse than the frozen model: not named" in kept.verdict.reasons[0]
+def test_a_name_that_predicts_the_channels_worse_is_not_named(campaign, lagging, nothing, monkeypatch):
+    late = replace(lagging.end, base=replace(lagging.end.base, values=np.array([10.0 * LAG])))
+    answer(monkeypatch, nothing, replace(lagging, end=late))
+    assert search(campaign) is nothing
