@@ -89,7 +89,7 @@ def _look_along_road(
     if find_worse_channels(error, rules.worse_limit):
         return None
     alone = join_phrases(name.replace("_", " ") for name in kept)
-    reason = f"by all channels nothing can be named, because {why}; by {alone} alone it can; errors are of all channels"
+    reason = f"all channels together name nothing, because {why}; this verdict is by {alone} alone, its errors by all"
     verdict = replace(
         second.verdict, error=error, manoeuvre_error=manoeuvres, reasons=(reason, *second.verdict.reasons)
     )

@@ -102,7 +102,7 @@ def test_the_reason_says_why_there_was_a_second_look_and_by_which_channels(
     assert "disagree with the model by a factor of 3.0" in search(campaign).verdict.reasons[0]
     answer(monkeypatch, FOREIGN, lagging)
     (reason, *_) = search(campaign).verdict.reasons
-    assert str(FOREIGN) in reason and "by speed and longitudinal acceleration alone it can" in reason
+    assert str(FOREIGN) in reason and "this verdict is by speed and longitudinal acceleration alone" in reason
 
 
 def test_a_first_look_that_names_something_or_whose_runs_agree_is_the_verdict(
