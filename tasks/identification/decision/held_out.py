@@ -106,7 +106,9 @@ def is_noticed(error: Mapping[str, ChannelError], without: Mapping[str, ChannelE
     return any(error[name].after < share * e.after for name, e in without.items())
 
 
-def find_worse_channels(error: Mapping[str, ChannelError], limit: float) -> list[str]:
+def find_worse_channels(
+    error: Mapping[str, ChannelError], limit: float, *, speed_decides: bool = True
+) -> list[str]:
     """Return the channels that effects predict worse than the frozen model, if that outweighs what they predict better.
 
     One channel must not veto what the others prove; the speed, which a stop is made of, may.
@@ -115,7 +117,8 @@ def find_worse_channels(error: Mapping[str, ChannelError], limit: float) -> list
     ----------
     error : by channel
     limit : ratio of errors from which a channel is worse, if its resampled change also says so [1]
+    speed_decides : whether the effects move the speed; an error of the accelerometer leaves it to the session's numbers
     """
     worse = [name for name, e in error.items() if e.after > limit * e.frozen and e.change_low > 0.0]
     change = np.mean([np.log(e.after / e.frozen) for e in error.values() if e.frozen > 0.0 and e.after > 0.0])
-    return worse if "speed" in worse or change > 0.0 else []
+    return worse if (speed_decides and "speed" in worse) or change > 0.0 else []

@@ -14,10 +14,15 @@ from tasks.identification.decision.attribution import (  # fmt: skip
 )
 from tasks.identification.decision.cross_validation import cross_validate_candidate
 from tasks.identification.decision.search import Round
-from tasks.identification.decision.session_numbers import find_alike_numbers, free_session_number
+from tasks.identification.decision.session_numbers import (
+    find_alike_instruments,
+    find_alike_numbers,
+    free_session_number,
+)
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.fit import Fit, compute_misfit_by_run, compute_misfit_falls
 from tasks.identification.inference.hypothesis import is_nested
+from tasks.identification.inference.linearisation import hold_session
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,6 +66,9 @@ def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]
         others = [c for c in tried if c.hypothesis.name != own.hypothesis.name]
         alike = find_alike_numbers(evidence, own.hypothesis.names[0])
         others += _free_numbers(evidence, rest, alike, {c.hypothesis.name for c in others})
+        if own.hypothesis.effect_class == "retune":
+            known = {c.hypothesis.name for c in others}
+            others += _read_in_place(evidence, rest, own.hypothesis.names[0], known)
         unseen = compute_misfit_by_run(evidence.held_out, rest)
         share = compute_win_share([own, *others], rest)
         shares = [compute_win_share([c, own, *[o for o in others if o is not c]], rest) for c in others]
@@ -70,7 +78,7 @@ def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]
             if (
                 _is_as_wrong(c)
                 if c.hypothesis.names[0] in alike
-                else c.score > 0.0 and is_close(own, share, c, wins)
+                else _may_be_rival(own, c) and is_close(own, share, c, wins)
             )
             and not is_nested(own.hypothesis, c.hypothesis)
             # an explanation that bends the session beyond belief is none beside one that does not
@@ -88,6 +96,12 @@ def _is_as_wrong(number: Candidate) -> bool:
     return number.gain > 0.0 and not number.fitted.at_bound
 
 
+def _may_be_rival(own: Candidate, other: Candidate) -> bool:
+    """Return whether another explanation has the score it needs: none if it reads like a wrong number that has none."""
+    classes = (own.hypothesis.effect_class, other.hypothesis.effect_class)
+    return other.score > 0.0 or (classes == ("retune", "sensor") and _is_as_wrong(other))
+
+
 def _free_numbers(
     evidence: Evidence, rest: Fit, names: Sequence[str], known: Collection[str]
 ) -> list[Candidate]:
@@ -101,6 +115,16 @@ def _free_numbers(
         if hypothesis is not None and hypothesis.name not in known:
             judged.append(judge_hypothesis(evidence, rest, None, hypothesis))
     return judged
+
+
+def _read_in_place(evidence: Evidence, rest: Fit, number: str, known: Collection[str]) -> list[Candidate]:
+    """Return errors of instruments that look like a wrong number, each with the number as the file has it."""
+    held = hold_session(evidence, [number])
+    return [
+        judge_hypothesis(held, rest, None, instrument)
+        for instrument in find_alike_instruments(evidence, number)
+        if instrument.name not in known
+    ]
 
 
 def compute_win_share(candidates: list[Candidate], base: Fit, seed: int = 0) -> float:

@@ -42,6 +42,23 @@ def find_alike_numbers(evidence: Evidence, name: str) -> list[str]:
     return [numbers[0].name for numbers in alike if len(numbers) == 1 and numbers[0].name in SESSION]
 
 
+def find_alike_instruments(evidence: Evidence, name: str) -> list[Hypothesis]:
+    """Return the errors of instruments that the runs can hardly tell from a number of the session.
+
+    Wheels that are smaller than the file says turn as fast as wheels whose sensor counts too much.
+
+    Parameters
+    ----------
+    evidence : the runs
+    name : of `SESSION`
+    """
+    place = _find_in_library(evidence, name)
+    if place is None:
+        return []
+    alike = (evidence.effects[j] for j in find_look_alikes(evidence, place))
+    return [make_library_hypothesis(effect) for effect in alike if effect.effect_class == "sensor"]
+
+
 def compute_joint_pull(fitted: Fit, names: list[str]) -> float:
     """Return how far numbers that look alike are pulled together, in their prior sigmas [1].
 

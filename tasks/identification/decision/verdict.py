@@ -238,10 +238,12 @@ def _object_to_last(
     least : share of the error of some channel that a name must leave at most; None takes that of forms, for forms
     """
     rules, last = found.evidence.rules, found.rounds[-1]
-    worse = find_worse_channels(error, rules.worse_limit)
+    named = [r.accepted.hypothesis for r in found.rounds]
+    moved = any(h.effect_class != "sensor" or h.variable == "speed" for h in named)
+    worse = find_worse_channels(error, rules.worse_limit, speed_decides=moved)
     if worse:
         return (
-            f"{', '.join(r.accepted.hypothesis.name for r in found.rounds)} would fit, but predicts"
+            f"{', '.join(h.name for h in named)} would fit, but predicts"
             f" {', '.join(worse)} of the held-out runs worse than the frozen model: not named"
         )
     if least is not None or last.accepted.hypothesis.effect_class == "form":
