@@ -144,6 +144,10 @@ class TestHeldOutChannels:
         error = dict.fromkeys(CHANNELS, self.ERROR) | {"speed": self.WORSE}
         assert find_worse_channels(error, 1.05) == ["speed"]
 
+    def test_the_speed_does_not_where_the_effects_leave_it_alone(self) -> None:
+        error = dict.fromkeys(CHANNELS, self.ERROR) | {"speed": self.WORSE}
+        assert find_worse_channels(error, 1.05, speed_decides=False) == []
+
     def test_channels_that_are_worse_on_the_whole_do(self) -> None:
         error = {"speed": replace(self.ERROR, after=0.99), "pitch": self.WORSE}
         assert find_worse_channels(error, 1.05) == ["pitch"]

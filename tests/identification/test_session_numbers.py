@@ -13,7 +13,7 @@ from synthetic import NOISE, TOLERANCES, measured, plain_run
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
-from tasks.campaign.campaign import CHANNELS, SESSION
+from tasks.campaign.campaign import CHANNELS, SESSION, Tolerances
 from tasks.identification.decision.rivals import compare_with_rivals
 from tasks.identification.decision.search import SearchState, find_retune
 from tasks.identification.decision.session_numbers import (
@@ -25,6 +25,7 @@ from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.derivatives import differentiate_run
 from tasks.identification.inference.disturbance import Disturbance
 from tasks.identification.inference.fit import fit_hypotheses
+from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.table import EFFECT_TABLE, build_parameter_vector
 
 QUIET = Disturbance(scale=(5.0, 0.001, 5.0), time=(1.0, 0.3, 0.3))
@@ -32,24 +33,35 @@ NUMBERS = tuple(e for e in load_effects() if e.name in ("retuned_pressure_gain",
 SPEED_ALONE = np.where([name == "speed" for name in CHANNELS], NOISE, np.inf)
 
 
-def evidence_of(theta: np.ndarray, sigma: np.ndarray) -> Evidence:
-    tolerances = TOLERANCES.with_session({"wheel_radius": 1e-5})
+WHEELS = tuple(e for e in load_effects() if e.name in ("retuned_wheel_radius", "sensor_wheel_speed_scale"))
+KNOWN_RADIUS = TOLERANCES.with_session({"wheel_radius": 1e-5})
+
+
+def evidence_of(
+    theta: np.ndarray,
+    sigma: np.ndarray,
+    effects: tuple[Effect, ...] = NUMBERS,
+    tolerances: Tolerances = KNOWN_RADIUS,
+) -> Evidence:
     drives = [(30.0, 0.0), (28.0, 1.2), (25.0, 1.6), (18.0, 0.8), (27.0, 1.0)]
     runs = tuple(
         differentiate_run(
-            measured(plain_run(v, p, name=str(i)), theta, i), np.zeros(7), sigma, np.zeros(len(EFFECT_TABLE)), NUMBERS,
+            measured(plain_run(v, p, name=str(i)), theta, i), np.zeros(7), sigma, np.zeros(len(EFFECT_TABLE)), effects,
             tolerances, QUIET,
         )
         for i, (v, p) in enumerate(drives)
     )  # fmt: skip
     return Evidence(
-        train=runs[:3], held_out=runs[3:], effects=NUMBERS, tolerances=tolerances, disturbance=QUIET,
+        train=runs[:3], held_out=runs[3:], effects=effects, tolerances=tolerances, disturbance=QUIET,
         sensors=(np.zeros(7), sigma), rules=load_decision_rules(),
     )  # fmt: skip
 
 
 def find_gain(gain: float, sigma: np.ndarray) -> tuple[SearchState, list[str]]:
-    evidence = evidence_of(build_parameter_vector({"pressure_gain": gain}), sigma)
+    return find_wrong_number(evidence_of(build_parameter_vector({"pressure_gain": gain}), sigma))
+
+
+def find_wrong_number(evidence: Evidence) -> tuple[SearchState, list[str]]:
     null = fit_hypotheses(evidence.train, (), evidence.session_sigma, iterations=6)
     reasons: list[str] = []
     return find_retune(SearchState(evidence=evidence, base=null), reasons), reasons
@@ -96,4 +108,28 @@ def test_a_gain_that_the_body_tells_from_the_mass_has_no_rival() -> None:
     found, _ = find_gain(0.1, NOISE)
     assert [r.accepted.hypothesis.name for r in found.rounds] == ["retuned_pressure_gain"]
     (compared,) = compare_with_rivals(found.evidence, found.base, found.rounds)
+    assert not compared.near
+
+
+@pytest.mark.parametrize("truth", [{"wheel_speed_scale": 0.027}, {"wheel_radius": -0.027}])
+def test_wheels_that_are_too_small_and_a_sensor_that_counts_too_much_are_rivals(
+    truth: dict[str, float],
+) -> None:
+    found, _ = find_wrong_number(evidence_of(build_parameter_vector(truth), NOISE, WHEELS, TOLERANCES))
+    assert [r.accepted.hypothesis.name for r in found.rounds] == ["retuned_wheel_radius"]
+    (compared,) = compare_with_rivals(found.evidence, found.base, found.rounds)
+    ((sensor, _),) = compared.near
+    assert sensor.hypothesis.name == "sensor_wheel_speed_scale"
+    assert sensor.fitted.values == pytest.approx(0.027, rel=0.1)
+    assert abs(sensor.fitted.session[SESSION.index("wheel_radius")]) < 1e-3
+
+
+def test_a_sensor_that_does_not_read_like_the_wrong_number_is_no_rival() -> None:
+    sensor = tuple(e for e in load_effects() if e.name == "sensor_speed_delay")
+    evidence = evidence_of(
+        build_parameter_vector({"wheel_radius": -0.027}), NOISE, WHEELS[:1] + sensor, TOLERANCES
+    )
+    found, _ = find_wrong_number(evidence)
+    (compared,) = compare_with_rivals(found.evidence, found.base, found.rounds)
+    assert [r.accepted.hypothesis.name for r in found.rounds] == ["retuned_wheel_radius"]
     assert not compared.near

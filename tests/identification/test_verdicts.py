@@ -126,6 +126,23 @@ def test_what_no_held_out_error_feels_is_no_discovery_where_the_gain_was_not_kno
     assert is_named or "makes no difference of 15%" in str(objection)
 
 
+@pytest.mark.parametrize(
+    ("name", "variable", "is_named"),
+    [("sensor_mount_tilt", "mount", True), ("sensor_speed_scale", "speed", False)],
+)
+def test_an_accelerometer_answers_for_its_own_channel_and_a_speedometer_for_the_speed(
+    name: str, variable: str, is_named: bool
+) -> None:
+    worse = replace(make_error(1.3)["speed"], change_low=0.1)
+    error = {"speed": worse, "longitudinal_acceleration": make_error(0.2)["speed"]}
+    hypothesis = SimpleNamespace(name=name, effect_class="sensor", variable=variable)
+    found = SimpleNamespace(
+        evidence=SimpleNamespace(rules=RULES), rounds=[SimpleNamespace(accepted=SimpleNamespace(hypothesis=hypothesis))]
+    )  # fmt: skip
+    objection = decision._object_to_last(found, None, error, None)
+    assert (objection is None) == is_named
+
+
 def make_error(after: float) -> dict[str, ChannelError]:
     return {
         "speed": ChannelError(
