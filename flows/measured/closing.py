@@ -20,7 +20,7 @@ from flows.measured.verdict_report import write_verdict_page
 from flows.store.outputs import Outputs
 from manifests.canonical import sha256_of, sha256_of_file
 from manifests.provenance import code_version
-from tasks.campaign.campaign import SESSION, Campaign
+from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
 from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter, Verdict
 from tasks.identification.decision.excitation import find_reached_range
 from tasks.identification.decision.verdict import Trace
@@ -142,7 +142,11 @@ def tell_search(trace: Trace | JointTrace) -> dict[str, Any]:
         verdict.effects, rivals, library, verdict.error, verdict.manoeuvre_error, suggested,
         bool(verdict.disagreement),
     )  # fmt: skip
-    told = {"sentence": sentence, "calibrated": [effect_json(effect, library) for effect in trace.calibrated]}
+    told = {
+        "channels": [CHANNELS[c] for c in train[0].channels],
+        "sentence": sentence,
+        "calibrated": [effect_json(effect, library) for effect in trace.calibrated],
+    }
     if isinstance(trace, Trace):
         residual = compute_residual_rmse((*train, *held_out))
         pulls = compute_friction_pulls(trace)

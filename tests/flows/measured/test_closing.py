@@ -109,6 +109,12 @@ def test_a_lag_in_the_data_is_named_with_its_value_and_better_predictions(closed
     assert distance["unit"] == "m" and distance["after"] < 0.5 * distance["frozen"]
 
 
+def test_a_verdict_says_by_which_channels_it_was_reached(closed: Path) -> None:
+    verdict = json.loads((closed / "verdict.json").read_text())
+    assert verdict["channels"] == list(CHANNELS)
+    assert all(set(run) == set(CHANNELS) for run in verdict["residual_rmse"].values())
+
+
 def test_a_tolerance_that_no_verdict_uses_is_told(tmp_path: Path) -> None:
     numbers = {
         name: {"value": value, "unit": unit, "source": "guess", "tolerance": 0.1 * value}
