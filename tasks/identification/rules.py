@@ -85,7 +85,8 @@ class DecisionRules:
     relinearisation_change : relative change of parameters below which a second relinearisation is not needed [1]
     retune_pull : pull of a session nuisance, in prior sigmas, from which it is a wrong number of the vehicle [1]
     relinearisation_pull : pull, in prior sigmas, from which the runs are linearised anew at the session [1]
-    disagreement : inflation of a named effect from which a single form is compared with it [1]
+    disagreement : inflation of a named effect from which a single form is compared with it; of the runs without any
+        name, from which speed and accelerometer are asked alone [1]
     lone_form_share : share of the named effects' gain from which a single form is compared with them [1]
     least_expected_d2 : expected squared distance below which a planned run is not worth driving [1]
     retune_widening : factor on the session's tolerances when a model is re-tuned without any new effect [1]

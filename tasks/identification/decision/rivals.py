@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tasks.campaign.campaign import SESSION
 from tasks.identification.decision.attribution import (  # fmt: skip
     Candidate,
     Misfits,
@@ -66,9 +67,8 @@ def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]
         others = [c for c in tried if c.hypothesis.name != own.hypothesis.name]
         alike = find_alike_numbers(evidence, own.hypothesis.names[0])
         others += _free_numbers(evidence, rest, alike, {c.hypothesis.name for c in others})
-        if own.hypothesis.effect_class == "retune":
-            known = {c.hypothesis.name for c in others}
-            others += _read_in_place(evidence, rest, own.hypothesis.names[0], known)
+        read = _read_in_place(evidence, rest, own)
+        others = [c for c in others if c.hypothesis.name not in read] + list(read.values())
         unseen = compute_misfit_by_run(evidence.held_out, rest)
         share = compute_win_share([own, *others], rest)
         shares = [compute_win_share([c, own, *[o for o in others if o is not c]], rest) for c in others]
@@ -78,7 +78,8 @@ def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]
             if (
                 _is_as_wrong(c)
                 if c.hypothesis.names[0] in alike
-                else _may_be_rival(own, c) and is_close(own, share, c, wins)
+                else (_is_as_wrong(c) if c.hypothesis.name in read else c.score > 0.0)
+                and is_close(own, share, c, wins)
             )
             and not is_nested(own.hypothesis, c.hypothesis)
             # an explanation that bends the session beyond belief is none beside one that does not
@@ -91,15 +92,9 @@ def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]
     return compared
 
 
-def _is_as_wrong(number: Candidate) -> bool:
-    """Return whether a number that looks like the named one may be the wrong one: as of that one, no score is asked."""
-    return number.gain > 0.0 and not number.fitted.at_bound
-
-
-def _may_be_rival(own: Candidate, other: Candidate) -> bool:
-    """Return whether another explanation has the score it needs: none if it reads like a wrong number that has none."""
-    classes = (own.hypothesis.effect_class, other.hypothesis.effect_class)
-    return other.score > 0.0 or (classes == ("retune", "sensor") and _is_as_wrong(other))
+def _is_as_wrong(other: Candidate) -> bool:
+    """Return whether what looks like a wrong number may be what is wrong: as of that one, no score is asked."""
+    return other.gain > 0.0 and not other.fitted.at_bound
 
 
 def _free_numbers(
@@ -117,14 +112,16 @@ def _free_numbers(
     return judged
 
 
-def _read_in_place(evidence: Evidence, rest: Fit, number: str, known: Collection[str]) -> list[Candidate]:
-    """Return errors of instruments that look like a wrong number, each with the number as the file has it."""
+def _read_in_place(evidence: Evidence, rest: Fit, own: Candidate) -> dict[str, Candidate]:
+    """Return errors of instruments that look like a wrong number, by name, each with the number as the file has it."""
+    number = own.hypothesis.names[0]
+    if own.hypothesis.effect_class != "retune" or number not in SESSION:
+        return {}
     held = hold_session(evidence, [number])
-    return [
-        judge_hypothesis(held, rest, None, instrument)
-        for instrument in find_alike_instruments(evidence, number)
-        if instrument.name not in known
-    ]
+    return {
+        instrument.name: judge_hypothesis(held, rest, None, instrument)
+        for instrument in find_alike_instruments(held, number)
+    }
 
 
 def compute_win_share(candidates: list[Candidate], base: Fit, seed: int = 0) -> float:

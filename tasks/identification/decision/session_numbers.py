@@ -49,7 +49,7 @@ def find_alike_instruments(evidence: Evidence, name: str) -> list[Hypothesis]:
 
     Parameters
     ----------
-    evidence : the runs
+    evidence : the runs, with the number held: free, it would follow either
     name : of `SESSION`
     """
     place = _find_in_library(evidence, name)

@@ -19,7 +19,7 @@ from tasks.identification.decision.attribution import Candidate
 from tasks.identification.decision.calibrated import tell_calibrated
 from tasks.identification.decision.correlation import correlate_residual_with_pressure
 from tasks.identification.decision.discovery import search_library_and_forms
-from tasks.identification.decision.disputes import settle_disputes
+from tasks.identification.decision.disputes import moves_speed, settle_disputes
 from tasks.identification.decision.experiment import plan_next_experiment
 from tasks.identification.decision.held_out import compute_held_out_errors, find_worse_channels, is_noticed
 from tasks.identification.decision.intervals import (
@@ -239,8 +239,7 @@ def _object_to_last(
     """
     rules, last = found.evidence.rules, found.rounds[-1]
     named = [r.accepted.hypothesis for r in found.rounds]
-    moved = any(h.effect_class != "sensor" or h.variable == "speed" for h in named)
-    worse = find_worse_channels(error, rules.worse_limit, speed_decides=moved)
+    worse = find_worse_channels(error, rules.worse_limit, speed_decides=any(map(moves_speed, named)))
     if worse:
         return (
             f"{', '.join(h.name for h in named)} would fit, but predicts"
@@ -289,7 +288,6 @@ def _to_tell_apart(
 def _verdict_name(named: list[NamedEffect], near: list[tuple[str, NamedEffect]]) -> VerdictName:
     if not named:
         return "NOTHING"
-    classes = {effect.effect_class for effect in named}
     forms = {(e.name, e.port, e.variable) for e in named if e.effect_class == "form"}
     if forms:
         # an effect of the library that explains as much at the same port by the same variable is not unknown
@@ -297,6 +295,5 @@ def _verdict_name(named: list[NamedEffect], near: list[tuple[str, NamedEffect]])
         return "SET" if forms & known else "UNKNOWN_FORM"
     if near:
         return "SET"
-    if "effect" in classes:
-        return "FOUND"
-    return "RETUNE" if "retune" in classes else "SENSOR"
+    classes = {effect.effect_class for effect in named}
+    return "FOUND" if "effect" in classes else "RETUNE" if "retune" in classes else "SENSOR"

@@ -1,9 +1,9 @@
-"""Single effects by all channels, and by speed and accelerometer alone where wheels and body are not the model's."""
+"""Single effects by all channels, and by speed and accelerometer alone where the runs disagree with the model."""
 
 from dataclasses import replace
 
 from tasks.campaign.campaign import Campaign
-from tasks.identification.decision.disputes import ForeignCarError, moves_body_alone
+from tasks.identification.decision.disputes import ForeignCarError, moves_body_alone, moves_speed
 from tasks.identification.decision.held_out import compute_held_out_errors, find_worse_channels
 from tasks.identification.decision.screening import compute_inflation
 from tasks.identification.decision.verdict import Trace
@@ -27,10 +27,11 @@ def find_effects_in_two_looks(
     numbers: tuple[JointNumber, ...],
     rules: DecisionRules,
 ) -> Trace:
-    """Look for single effects by all channels; where these disagree and name nothing, by the motion along the road.
+    """Look for single effects by all channels; where they name nothing and the runs disagree, along the road alone.
 
     A car whose tyres, anti-lock brake or suspension are not the model's moves its wheels and its body as no effect of
     the library does. The runs then disagree about every effect, also about one that the speed alone shows plainly.
+    Whether runs disagree is told from four training runs on.
 
     Parameters
     ----------
@@ -71,7 +72,8 @@ def _look_along_road(
     """Return the verdict by speed and accelerometer, with errors of all channels; None if it names nothing that holds.
 
     A name must not act on the body alone, because the channels that show that were not asked, and must not predict
-    the held-out runs worse in any of them than the vehicle file does.
+    the held-out runs worse than the vehicle file does, with all channels counted. A brake gain that is wrong and
+    nothing else is left to the first look or the joint fit.
     """
     kept = tuple(name for name in ALONG_ROAD if name in campaign.channels)
     if kept == campaign.channels:
@@ -86,10 +88,13 @@ def _look_along_road(
     if not found.parts or any(moves_body_alone(part) for part in found.parts):
         return None
     error, manoeuvres = compute_held_out_errors(start.evidence, start.base, found, campaign.is_measured)
-    if find_worse_channels(error, rules.worse_limit):
+    moved = any(map(moves_speed, found.parts))
+    if find_worse_channels(error, rules.worse_limit, speed_decides=moved):
         return None
     alone = join_phrases(name.replace("_", " ") for name in kept)
-    reason = f"all channels together name nothing, because {why}; this verdict is by {alone} alone, its errors by all"
+    reason = (
+        f"all channels together name nothing, and {why}; this verdict is by {alone} alone, its errors by all"
+    )
     verdict = replace(
         second.verdict, error=error, manoeuvre_error=manoeuvres, reasons=(reason, *second.verdict.reasons)
     )

@@ -8,8 +8,10 @@ import pytest
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from catalogs.joint_numbers import load_joint_numbers
+from flows.measured.closing import tell_search
 from tasks.campaign.campaign import CHANNELS, Campaign
 from tasks.identification.decision.disputes import ForeignCarError
+from tasks.identification.decision.screening import compute_inflation
 from tasks.identification.decision.verdict import Trace, find_missing_effects
 from tasks.identification.inference.hypothesis import make_library_hypothesis
 from tasks.identification.joint import along_road
@@ -20,7 +22,7 @@ from tests.identification.synthetic import SURFACE, TOLERANCES, VEHICLE, measure
 
 RULES, NUMBERS = load_decision_rules(), load_joint_numbers()
 LAG = 0.05
-STOPS = ((27.0, 1.2), (20.0, 2.0), (24.0, 1.6), (16.0, 1.8), (29.0, 1.9), (22.0, 1.3))
+STOPS = ((27.0, 1.2), (20.0, 2.0), (24.0, 1.6), (18.0, 1.5), (16.0, 1.8), (29.0, 1.9), (22.0, 1.3))
 LIBRARY = tuple(e for e in load_effects() if e.name in ("brake_lag", "aerodynamic_drag"))
 (DAMPER,) = (e for e in load_effects() if e.name == "damper_asymmetry")
 FOREIGN = ForeignCarError("the runs disagree about the wheels")
@@ -31,7 +33,7 @@ def campaign() -> Campaign:
     """Stops of a car with a lag, all channels measured."""
     runs = []
     for i, (speed, pressure) in enumerate(STOPS):
-        run = replace(plain_run(speed, pressure, name=f"run-{i}"), held_out=i > 2)
+        run = replace(plain_run(speed, pressure, name=f"run-{i}"), held_out=i > 3)
         response = measured(run, build_parameter_vector({"lag": LAG}), i).run.response
         runs.append(replace(run, pressure=run.pressure[: len(response)], response=response))
     return Campaign(
@@ -114,6 +116,33 @@ def test_a_first_look_that_names_something_or_whose_runs_agree_is_the_verdict(
     assert search(campaign) is nothing and asked == [CHANNELS]
     asked = answer(monkeypatch, nothing, nothing, disagreement=RULES.disagreement + 0.1)
     assert search(campaign) is nothing and asked == [CHANNELS, ALONG_ROAD]
+
+
+def test_whether_runs_disagree_is_read_from_four_training_runs_on(campaign, lagging, nothing, monkeypatch):
+    asked = answer(monkeypatch, nothing, lagging)
+    monkeypatch.setattr(along_road, "compute_inflation", compute_inflation)
+    assert compute_inflation(nothing.start.evidence, nothing.start.base, None) > RULES.disagreement
+    assert search(campaign).verdict.effects and asked == [CHANNELS, ALONG_ROAD]
+    evidence, base = nothing.start.evidence, nothing.start.base
+    few = replace(
+        nothing.start, evidence=replace(evidence, train=evidence.train[:3]), base=replace(base, residuals=base.residuals[:3])
+    )  # fmt: skip
+    answer(monkeypatch, replace(nothing, start=few))
+    monkeypatch.setattr(along_road, "compute_inflation", compute_inflation)
+    assert not search(campaign).verdict.effects
+
+
+def test_without_an_accelerometer_the_second_look_has_the_speed_alone(
+    campaign, lagging, nothing, monkeypatch
+):
+    asked = answer(monkeypatch, nothing, lagging)
+    few = ("speed", "wheel_speed_front")
+    (reason, *_) = search(replace(campaign, channels=few)).verdict.reasons
+    assert asked == [few, ("speed",)] and "by speed alone" in reason
+
+
+def test_the_file_of_a_verdict_says_by_which_channels_it_was_reached(lagging):
+    assert tell_search(lagging)["channels"] == list(ALONG_ROAD)
 
 
 def test_without_wheels_and_body_there_is_no_second_look(campaign, nothing, monkeypatch):
