@@ -124,10 +124,8 @@ def test_whether_runs_disagree_is_read_from_four_training_runs_on(campaign, lagg
     assert compute_inflation(nothing.start.evidence, nothing.start.base, None) > RULES.disagreement
     assert search(campaign).verdict.effects and asked == [CHANNELS, ALONG_ROAD]
     evidence, base = nothing.start.evidence, nothing.start.base
-    few = replace(
-        nothing.start, evidence=replace(evidence, train=evidence.train[:3]), base=replace(base, residuals=base.residuals[:3])
-    )  # fmt: skip
-    answer(monkeypatch, replace(nothing, start=few))
+    evidence, base = replace(evidence, train=evidence.train[:3]), replace(base, residuals=base.residuals[:3])
+    answer(monkeypatch, replace(nothing, start=replace(nothing.start, evidence=evidence, base=base)))
     monkeypatch.setattr(along_road, "compute_inflation", compute_inflation)
     assert not search(campaign).verdict.effects
 
