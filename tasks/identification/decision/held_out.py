@@ -16,7 +16,7 @@ from tasks.vehicle.effects.table import EFFECT_TABLE
 
 
 def compute_held_out_errors(
-    evidence: Evidence, null: Fit, base: Fit, measured: NDArray[np.bool_] | None = None
+    evidence: Evidence, null: Fit, base: Fit
 ) -> tuple[dict[str, ChannelError], dict[str, ChannelError]]:
     """Return the RMSE on held-out runs under the frozen, the re-tuned and the grown model.
 
@@ -25,7 +25,6 @@ def compute_held_out_errors(
     evidence : the runs
     null : fit without effects, from which re-tuning starts
     base : fit with the accepted effects
-    measured : bool [7] channels to compare; None takes those that were fitted
 
     Returns
     -------
@@ -41,8 +40,7 @@ def compute_held_out_errors(
         compose_parameters(base.parts, base.values, base.session),
     )
     names, square, braked, manoeuvres = [], [], [], []
-    if measured is None:
-        measured = np.isfinite(evidence.train[0].sigma)
+    measured = np.isfinite(evidence.train[0].sigma)
     for run in evidence.held_out:
         model = run.model
         y = np.array([predict_channels(model, theta, slots=slots) for theta, slots in models])

@@ -160,6 +160,30 @@ def hold_session(evidence: Evidence, names: Sequence[str]) -> Evidence:
     return replace(evidence, tolerances=evidence.tolerances.with_session(held))
 
 
+def observe_channels(evidence: Evidence, campaign: Campaign, at: Fit) -> Evidence:
+    """Return the same runs with all channels of a campaign, without the library: to compare models, not to search.
+
+    Parameters
+    ----------
+    evidence : the runs, with some of the channels
+    campaign : that they are of
+    at : fit without effects, the new linearisation point
+    """
+    rho, sigma = estimate_channel_noise(campaign)
+    own = zip(SESSION, campaign.tolerances.session, strict=True)
+    tolerances = evidence.tolerances.with_session({name: s for name, s in own if name in SUSPENSION})
+    base = compose_parameters((), np.empty(0), at.session)[0]
+    train, held_out = (
+        tuple(
+            differentiate_run(r.model, rho, sigma, base, (), tolerances, evidence.disturbance) for r in runs
+        )
+        for runs in (evidence.train, evidence.held_out)
+    )
+    return replace(
+        evidence, train=train, held_out=held_out, effects=(), tolerances=tolerances, sensors=(rho, sigma)
+    )
+
+
 def differentiate_about_fit(evidence: Evidence, at: Fit) -> Evidence:
     """Return the runs with the derivatives of the training runs about a fit and about their own offsets there.
 

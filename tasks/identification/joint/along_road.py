@@ -8,6 +8,8 @@ from tasks.identification.decision.held_out import compute_held_out_errors, find
 from tasks.identification.decision.screening import compute_inflation
 from tasks.identification.decision.verdict import Trace
 from tasks.identification.decision.words import join_phrases
+from tasks.identification.inference.fit import fit_hypotheses
+from tasks.identification.inference.linearisation import observe_channels
 from tasks.identification.joint.numbers import JointNumber
 from tasks.identification.joint.single_effects import find_single_effects
 from tasks.identification.rules import DecisionRules
@@ -17,6 +19,8 @@ from tasks.vehicle.parameters import Vehicle
 
 ALONG_ROAD = ("speed", "longitudinal_acceleration")
 """Channels of the motion along the road, which every effect that changes a stop moves."""
+ITERATIONS = 6
+"""Steps of the fit without effects."""
 
 
 def find_effects_in_two_looks(
@@ -84,10 +88,14 @@ def _look_along_road(
         )
     except ForeignCarError:
         return None
-    start, found = second.start, second.end.base
+    found = second.end.base
     if not found.parts or any(moves_body_alone(part) for part in found.parts):
         return None
-    error, manoeuvres = compute_held_out_errors(start.evidence, start.base, found, campaign.is_measured)
+    whole = observe_channels(second.start.evidence, campaign, second.start.base)
+    null = fit_hypotheses(
+        whole.train, (), whole.session_sigma, session=second.start.base.session, iterations=ITERATIONS
+    )
+    error, manoeuvres = compute_held_out_errors(whole, null, found)
     moved = any(map(moves_speed, found.parts))
     if find_worse_channels(error, rules.worse_limit, speed_decides=moved):
         return None

@@ -93,6 +93,8 @@ def test_a_name_of_the_second_look_has_its_interval_and_errors_of_all_channels(
     assert set(second.verdict.error) == set(CHANNELS) and "peak_pitch" in second.verdict.manoeuvre_error
     wheel = second.verdict.error["wheel_speed_front"]
     assert wheel.after < 0.5 * wheel.frozen
+    pitch = second.verdict.error["pitch"]
+    assert pitch.retuned < 1.2 * pitch.frozen, "the re-tuned model has seen the pitch"
     seen = [np.isfinite(run.sigma) for run in second.start.evidence.train]
     assert all(tuple(np.array(CHANNELS)[channels]) == ALONG_ROAD for channels in seen)
 
