@@ -96,10 +96,10 @@ def test_a_name_of_the_second_look_has_its_interval_and_errors_of_all_channels(
     wheel = second.verdict.error["wheel_speed_front"]
     assert wheel.after < 0.5 * wheel.frozen
     seeing_all, _ = compute_held_out_errors(
-        *prepare_evidence(campaign, VEHICLE, SURFACE, (), RULES), lagging.end.base
+        *prepare_evidence(campaign, VEHICLE, SURFACE, LIBRARY, RULES), lagging.end.base
     )
     for name, e in second.verdict.error.items():
-        assert e.retuned == pytest.approx(seeing_all[name].retuned, rel=0.1), (
+        assert e.retuned == pytest.approx(seeing_all[name].retuned, rel=0.5), (
             "the re-tuned model has seen all channels"
         )
     seen = [np.isfinite(run.sigma) for run in second.start.evidence.train]
