@@ -163,6 +163,8 @@ def hold_session(evidence: Evidence, names: Sequence[str]) -> Evidence:
 def observe_channels(evidence: Evidence, campaign: Campaign, at: Fit) -> Evidence:
     """Return the same runs with all channels of a campaign, without the library: to compare models, not to search.
 
+    The disturbances are a first guess: scales that were fitted without a channel would take its residual for them.
+
     Parameters
     ----------
     evidence : the runs, with some of the channels
@@ -170,18 +172,17 @@ def observe_channels(evidence: Evidence, campaign: Campaign, at: Fit) -> Evidenc
     at : fit without effects, the new linearisation point
     """
     rho, sigma = estimate_channel_noise(campaign)
-    own = zip(SESSION, campaign.tolerances.session, strict=True)
-    tolerances = evidence.tolerances.with_session({name: s for name, s in own if name in SUSPENSION})
-    base = compose_parameters((), np.empty(0), at.session)[0]
+    seen = {name: campaign.tolerances.session[SESSION.index(name)] for name in SUSPENSION}
+    tolerances = evidence.tolerances.with_session(seen)
+    base, guess = compose_parameters((), np.empty(0), at.session)[0], Disturbance()
     train, held_out = (
-        tuple(
-            differentiate_run(r.model, rho, sigma, base, (), tolerances, evidence.disturbance) for r in runs
-        )
+        tuple(differentiate_run(r.model, rho, sigma, base, (), tolerances, guess) for r in runs)
         for runs in (evidence.train, evidence.held_out)
     )
     return replace(
-        evidence, train=train, held_out=held_out, effects=(), tolerances=tolerances, sensors=(rho, sigma)
-    )
+        evidence, train=train, held_out=held_out, effects=(), tolerances=tolerances, disturbance=guess,
+        sensors=(rho, sigma),
+    )  # fmt: skip
 
 
 def differentiate_about_fit(evidence: Evidence, at: Fit) -> Evidence:
