@@ -116,7 +116,9 @@ def test_what_no_held_out_error_feels_is_no_discovery_where_the_gain_was_not_kno
     error = make_error(0.9)
     monkeypatch.setattr(decision, "compute_held_out_errors", lambda *_: (make_error(1.0), {}))
     last = SimpleNamespace(
-        accepted=SimpleNamespace(hypothesis=SimpleNamespace(name="relaxation_length", effect_class="effect")),
+        accepted=SimpleNamespace(
+            hypothesis=SimpleNamespace(name="relaxation_length", effect_class="effect", variable="slip")
+        ),
         base=None,
     )
     found = SimpleNamespace(evidence=SimpleNamespace(rules=RULES), rounds=[last])

@@ -102,3 +102,19 @@ def test_the_verdict_says_when_cross_validation_confirmed_a_name() -> None:
     said = say_confirmation(judged("anti_dive", 45.6, held_out_gain=0.4, crossed=134.0))
     assert said is not None and "(gain 134.0, a name needs 40)" in said
     assert say_confirmation(judged("anti_dive", 45.6, held_out_gain=9.0)) is None
+
+
+def test_an_instruments_error_is_told_by_its_own_channel_and_not_by_the_speed() -> None:
+    speed = ChannelError(
+        frozen=0.065, retuned=0.44, after=0.094, ci_low=0.0, ci_high=1.0, change_low=0.0, change_high=1.0, wins=1,
+        worst_run="run", unit="m/s",
+    )  # fmt: skip
+    error = {
+        "speed": speed,
+        "longitudinal_acceleration": replace(speed, frozen=0.46, after=0.073, unit="m/s^2"),
+    }
+    tilt = replace(FORM, name="sensor_mount_tilt", effect_class="sensor", variable="mount")
+    told = tell_verdict((tilt,), (), (), error, {"stopping_distance": speed})
+    assert "the error of the longitudinal acceleration from 0.46 (re-tuned 0.44) to 0.073 m/s^2" in told
+    assert "speed from" not in told and "stopping" not in told
+    assert "of the speed from" in tell_verdict((replace(tilt, variable="speed"),), (), (), error, {})

@@ -62,13 +62,3 @@ def moves_body_alone(named: Hypothesis) -> bool:
     """
     port = PORT_OF_NUMBER.get(named.names[0], named.port)
     return port in BODY_PORTS or (port == "sensor" and named.variable in BODY_INSTRUMENTS)
-
-
-def moves_speed(named: Hypothesis) -> bool:
-    """Return whether a name moves the measured speed: every one but the error of another instrument.
-
-    Parameters
-    ----------
-    named : effect, number or form
-    """
-    return named.effect_class != "sensor" or named.variable == "speed"

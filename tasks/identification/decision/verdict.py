@@ -19,7 +19,7 @@ from tasks.identification.decision.attribution import Candidate
 from tasks.identification.decision.calibrated import tell_calibrated
 from tasks.identification.decision.correlation import correlate_residual_with_pressure
 from tasks.identification.decision.discovery import search_library_and_forms
-from tasks.identification.decision.disputes import moves_speed, settle_disputes
+from tasks.identification.decision.disputes import settle_disputes
 from tasks.identification.decision.experiment import plan_next_experiment
 from tasks.identification.decision.held_out import compute_held_out_errors, find_worse_channels, is_noticed
 from tasks.identification.decision.intervals import (
@@ -33,7 +33,7 @@ from tasks.identification.decision.search import SearchState
 from tasks.identification.decision.superseded import drop_superseded
 from tasks.identification.decision.words import say_confirmation, say_rejection
 from tasks.identification.inference.fit import Fit
-from tasks.identification.inference.hypothesis import compose_parameters
+from tasks.identification.inference.hypothesis import compose_parameters, moves_speed
 from tasks.identification.inference.linearisation import prepare_evidence
 from tasks.identification.rules import DecisionRules
 from tasks.surface.state import SurfaceParameters
@@ -239,7 +239,8 @@ def _object_to_last(
     """
     rules, last = found.evidence.rules, found.rounds[-1]
     named = [r.accepted.hypothesis for r in found.rounds]
-    worse = find_worse_channels(error, rules.worse_limit, speed_decides=any(map(moves_speed, named)))
+    moved = any(moves_speed(h.effect_class, h.variable) for h in named)
+    worse = find_worse_channels(error, rules.worse_limit, speed_decides=moved)
     if worse:
         return (
             f"{', '.join(h.name for h in named)} would fit, but predicts"

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from tasks.identification.decision.answer import ChannelError, NamedEffect
 from tasks.identification.decision.attribution import Candidate
+from tasks.identification.inference.hypothesis import moves_speed
 from tasks.vehicle.effects.library import Effect, say_number
 
 
@@ -60,6 +61,10 @@ def tell_verdict(
         choice = others[0] if len(others) == 1 else f"one of {len(others)} other explanations holds"
         text += f", or {choice}, which these runs cannot tell apart"
     figures = {"speed": error["speed"], **manoeuvres}
+    if not any(moves_speed(effect.effect_class, effect.variable) for effect in effects):
+        # an instrument's own channel says what its error does; the car moves as before
+        own = min(error, key=lambda name: error[name].after / error[name].frozen)
+        figures = {own: error[own]}
     moved = join_phrases(
         f"of the {name.replace('_', ' ')} from {say_number(e.frozen)} (re-tuned {say_number(e.retuned)}) to"
         f" {say_number(e.after)} {e.unit}"

@@ -41,6 +41,16 @@ class Hypothesis:
     build: Build
 
 
+def moves_speed(effect_class: str, variable: str) -> bool:
+    """Return whether a name moves the measured speed: every one does but the error of another instrument.
+
+    Parameters
+    ----------
+    effect_class, variable : of an effect, a number or a form
+    """
+    return effect_class != "sensor" or variable == "speed"
+
+
 def make_library_hypothesis(effect: Effect, start: float | None = None, second: float = np.nan) -> Hypothesis:
     """Return a library effect as a hypothesis.
 

@@ -3,12 +3,13 @@
 from dataclasses import replace
 
 from tasks.campaign.campaign import Campaign
-from tasks.identification.decision.disputes import ForeignCarError, moves_body_alone, moves_speed
+from tasks.identification.decision.disputes import ForeignCarError, moves_body_alone
 from tasks.identification.decision.held_out import compute_held_out_errors, find_worse_channels
 from tasks.identification.decision.screening import compute_inflation
 from tasks.identification.decision.verdict import Trace
 from tasks.identification.decision.words import join_phrases
 from tasks.identification.inference.fit import fit_hypotheses
+from tasks.identification.inference.hypothesis import moves_speed
 from tasks.identification.inference.linearisation import observe_channels
 from tasks.identification.joint.numbers import JointNumber
 from tasks.identification.joint.single_effects import find_single_effects
@@ -96,7 +97,7 @@ def _look_along_road(
         whole.train, (), whole.session_sigma, session=second.start.base.session, iterations=ITERATIONS
     )
     error, manoeuvres = compute_held_out_errors(whole, null, found)
-    moved = any(map(moves_speed, found.parts))
+    moved = any(moves_speed(part.effect_class, part.variable) for part in found.parts)
     if find_worse_channels(error, rules.worse_limit, speed_decides=moved):
         return None
     alone = join_phrases(name.replace("_", " ") for name in kept)
