@@ -5,8 +5,8 @@ from catalogs.joint_numbers import load_joint_numbers
 from tasks.campaign.campaign import Campaign
 from tasks.identification.decision.disputes import ForeignCarError
 from tasks.identification.decision.verdict import Trace
-from tasks.identification.joint.along_road import find_effects_in_two_looks
 from tasks.identification.joint.calibration import needs_joint_fit
+from tasks.identification.joint.second_look import find_effects_in_two_looks
 from tasks.identification.joint.verdict import JointTrace, judge_jointly
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import Effect

@@ -67,8 +67,8 @@ def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]
         others = [c for c in tried if c.hypothesis.name != own.hypothesis.name]
         alike = find_alike_numbers(evidence, own.hypothesis.names[0])
         others += _free_numbers(evidence, rest, alike, {c.hypothesis.name for c in others})
-        read = _read_in_place(evidence, rest, own)
-        others = [c for c in others if c.hypothesis.name not in read] + list(read.values())
+        instruments = _judge_alike_instruments(evidence, rest, own)
+        others = [c for c in others if c.hypothesis.name not in instruments] + list(instruments.values())
         unseen = compute_misfit_by_run(evidence.held_out, rest)
         share = compute_win_share([own, *others], rest)
         shares = [compute_win_share([c, own, *[o for o in others if o is not c]], rest) for c in others]
@@ -78,7 +78,7 @@ def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]
             if (
                 _is_as_wrong(c)
                 if c.hypothesis.names[0] in alike
-                else (_is_as_wrong(c) if c.hypothesis.name in read else c.score > 0.0)
+                else (_is_as_wrong(c) if c.hypothesis.name in instruments else c.score > 0.0)
                 and is_close(own, share, c, wins)
             )
             and not is_nested(own.hypothesis, c.hypothesis)
@@ -112,7 +112,7 @@ def _free_numbers(
     return judged
 
 
-def _read_in_place(evidence: Evidence, rest: Fit, own: Candidate) -> dict[str, Candidate]:
+def _judge_alike_instruments(evidence: Evidence, rest: Fit, own: Candidate) -> dict[str, Candidate]:
     """Return errors of instruments that look like a wrong number, by name, each with the number as the file has it."""
     number = own.hypothesis.names[0]
     if own.hypothesis.effect_class != "retune" or number not in SESSION:

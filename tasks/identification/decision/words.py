@@ -63,7 +63,8 @@ def tell_verdict(
     figures = {"speed": error["speed"], **manoeuvres}
     if not any(moves_speed(effect.effect_class, effect.variable) for effect in effects):
         # an instrument's own channel says what its error does; the car moves as before
-        own = min(error, key=lambda name: error[name].after / error[name].frozen)
+        missed = [name for name, e in error.items() if e.frozen > 0.0]
+        own = min(missed, key=lambda name: error[name].after / error[name].frozen)
         figures = {own: error[own]}
     moved = join_phrases(
         f"of the {name.replace('_', ' ')} from {say_number(e.frozen)} (re-tuned {say_number(e.retuned)}) to"

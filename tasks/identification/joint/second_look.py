@@ -1,5 +1,6 @@
 """Single effects by all channels, and by speed and accelerometer alone where the runs disagree with the model."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from tasks.campaign.campaign import Campaign
@@ -51,10 +52,14 @@ def find_effects_in_two_looks(
     ForeignCarError
         If single effects can be told by neither; `judge_jointly` can.
     """
+
+    def search(runs: Campaign) -> Trace:
+        return find_single_effects(runs, vehicle, surface, effects, numbers, rules)
+
     try:
-        first = find_single_effects(campaign, vehicle, surface, effects, numbers, rules)
+        first = search(campaign)
     except ForeignCarError as error:
-        second = _look_along_road(campaign, vehicle, surface, effects, numbers, rules, str(error))
+        second = _look_along_road(campaign, search, rules.worse_limit, str(error))
         if second is None:
             raise
         return second
@@ -62,17 +67,11 @@ def find_effects_in_two_looks(
     if first.verdict.effects or disagreement <= rules.disagreement:
         return first
     why = f"the runs disagree with the model by a factor of {disagreement:.1f} (noise alone gives 1)"
-    return _look_along_road(campaign, vehicle, surface, effects, numbers, rules, why) or first
+    return _look_along_road(campaign, search, rules.worse_limit, why) or first
 
 
 def _look_along_road(
-    campaign: Campaign,
-    vehicle: Vehicle,
-    surface: SurfaceParameters,
-    effects: tuple[Effect, ...],
-    numbers: tuple[JointNumber, ...],
-    rules: DecisionRules,
-    why: str,
+    campaign: Campaign, search: Callable[[Campaign], Trace], worse_limit: float, why: str
 ) -> Trace | None:
     """Return the verdict by speed and accelerometer, with errors of all channels; None if it names nothing that holds.
 
@@ -84,9 +83,7 @@ def _look_along_road(
     if kept == campaign.channels:
         return None
     try:
-        second = find_single_effects(
-            replace(campaign, channels=kept), vehicle, surface, effects, numbers, rules
-        )
+        second = search(replace(campaign, channels=kept))
     except ForeignCarError:
         return None
     found = second.end.base
@@ -98,7 +95,7 @@ def _look_along_road(
     )
     error, manoeuvres = compute_held_out_errors(whole, null, found)
     moved = any(moves_speed(part.effect_class, part.variable) for part in found.parts)
-    if find_worse_channels(error, rules.worse_limit, speed_decides=moved):
+    if find_worse_channels(error, worse_limit, speed_decides=moved):
         return None
     alone = join_phrases(name.replace("_", " ") for name in kept)
     reason = (

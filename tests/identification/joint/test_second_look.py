@@ -16,8 +16,8 @@ from tasks.identification.decision.verdict import Trace, find_missing_effects
 from tasks.identification.inference.fit import fit_hypotheses
 from tasks.identification.inference.hypothesis import make_library_hypothesis
 from tasks.identification.inference.linearisation import observe_channels
-from tasks.identification.joint import along_road
-from tasks.identification.joint.along_road import ALONG_ROAD, find_effects_in_two_looks
+from tasks.identification.joint import second_look
+from tasks.identification.joint.second_look import ALONG_ROAD, find_effects_in_two_looks
 from tasks.identification.joint.single_effects import find_single_effects
 from tasks.vehicle.effects.table import build_parameter_vector
 from tests.identification.synthetic import SURFACE, TOLERANCES, VEHICLE, measured, plain_run
@@ -45,50 +45,50 @@ def campaign() -> Campaign:
 
 
 @pytest.fixture(scope="module")
-def lagging(campaign) -> Trace:
+def lag_found(campaign) -> Trace:
     """The lag, found by speed and accelerometer alone."""
     bare = replace(campaign, channels=ALONG_ROAD)
     return find_missing_effects(bare, VEHICLE, SURFACE, LIBRARY, RULES)
 
 
 @pytest.fixture(scope="module")
-def nothing(lagging) -> Trace:
-    """A verdict that names nothing."""
-    verdict = replace(lagging.verdict, verdict="NOTHING", effects=())
-    return replace(lagging, verdict=verdict, end=lagging.start, compared=())
+def no_name(lag_found) -> Trace:
+    """A verdict that names no_name."""
+    verdict = replace(lag_found.verdict, verdict="NOTHING", effects=())
+    return replace(lag_found, verdict=verdict, end=lag_found.start, compared=())
 
 
-def answer(
+def answer_searches(
     monkeypatch, *answers: Trace | ForeignCarError, disagreement: float = 3.0
 ) -> list[tuple[str, ...]]:
     """Answers in place of searches, one after the other, and the channels that each was asked about."""
     asked, left = [], list(answers)
 
-    def search(runs, *_):
+    def answer_next(runs, *_):
         asked.append(runs.channels)
         found = left.pop(0)
         if isinstance(found, ForeignCarError):
             raise found
         return found
 
-    monkeypatch.setattr(along_road, "find_single_effects", search)
-    monkeypatch.setattr(along_road, "compute_inflation", lambda *_: disagreement)
+    monkeypatch.setattr(second_look, "find_single_effects", answer_next)
+    monkeypatch.setattr(second_look, "compute_inflation", lambda *_: disagreement)
     return asked
 
 
-def search(campaign: Campaign) -> Trace:
+def look_twice(campaign: Campaign) -> Trace:
     return find_effects_in_two_looks(campaign, VEHICLE, SURFACE, LIBRARY, NUMBERS, RULES)
 
 
 def test_a_name_of_the_second_look_has_its_interval_and_errors_of_all_channels(
-    campaign, nothing, monkeypatch
+    campaign, no_name, monkeypatch
 ):
     def search_then_find(runs, *rest):
-        return nothing if runs.channels == CHANNELS else find_single_effects(runs, *rest)
+        return no_name if runs.channels == CHANNELS else find_single_effects(runs, *rest)
 
-    monkeypatch.setattr(along_road, "find_single_effects", search_then_find)
-    monkeypatch.setattr(along_road, "compute_inflation", lambda *_: 3.0)
-    second = search(campaign)
+    monkeypatch.setattr(second_look, "find_single_effects", search_then_find)
+    monkeypatch.setattr(second_look, "compute_inflation", lambda *_: 3.0)
+    second = look_twice(campaign)
     (found,) = second.verdict.effects
     assert found.name == "brake_lag"
     assert found.parameters[0].ci_low < LAG < found.parameters[0].ci_high
@@ -99,8 +99,8 @@ def test_a_name_of_the_second_look_has_its_interval_and_errors_of_all_channels(
     assert all(tuple(np.array(CHANNELS)[channels]) == ALONG_ROAD for channels in seen)
 
 
-def test_the_retuned_model_of_a_second_look_sees_all_channels(campaign, lagging):
-    start = lagging.start
+def test_the_retuned_model_of_a_second_look_sees_all_channels(campaign, lag_found):
+    start = lag_found.start
     whole = observe_channels(start.evidence, campaign, start.base)
     assert all(np.all(np.isfinite(run.sigma)) for run in (*whole.train, *whole.held_out))
     assert whole.tolerances == campaign.tolerances
@@ -111,73 +111,73 @@ def test_the_retuned_model_of_a_second_look_sees_all_channels(campaign, lagging)
 
 
 def test_the_reason_says_why_there_was_a_second_look_and_by_which_channels(
-    campaign, lagging, nothing, monkeypatch
+    campaign, lag_found, no_name, monkeypatch
 ):
-    answer(monkeypatch, nothing, lagging)
-    assert "disagree with the model by a factor of 3.0" in search(campaign).verdict.reasons[0]
-    answer(monkeypatch, FOREIGN, lagging)
-    (reason, *_) = search(campaign).verdict.reasons
+    answer_searches(monkeypatch, no_name, lag_found)
+    assert "disagree with the model by a factor of 3.0" in look_twice(campaign).verdict.reasons[0]
+    answer_searches(monkeypatch, FOREIGN, lag_found)
+    (reason, *_) = look_twice(campaign).verdict.reasons
     assert str(FOREIGN) in reason and "this verdict is by speed and longitudinal acceleration alone" in reason
 
 
 def test_a_first_look_that_names_something_or_whose_runs_agree_is_the_verdict(
-    campaign, lagging, nothing, monkeypatch
+    campaign, lag_found, no_name, monkeypatch
 ):
-    answer(monkeypatch, lagging)
-    assert search(campaign) is lagging
-    asked = answer(monkeypatch, nothing, disagreement=RULES.disagreement)
-    assert search(campaign) is nothing and asked == [CHANNELS]
-    asked = answer(monkeypatch, nothing, nothing, disagreement=RULES.disagreement + 0.1)
-    assert search(campaign) is nothing and asked == [CHANNELS, ALONG_ROAD]
+    answer_searches(monkeypatch, lag_found)
+    assert look_twice(campaign) is lag_found
+    asked = answer_searches(monkeypatch, no_name, disagreement=RULES.disagreement)
+    assert look_twice(campaign) is no_name and asked == [CHANNELS]
+    asked = answer_searches(monkeypatch, no_name, no_name, disagreement=RULES.disagreement + 0.1)
+    assert look_twice(campaign) is no_name and asked == [CHANNELS, ALONG_ROAD]
 
 
-def test_whether_runs_disagree_is_read_from_four_training_runs_on(campaign, lagging, nothing, monkeypatch):
-    asked = answer(monkeypatch, nothing, lagging)
-    monkeypatch.setattr(along_road, "compute_inflation", compute_inflation)
-    assert compute_inflation(nothing.start.evidence, nothing.start.base, None) > RULES.disagreement
-    assert search(campaign).verdict.effects and asked == [CHANNELS, ALONG_ROAD]
-    evidence, base = nothing.start.evidence, nothing.start.base
+def test_whether_runs_disagree_is_read_from_four_training_runs_on(campaign, lag_found, no_name, monkeypatch):
+    asked = answer_searches(monkeypatch, no_name, lag_found)
+    monkeypatch.setattr(second_look, "compute_inflation", compute_inflation)
+    assert compute_inflation(no_name.start.evidence, no_name.start.base, None) > RULES.disagreement
+    assert look_twice(campaign).verdict.effects and asked == [CHANNELS, ALONG_ROAD]
+    evidence, base = no_name.start.evidence, no_name.start.base
     evidence, base = replace(evidence, train=evidence.train[:3]), replace(base, residuals=base.residuals[:3])
-    answer(monkeypatch, replace(nothing, start=replace(nothing.start, evidence=evidence, base=base)))
-    monkeypatch.setattr(along_road, "compute_inflation", compute_inflation)
-    assert not search(campaign).verdict.effects
+    answer_searches(monkeypatch, replace(no_name, start=replace(no_name.start, evidence=evidence, base=base)))
+    monkeypatch.setattr(second_look, "compute_inflation", compute_inflation)
+    assert not look_twice(campaign).verdict.effects
 
 
 def test_without_an_accelerometer_the_second_look_has_the_speed_alone(
-    campaign, lagging, nothing, monkeypatch
+    campaign, lag_found, no_name, monkeypatch
 ):
-    asked = answer(monkeypatch, nothing, lagging)
+    asked = answer_searches(monkeypatch, no_name, lag_found)
     few = ("speed", "wheel_speed_front")
-    (reason, *_) = search(replace(campaign, channels=few)).verdict.reasons
+    (reason, *_) = look_twice(replace(campaign, channels=few)).verdict.reasons
     assert asked == [few, ("speed",)] and "by speed alone" in reason
 
 
-def test_the_file_of_a_verdict_says_by_which_channels_it_was_reached(lagging):
-    assert tell_search(lagging)["channels"] == list(ALONG_ROAD)
+def test_the_file_of_a_verdict_says_by_which_channels_it_was_reached(lag_found):
+    assert tell_search(lag_found)["channels"] == list(ALONG_ROAD)
 
 
-def test_without_wheels_and_body_there_is_no_second_look(campaign, nothing, monkeypatch):
+def test_without_wheels_and_body_there_is_no_second_look(campaign, no_name, monkeypatch):
     bare = replace(campaign, channels=ALONG_ROAD)
-    asked = answer(monkeypatch, nothing)
-    assert search(bare) is nothing and asked == [ALONG_ROAD]
+    asked = answer_searches(monkeypatch, no_name)
+    assert look_twice(bare) is no_name and asked == [ALONG_ROAD]
 
 
 @pytest.mark.parametrize("name", ["nothing", "a damper beside the lag", "a foreign car"])
 def test_a_second_look_that_names_nothing_or_the_body_leaves_the_first(
-    campaign, lagging, nothing, monkeypatch, name
+    campaign, lag_found, no_name, monkeypatch, name
 ):
-    found = lagging.end.base
+    found = lag_found.end.base
     parts, values = (*found.parts, make_library_hypothesis(DAMPER)), np.append(found.values, 1e-4)
-    beside = replace(lagging, end=replace(lagging.end, base=replace(found, parts=parts, values=values)))
-    second = {"nothing": nothing, "a damper beside the lag": beside, "a foreign car": FOREIGN}[name]
-    answer(monkeypatch, nothing, second)
-    assert search(campaign) is nothing
-    answer(monkeypatch, FOREIGN, second)
+    beside = replace(lag_found, end=replace(lag_found.end, base=replace(found, parts=parts, values=values)))
+    second = {"nothing": no_name, "a damper beside the lag": beside, "a foreign car": FOREIGN}[name]
+    answer_searches(monkeypatch, no_name, second)
+    assert look_twice(campaign) is no_name
+    answer_searches(monkeypatch, FOREIGN, second)
     with pytest.raises(ForeignCarError, match="disagree about the wheels"):
-        search(campaign)
+        look_twice(campaign)
 
 
-def test_a_name_that_predicts_the_channels_worse_is_not_named(campaign, lagging, nothing, monkeypatch):
-    late = replace(lagging.end, base=replace(lagging.end.base, values=np.array([10.0 * LAG])))
-    answer(monkeypatch, nothing, replace(lagging, end=late))
-    assert search(campaign) is nothing
+def test_a_name_that_predicts_the_channels_worse_is_not_named(campaign, lag_found, no_name, monkeypatch):
+    late = replace(lag_found.end, base=replace(lag_found.end.base, values=np.array([10.0 * LAG])))
+    answer_searches(monkeypatch, no_name, replace(lag_found, end=late))
+    assert look_twice(campaign) is no_name
