@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from catalogs.campaigns import read_campaign
 from catalogs.effects import LIBRARY_FILE, load_effects
@@ -140,7 +141,7 @@ def tell_search(trace: Trace | JointTrace) -> dict[str, Any]:
     suggested = next((effect for effect in verdict.tried if effect.name == planned_for), None)
     sentence = tell_verdict(
         verdict.effects, rivals, library, verdict.error, verdict.manoeuvre_error, suggested,
-        bool(verdict.disagreement),
+        bool(verdict.disagreement), _say_most_pulled(trace, library),
     )  # fmt: skip
     told = {
         "channels": [CHANNELS[c] for c in train[0].channels],
@@ -150,19 +151,41 @@ def tell_search(trace: Trace | JointTrace) -> dict[str, Any]:
     if isinstance(trace, Trace):
         residual = compute_residual_rmse((*train, *held_out))
         pulls = compute_friction_pulls(trace)
-        return {"search": SEARCHES[0], **told, "residual_rmse": residual, "friction_pulls_sigma": pulls}
+        return {
+            "search": SEARCHES[0],
+            **told,
+            "numbers": _number_json(SESSION, trace.end.base.session, trace.end.base.session_error),
+            "residual_rmse": residual,
+            "friction_pulls_sigma": pulls,
+        }
+    names = [number.name for number in trace.fitted.numbers]
     return {
         "search": SEARCHES[1],
         **told,
-        "numbers": {
-            number.name: {"value": float(value), "standard_error": float(error), "unit": PARAMETERS[number.name].unit}
-            for number, value, error in zip(
-                trace.fitted.numbers, trace.fitted.values, trace.errors, strict=True
-            )
-        },
+        "numbers": _number_json(names, trace.fitted.values, trace.errors),
         "starts_agreeing": {"agreeing": trace.agreeing[0], "of": trace.agreeing[1]},
         "residual_rmse": compute_residual_rmse(held_out),
     }  # fmt: skip
+
+
+def _number_json(
+    names: Sequence[str], values: NDArray[np.float64], errors: NDArray[np.float64]
+) -> dict[str, dict[str, Any]]:
+    """Return fitted numbers of the vehicle, which are added to its file's, as plain values."""
+    return {
+        name: {"value": float(value), "standard_error": float(error), "unit": PARAMETERS[name].unit}
+        for name, value, error in zip(names, values, errors, strict=True)
+    }
+
+
+def _say_most_pulled(trace: Trace | JointTrace, library: Sequence[Effect]) -> str:
+    """Return what the vehicle's own number that the runs pull most says; empty where a joint fit has moved all."""
+    if isinstance(trace, JointTrace):
+        return ""
+    base = trace.end.base
+    place = int(np.argmax(base.pulls))
+    number = next(e for e in library if e.effect_class == "retune" and e.parameters[0].name == SESSION[place])
+    return number.say({SESSION[place]: float(base.session[place])})
 
 
 def split_of(campaign: Campaign) -> dict[str, Any]:

@@ -54,6 +54,28 @@ def test_what_only_the_training_runs_show_is_suggested_and_not_named() -> None:
     assert tell_verdict((), (), (), {}, {}) == "These runs show nothing that the model lacks."
 
 
+def test_where_nothing_is_missing_the_verdict_says_what_the_vehicles_own_numbers_do() -> None:
+    speed = ChannelError(
+        frozen=0.394, retuned=0.081, after=0.08, ci_low=0.0, ci_high=1.0, change_low=-0.6, change_high=-0.1, wins=5,
+        worst_run="run", unit="m/s",
+    )  # fmt: skip
+    stop = replace(speed, frozen=3.14, after=0.36, unit="m")
+    own = "the brakes give 5.1 % above the torque of the vehicle file"
+    told = tell_verdict((), (), (), {"speed": speed}, {"stopping_distance": stop}, own=own)
+    assert told == (
+        "These runs show nothing that the model lacks; its own numbers, fitted to these runs (most: the brakes give"
+        " 5.1 % above the torque of the vehicle file), take the error of the speed from 0.39 to 0.08 m/s and of the"
+        " stopping distance from 3.1 to 0.36 m, on runs to which no number was fitted."
+    )
+    unsure = replace(speed, change_high=0.02)
+    told = tell_verdict(
+        (), (), (), {"speed": speed}, {"stopping_distance": replace(unsure, unit="m")}, own=own
+    )
+    assert "stopping distance" not in told
+    told = tell_verdict((), (), (), {"speed": unsure}, {"stopping_distance": stop}, own=own)
+    assert told == "These runs show nothing that the model lacks."
+
+
 def test_no_name_beside_runs_that_the_model_misses_is_no_claim_that_nothing_is_missing() -> None:
     told = tell_verdict((), (), (), {}, {}, misses=True)
     assert (

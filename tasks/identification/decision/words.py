@@ -31,6 +31,7 @@ def tell_verdict(
     manoeuvres: Mapping[str, ChannelError],
     suggested: NamedEffect | None = None,
     misses: bool = False,
+    own: str = "",
 ) -> str:
     """Return the verdict in plain words.
 
@@ -42,6 +43,7 @@ def tell_verdict(
     error, manoeuvres : on runs to which no number was fitted
     suggested : what the training runs show and the held-out runs neither confirm nor contradict, if nothing is named
     misses : whether the runs disagree with the model by more than single effects can be told beside
+    own : what the vehicle's own number that the runs pull most says of the car
     """
     if not effects and suggested is not None:
         return (
@@ -53,7 +55,14 @@ def tell_verdict(
             "The model misses these runs by more than their noise, and nothing that can be named explains it."
         )
     if not effects:
-        return "These runs show nothing that the model lacks."
+        nothing = "These runs show nothing that the model lacks"
+        if not own or error["speed"].change_high >= 0.0:
+            return f"{nothing}."
+        figures = {name: e for name, e in manoeuvres.items() if e.change_high < 0.0}
+        return (
+            f"{nothing}; its own numbers, fitted to these runs (most: {own}), take the error"
+            f" {_say_errors({'speed': error['speed'], **figures})}, on runs to which no number was fitted."
+        )
     told = [say_effect(effect, library) for effect in effects]
     text = join_phrases(told)
     if rivals:
@@ -66,13 +75,18 @@ def tell_verdict(
         missed = [name for name, e in error.items() if e.frozen > 0.0]
         own = min(missed, key=lambda name: error[name].after / error[name].frozen)
         figures = {own: error[own]}
-    moved = join_phrases(
-        f"of the {name.replace('_', ' ')} from {say_number(e.frozen)} (re-tuned {say_number(e.retuned)}) to"
-        f" {say_number(e.after)} {e.unit}"
-        for name, e in figures.items()
-    )
+    moved = _say_errors(figures, retuned=True)
     how = "that takes" if len(told) == 1 else "together they take"
     return f"{text[0].upper()}{text[1:]}; {how} the error {moved}, on runs to which no number was fitted."
+
+
+def _say_errors(figures: Mapping[str, ChannelError], *, retuned: bool = False) -> str:
+    """Return from what to what errors fall, and with ``retuned`` to what the vehicle's own numbers alone take them."""
+    return join_phrases(
+        f"of the {name.replace('_', ' ')} from {say_number(e.frozen)}"
+        f"{f' (re-tuned {say_number(e.retuned)})' if retuned else ''} to {say_number(e.after)} {e.unit}"
+        for name, e in figures.items()
+    )
 
 
 def say_rejection(tried: Sequence[Candidate]) -> str:
