@@ -16,6 +16,28 @@ SESSION = ("pressure_gain", "mass", "pitch_gain", "wheel_radius", "damping", "st
 """Session nuisances, by the name of the parameter that carries them."""
 
 
+MASKED_SPEED = 2.0
+"""Speed below which a run is not used: the floor of the slip's denominator distorts slip there [m/s]."""
+
+
+def find_motion(speed: NDArray[np.float64]) -> tuple[int, int]:
+    """Return the first sample of the stretch of a run that is used, and the one behind its last.
+
+    It ends where the speed falls below `MASKED_SPEED`. Where a run begins below it, from a standstill or with a dab of
+    the brake at a red light, it is the longest stretch above.
+
+    Parameters
+    ----------
+    speed : float64 [N] [m/s]
+    """
+    moves = np.concatenate(([False], speed >= MASKED_SPEED, [False]))
+    starts, ends = np.flatnonzero(~moves[:-1] & moves[1:]), np.flatnonzero(moves[:-1] & ~moves[1:])
+    if not starts.size:
+        return 0, 0
+    used = 0 if starts[0] == 0 else int(np.argmax(ends - starts))
+    return int(starts[used]), int(ends[used])
+
+
 @dataclass(frozen=True, kw_only=True)
 class Tolerances:
     """One-sigma uncertainties of a session (relative, grade as slope) and of a single run.
@@ -86,6 +108,11 @@ class Run:
     road_slope: NDArray[np.float64] | None = None
     throttle: NDArray[np.float64] | None = None
     sampled: NDArray[np.bool_] | None = None
+
+    @property
+    def speed(self) -> NDArray[np.float64]:
+        """Return the measured speed, float64 [N] [m/s]."""
+        return np.asarray(self.response[:, CHANNELS.index("speed")])
 
     def find_samples(self, channel: int) -> NDArray[np.int64]:
         """Return the instants at which a channel has a sample, int64 [M].

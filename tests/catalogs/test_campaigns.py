@@ -8,6 +8,7 @@ import yaml
 
 from catalogs.campaigns import read_campaign
 from catalogs.effects import load_effects
+from tasks.campaign.campaign import MASKED_SPEED, find_motion
 from tests.catalogs.campaign_folder import (
     NAMES,
     braking_columns,
@@ -53,6 +54,63 @@ def test_a_run_is_driven_in_weather_that_there_is(folder: Path, old: str, new: s
     table = folder / "runs.csv"
     table.write_text(table.read_text().replace(old, new))
     assert words in list_problems(folder)
+
+
+def drive_off(folder: Path, standing: int, total: int = 1000) -> None:
+    """Let run-01 stand for some samples, gain 20 m/s at 5 m/s2, and then brake as before."""
+    braking, rng = braking_columns(0), np.random.default_rng(7)
+    acceleration = np.concatenate((np.zeros(standing), np.full(400, 5.0)))
+    speed, pitch = 0.01 * np.cumsum(acceleration), -0.2 * acceleration
+    first = {
+        "brake_pressure": 0.0 * speed, "speed": speed, "longitudinal_acceleration": acceleration,
+        "wheel_speed_front": speed / 0.32, "wheel_speed_rear": speed / 0.32, "pitch": pitch,
+        "pitch_rate": np.gradient(pitch, 0.01), "vertical_acceleration": 0.0 * speed,
+    }  # fmt: skip
+    columns = {
+        name: np.concatenate((x + 0.01 * rng.standard_normal(len(x)), braking[name]))[:total]
+        for name, x in first.items()
+    }
+    columns["time"] = np.arange(len(columns["speed"])) * 0.01
+    write_run(folder, NAMES[0], columns)
+
+
+def test_a_run_that_begins_at_a_standstill_is_used_from_where_the_car_moves(folder: Path) -> None:
+    drive_off(folder, 40)
+    run = read_campaign(folder).runs[0]
+    assert len(run.pressure) == pytest.approx(740 - 80, abs=2) and run.speed.min() >= MASKED_SPEED
+    assert run.pressure[-300:] == pytest.approx(braking_columns(0)["brake_pressure"])
+
+
+def test_a_run_in_which_the_car_stands_is_refused_with_what_to_do(folder: Path) -> None:
+    drive_off(folder, 40, total=92)
+    assert (
+        "run-01: channel speed must stay at or above 2 m/s for 20 samples; it does for 12: the car stands or crawls,"
+        " leave the run out"
+    ) in list_problems(folder)
+
+
+def test_a_run_over_a_road_feature_begins_moving_because_the_feature_has_a_place(folder: Path) -> None:
+    drive_off(folder, 40)
+    table = folder / "runs.csv"
+    table.write_text(table.read_text().replace("0.0,0.0,0.0\n", "20.0,3.6,0.05\n", 1))
+    assert "run-01: channel speed must begin at or above 2 m/s in a run with a road feature" in list_problems(
+        folder
+    )
+
+
+@pytest.mark.parametrize(
+    ("speed", "used"),
+    [
+        ((9.0, 8.0, 1.0, 9.0, 9.0, 9.0), (0, 2)),
+        ((0.0, 3.0, 1.0, 9.0, 8.0, 7.0), (3, 6)),
+        ((0.0, 9.0, 8.0, 0.0), (1, 3)),
+        ((0.0, 1.0), (0, 0)),
+    ],
+)
+def test_a_run_is_used_until_it_stops_or_if_it_begins_slowly_where_it_drives_longest(
+    speed: tuple[float, ...], used: tuple[int, int]
+) -> None:
+    assert find_motion(np.array(speed)) == used
 
 
 def test_the_hash_changes_with_any_sample(folder: Path) -> None:

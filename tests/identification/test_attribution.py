@@ -227,3 +227,18 @@ def test_a_fit_of_an_effect_with_a_threshold_does_not_hang_on_where_the_threshol
     ]
     assert max(found) < 8360.0
     assert found[0] == pytest.approx(found[1], abs=10.0)
+
+
+@pytest.mark.parametrize(("rate", "samples"), [(100, 400), (100, 60), (10, 400), (10, 25)])
+def test_the_speed_at_the_start_is_that_of_a_second_whatever_the_rate_and_the_length(
+    rate: int, samples: int
+) -> None:
+    """A coasting car slows by 0.2 m/s2 for a second and by 0.5 m/s2 afterwards."""
+    t = np.arange(samples) / rate
+    run = plain_run(20.0, 0.0)
+    response = np.zeros((samples, 7))
+    response[:, 0] = 20.0 - 0.2 * t - 0.3 * np.maximum(t - 1.0, 0.0)
+    model = prepare_run(
+        replace(run, interval=1.0 / rate, pressure=np.zeros(samples), response=response), VEHICLE, SURFACE
+    )
+    assert model.initial_speed == pytest.approx(20.0, abs=1e-6)

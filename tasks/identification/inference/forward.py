@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.campaign import CHANNELS, Run
+from tasks.campaign.campaign import CHANNELS, Run, find_motion
 from tasks.campaign.gauge import zero_pressure_at_rest
 from tasks.identification.inference.recursion import filter_recursively
 from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
@@ -19,8 +19,8 @@ from tasks.vehicle.model.chassis import Conditions
 from tasks.vehicle.model.simulation import Recording, Simulation, simulate
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle, compute_surface_response
 
-MASKED_SPEED = 2.0
-"""Speed at which the used part of a run ends: below it the floor of the slip's denominator distorts slip [m/s]."""
+LEAD, LEAST_LEAD = 1.0, 5
+"""Time before the brake whose line gives the speed at the first sample [s], and its fewest samples [1]."""
 STEP = 0.002
 """Longest integration step [s]; `compute_step_misfit` checks it by halving."""
 
@@ -42,7 +42,7 @@ class RunModel:
     vehicle : vehicle with the effects that it has already; fitted effects are added to them
     surface_friction : mu_c [1]
     conditions : road feature, snow, direction and disc temperature of the run
-    samples : number of samples that are used, to `MASKED_SPEED`
+    samples : number of samples that are used, to the end of `find_motion`
     initial_speed : speed at the first sample, from the line through the speed before the brake [m/s]
     climb : force of the measured road slope over time; empty where the slope was not measured
     """
@@ -105,10 +105,11 @@ def prepare_run(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunMo
         hazard = RoadHazard(
             center_m=run.hazard_center, length_m=run.hazard_length, height_m=run.hazard_height
         )
-    speed = run.response[:, CHANNELS.index("speed")]
-    slow = np.flatnonzero(speed < MASKED_SPEED)
+    speed = run.speed
+    samples = find_motion(speed)[1]
     pressed = np.flatnonzero(run.pressure > 0.1)
-    lead = min(100, int(pressed[0])) if pressed.size else 100
+    lead = min(round(LEAD / run.interval), int(pressed[0]) if pressed.size else samples)
+    lead = min(max(lead, LEAST_LEAD), samples)
     return RunModel(
         run=replace(run, pressure=zero_pressure_at_rest(run.pressure)),
         vehicle=vehicle,
@@ -116,8 +117,8 @@ def prepare_run(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunMo
         conditions=Conditions(
             hazard=hazard, snow_depth_mm=state.snow_depth_mm, direction=run.direction, disc_rise=run.disc_rise
         ),
-        samples=int(slow[0]) if slow.size else len(speed),
-        initial_speed=float(np.polyfit(np.arange(max(lead, 5)), speed[: max(lead, 5)], 1)[1]),
+        samples=samples,
+        initial_speed=float(np.polyfit(np.arange(lead), speed[:lead], 1)[1]),
         climb=_compute_grade_force(run, vehicle),
     )
 

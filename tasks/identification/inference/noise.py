@@ -16,8 +16,8 @@ INTEGRALS = tuple(
 )
 QUIET_PRESSURE = 0.1
 """Pressure at which the quiet part of a run ends [MPa]."""
-BEFORE_BRAKE, ON_HAZARD = 5, 40
-"""Samples between the quiet part and the brake, and its largest number of samples where the road is not flat."""
+BEFORE_BRAKE, ON_HAZARD = 0.05, 0.4
+"""Time between the quiet part and the brake, and its longest time where the road is not flat [s]."""
 
 
 def estimate_channel_noise(campaign: Campaign) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -123,9 +123,9 @@ def _compute_variogram(stretches: list[Stretch]) -> NDArray[np.float64]:
 def _count_quiet_samples(run: Run) -> int:
     """Return the number of samples of a run before the brake."""
     pressed = np.flatnonzero(run.pressure > QUIET_PRESSURE)
-    end = int(pressed[0]) - BEFORE_BRAKE if pressed.size else len(run.pressure)
+    end = int(pressed[0]) - round(BEFORE_BRAKE / run.interval) if pressed.size else len(run.pressure)
     if run.hazard_length > 0:
-        end = min(end, ON_HAZARD)
+        end = min(end, round(ON_HAZARD / run.interval))
     return max(end, 0)
 
 
