@@ -25,7 +25,7 @@ from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
 from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter, Verdict
 from tasks.identification.decision.excitation import find_reached_range
 from tasks.identification.decision.verdict import Trace
-from tasks.identification.decision.words import say_effect, tell_verdict
+from tasks.identification.decision.words import join_phrases, say_effect, tell_verdict
 from tasks.identification.joint.verdict import JointTrace
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.table import PARAMETERS
@@ -141,7 +141,7 @@ def tell_search(trace: Trace | JointTrace) -> dict[str, Any]:
     suggested = next((effect for effect in verdict.tried if effect.name == planned_for), None)
     sentence = tell_verdict(
         verdict.effects, rivals, library, verdict.error, verdict.manoeuvre_error, suggested,
-        bool(verdict.disagreement), _say_most_pulled(trace, library),
+        bool(verdict.disagreement), _say_own_numbers(trace, library),
     )  # fmt: skip
     told = {
         "channels": [CHANNELS[c] for c in train[0].channels],
@@ -178,14 +178,16 @@ def _number_json(
     }
 
 
-def _say_most_pulled(trace: Trace | JointTrace, library: Sequence[Effect]) -> str:
-    """Return what the vehicle's own number that the runs pull most says; empty where a joint fit has moved all."""
+def _say_own_numbers(trace: Trace | JointTrace, library: Sequence[Effect]) -> str:
+    """Return what the numbers that the file hardly knew say of the car, else the one that the runs pull most."""
+    if trace.calibrated:
+        return join_phrases(say_effect(effect, library) for effect in trace.calibrated)
     if isinstance(trace, JointTrace):
         return ""
     base = trace.end.base
     place = int(np.argmax(base.pulls))
     number = next(e for e in library if e.effect_class == "retune" and e.parameters[0].name == SESSION[place])
-    return number.say({SESSION[place]: float(base.session[place])})
+    return f"most: {number.say({SESSION[place]: float(base.session[place])})}"
 
 
 def split_of(campaign: Campaign) -> dict[str, Any]:

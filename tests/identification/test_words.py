@@ -60,7 +60,7 @@ def test_where_nothing_is_missing_the_verdict_says_what_the_vehicles_own_numbers
         worst_run="run", unit="m/s",
     )  # fmt: skip
     stop = replace(speed, frozen=3.14, after=0.36, unit="m")
-    own = "the brakes give 5.1 % above the torque of the vehicle file"
+    own = "most: the brakes give 5.1 % above the torque of the vehicle file"
     told = tell_verdict((), (), (), {"speed": speed}, {"stopping_distance": stop}, own=own)
     assert told == (
         "These runs show nothing that the model lacks; its own numbers, fitted to these runs (most: the brakes give"

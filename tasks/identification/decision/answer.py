@@ -106,7 +106,8 @@ class Verdict:
     experiment : planned run that separates the first effect best from its closest alternative
     forked : names of runs left out because halving the integration step changes their prediction
     reasons : sentences that explain the verdict
-    disagreement : why single effects could not be told; empty where they could, or were not looked for
+    disagreement : why single effects could not be told, or by how much nothing that is named explains the runs; else
+        empty
     """
 
     verdict: VerdictName

@@ -21,7 +21,12 @@ from tasks.identification.decision.correlation import correlate_residual_with_pr
 from tasks.identification.decision.discovery import search_library_and_forms
 from tasks.identification.decision.disputes import settle_disputes
 from tasks.identification.decision.experiment import plan_next_experiment
-from tasks.identification.decision.held_out import compute_held_out_errors, find_worse_channels, is_noticed
+from tasks.identification.decision.held_out import (
+    compute_held_out_errors,
+    find_worse_channels,
+    is_noticed,
+    is_predicted_better,
+)
 from tasks.identification.decision.intervals import (
     compute_curvature_interval,
     compute_profile_interval,
@@ -208,7 +213,7 @@ def find_missing_effects(
     )
     return Trace(
         verdict=verdict, start=start, end=found, compared=tuple(compared),
-        calibrated=calibrated if named else (),
+        calibrated=calibrated if named or is_predicted_better(error) else (),
     )  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from tasks.identification.decision.answer import ChannelError, NamedEffect
 from tasks.identification.decision.attribution import Candidate
+from tasks.identification.decision.held_out import is_predicted_better
 from tasks.identification.inference.hypothesis import moves_speed
 from tasks.vehicle.effects.library import Effect, say_number
 
@@ -43,7 +44,7 @@ def tell_verdict(
     error, manoeuvres : on runs to which no number was fitted
     suggested : what the training runs show and the held-out runs neither confirm nor contradict, if nothing is named
     misses : whether the runs disagree with the model by more than single effects can be told beside
-    own : what the vehicle's own number that the runs pull most says of the car
+    own : what the vehicle's own numbers that the runs move most say of the car
     """
     if not effects and suggested is not None:
         return (
@@ -56,11 +57,11 @@ def tell_verdict(
         )
     if not effects:
         nothing = "These runs show nothing that the model lacks"
-        if not own or error["speed"].change_high >= 0.0:
+        if not own or not is_predicted_better(error):
             return f"{nothing}."
         figures = {name: e for name, e in manoeuvres.items() if e.change_high < 0.0}
         return (
-            f"{nothing}; its own numbers, fitted to these runs (most: {own}), take the error"
+            f"{nothing}; its own numbers, fitted to these runs ({own}), take the error"
             f" {_say_errors({'speed': error['speed'], **figures})}, on runs to which no number was fitted."
         )
     told = [say_effect(effect, library) for effect in effects]

@@ -6,7 +6,9 @@ import numpy as np
 
 from tasks.campaign.campaign import CHANNELS, Campaign
 from tasks.campaign.channels import BRAKE_SIGNALS
-from tasks.identification.decision.answer import NamedEffect
+from tasks.errors import InputError
+from tasks.identification.decision.answer import ChannelError, NamedEffect
+from tasks.identification.inference.noise import estimate_channel_noise
 from tasks.identification.joint.numbers import JointNumber, saturates_tyres
 from tasks.identification.joint.stops import Stop
 from tasks.identification.rules import JointRules
@@ -58,6 +60,27 @@ def tell_what_was_used(
         f"{agreeing[0]} of {agreeing[1]} starts reach this fit",
         "the held-out runs decide which numbers stay, so their error is not that of a blind test",
     ]
+
+
+def tell_missed_speed(campaign: Campaign, error: ChannelError, rules: JointRules) -> str:
+    """Return by how much the speed of held-out runs is missed; empty where that is within a few times its noise.
+
+    Parameters
+    ----------
+    campaign : measured runs; those that are too short for their noise to be read are not judged
+    error : of the speed, on held-out runs
+    rules : of the joint fit
+    """
+    try:
+        noise = float(estimate_channel_noise(campaign)[1][CHANNELS.index("speed")])
+    except InputError:
+        return ""
+    if error.after <= rules.foreign_misfit * noise:
+        return ""
+    return (
+        f"the speed of the held-out runs is missed by {error.after:.3g} m/s, {error.after / noise:.0f} times its noise"
+        f" (at most {rules.foreign_misfit:g})"
+    )
 
 
 def tell_rivals(

@@ -14,6 +14,7 @@ from tasks.identification.joint.calibration import needs_joint_fit
 from tasks.identification.joint.elimination import Substitute
 from tasks.identification.joint.held_out import drop_what_predicts_worse
 from tasks.identification.joint.verdict import JointTrace, judge_jointly
+from tasks.identification.joint.words import tell_missed_speed
 from tasks.identification.rules import DecisionRules
 from tasks.vehicle.effects.table import build_parameter_vector
 from tasks.vehicle.parameters import Vehicle
@@ -100,6 +101,30 @@ def test_why_single_effects_could_not_be_told_is_the_first_reason():
     assert why not in judge_jointly(campaign_of({}), VEHICLE, SURFACE, numbers, RULES).verdict.reasons
 
 
+def test_no_claim_that_nothing_is_missing_stands_beside_a_stop_that_is_missed():
+    calm, strong = campaign_of({}), campaign_of({"pressure_gain": 0.8})
+    trace = judge(replace(calm, runs=(*calm.runs[:-1], strong.runs[-1])))
+    why = trace.verdict.disagreement
+    assert trace.verdict.verdict == "NOTHING" and not trace.calibrated and trace.verdict.reasons[0] == why
+    missed = trace.verdict.error["speed"].after
+    assert why.startswith(f"the speed of the held-out runs is missed by {missed:.3g} m/s, ")
+    assert tell_missed_speed(calm, replace(trace.verdict.error["speed"], after=0.1), RULES.joint) == ""
+
+
+def test_a_stop_that_is_missed_beside_a_name_is_told():
+    assert not any("is missed by" in reason for reason in slow_brakes().verdict.reasons)
+    late, windy = campaign_of({"lag": 0.2}), campaign_of({"lag": 0.2, "drag_area": 3.0})
+    trace = judge(replace(late, runs=(*late.runs[:-1], windy.runs[-1])))
+    assert trace.verdict.effects and trace.verdict.disagreement == ""
+    assert trace.verdict.reasons[-1].endswith("what is named is not all that the model lacks")
+
+
+def test_a_gain_that_predicts_unseen_stops_is_told_and_grown_although_nothing_is_named():
+    trace = judge(campaign_of({"pressure_gain": 0.3}))
+    assert trace.verdict.verdict == "NOTHING" and trace.verdict.disagreement == ""
+    assert [effect.name for effect in trace.calibrated] == ["retuned_pressure_gain"]
+
+
 def test_a_car_that_is_as_its_file_says_lacks_nothing():
     trace = judge(campaign_of({}))
     assert trace.verdict.verdict == "NOTHING" and not named_intervals(trace)
@@ -164,7 +189,7 @@ def test_what_the_training_runs_had_in_common_is_not_named_where_the_held_out_ru
 def test_an_engine_that_was_measured_is_an_input_and_no_effect():
     campaign = campaign_of({"pressure_gain": 0.3}, engine=-500.0)
     with_engine = judge(campaign)
-    assert not named_intervals(with_engine)
+    assert not with_engine.verdict.effects and named_intervals(with_engine).keys() == {"retuned_pressure_gain"}
     assert with_engine.fitted.by_name["pressure_gain"] == pytest.approx(0.3, abs=0.03)
     assert any("engine torque" in reason for reason in with_engine.verdict.reasons)
     blind = judge(replace(campaign, runs=tuple(replace(run, drive_torque=None) for run in campaign.runs)))
