@@ -27,6 +27,7 @@ class JointNumberEntry(CatalogueEntry):
     needs: Annotated[tuple[Text, ...], Field(min_length=1)]
     source: Text
     of_pressure: bool = False
+    free_with: tuple[Text, ...] = ()
 
 
 def _check(entries: dict[str, JointNumberEntry]) -> dict[str, JointNumberEntry]:
@@ -39,7 +40,9 @@ def _check(entries: dict[str, JointNumberEntry]) -> dict[str, JointNumberEntry]:
         if not entry.lower <= 0.0 <= entry.upper:
             problems.append(f"{name} must have 0, the vehicle file's value, within its limits")
         problems += [
-            f"{name} needs {need}, which is no channel" for need in entry.needs if need not in CHANNELS
+            f"{name} needs {need}, which is no channel"
+            for need in (*entry.needs, *entry.free_with)
+            if need not in CHANNELS
         ]
     if problems:
         raise ValueError("; ".join(problems))
@@ -69,6 +72,7 @@ def load_joint_numbers(path: str | Path = JOINT_NUMBERS) -> tuple[JointNumber, .
         JointNumber(
             name=name, sigma=entry.sigma, lower=entry.lower, upper=entry.upper, group=entry.group,
             removable=entry.removable, needs=entry.needs, effect=effects[name], of_pressure=entry.of_pressure,
+            free_with=entry.free_with,
         )
         for name, entry in entries.items()
     )  # fmt: skip

@@ -64,7 +64,7 @@ def test_the_errors_and_the_numbers_are_those_of_the_verdict(walked: tuple[Path,
     for name, value, interval in rows("number"):
         told = [float(value), *(float(end) for end in interval.split(" to "))]
         found = [numbers[name][key] for key in ("value", "ci_low", "ci_high")]
-        assert told == pytest.approx(found, rel=0.05, abs=0.05)
+        assert told == pytest.approx(found, rel=0.05, abs=0.05), (told, found)
 
 
 def test_the_pages_of_the_tutorial_are_there_and_say_what_it_says(walked: tuple[Path, list[str]]) -> None:

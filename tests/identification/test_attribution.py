@@ -13,8 +13,9 @@ from synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
-from tasks.identification.decision.attribution import judge_hypothesis, refine_candidates
+from tasks.identification.decision.attribution import assess_fit, judge_hypothesis, refine_candidates
 from tasks.identification.decision.cross_validation import cross_validate_candidate
+from tasks.identification.decision.rivals import _fit_further
 from tasks.identification.inference import derivatives
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.derivatives import differentiate_run
@@ -242,3 +243,24 @@ def test_the_speed_at_the_start_is_that_of_a_second_whatever_the_rate_and_the_le
         replace(run, interval=1.0 / rate, pressure=np.zeros(samples), response=response), VEHICLE, SURFACE
     )
     assert model.initial_speed == pytest.approx(20.0, abs=1e-6)
+
+
+def test_a_rival_of_a_large_effect_is_fitted_to_its_end_before_the_two_are_compared() -> None:
+    """Ended after one step, a lag explains a fraction of what it explains at its end; a small effect stays as it is."""
+    (lag,) = (make_library_hypothesis(e) for e in load_effects() if e.name == "brake_lag")
+    evidence = evidence_of(
+        build_parameter_vector({"lag": 0.2}), ((28.0, 1.5, -1, 20.0), (20.0, 2.2, 1, 20.0))
+    )
+    null = fit_hypotheses(evidence.train, (), evidence.session_sigma)
+    ended, early = (
+        fit_hypotheses(
+            evidence.train, (lag,), evidence.session_sigma, values=np.array([0.0]), iterations=steps
+        )
+        for steps in (12, 1)
+    )
+    first = assess_fit(evidence, null, None, lag, early)
+    further = _fit_further(evidence, null, ended, first)
+    assert load_decision_rules().relinearisation_gain < first.gain < 0.9 * further.gain
+    assert further.fitted.values == pytest.approx(0.2, abs=0.01)
+    small = replace(first, gain=0.99 * load_decision_rules().relinearisation_gain)
+    assert _fit_further(evidence, null, ended, small) is small

@@ -9,6 +9,7 @@ from tasks.campaign.campaign import SESSION
 from tasks.identification.decision.attribution import (  # fmt: skip
     Candidate,
     Misfits,
+    assess_fit,
     judge_hypothesis,
     refine_candidates,
     refit_without_part,
@@ -21,9 +22,17 @@ from tasks.identification.decision.session_numbers import (
     free_session_number,
 )
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.fit import Fit, compute_misfit_by_run, compute_misfit_falls
+from tasks.identification.inference.fit import (
+    Fit,
+    compute_misfit_by_run,
+    compute_misfit_falls,
+    fit_hypotheses,
+)
 from tasks.identification.inference.hypothesis import is_nested
 from tasks.identification.inference.linearisation import hold_session
+
+MORE_STEPS = 12
+"""Gauss-Newton steps of a fit that begins where another ended [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,6 +76,7 @@ def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]
         others = [c for c in tried if c.hypothesis.name != own.hypothesis.name]
         alike = find_alike_numbers(evidence, own.hypothesis.names[0])
         others += _free_numbers(evidence, rest, alike, {c.hypothesis.name for c in others})
+        others = [_fit_further(evidence, rest, base, c) if c.gain < own.gain else c for c in others]
         instruments = _judge_alike_instruments(evidence, rest, own)
         others = [c for c in others if c.hypothesis.name not in instruments] + list(instruments.values())
         unseen = compute_misfit_by_run(evidence.held_out, rest)
@@ -90,6 +100,24 @@ def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]
             RivalComparison(own=own, share=share, others=tuple(zip(others, shares, strict=True)), near=near)
         )
     return compared
+
+
+def _fit_further(evidence: Evidence, rest: Fit, base: Fit, other: Candidate) -> Candidate:
+    """Return an explanation with a large gain, fitted again from its numbers and the session beside what is named.
+
+    A search ranks what gains much after a few steps, and fits only the best of it to the end. A rival of that is what
+    gains as much at its own end, which lies where the runs are explained as well.
+    """
+    if other.gain < evidence.rules.relinearisation_gain:
+        return other
+    known = other.fitted
+    fitted = fit_hypotheses(
+        evidence.train, known.parts, evidence.session_sigma, values=known.values, session=base.session,
+        iterations=MORE_STEPS,
+    )  # fmt: skip
+    if fitted.objective >= known.objective:
+        return other
+    return assess_fit(evidence, rest, None, other.hypothesis, fitted)
 
 
 def _is_as_wrong(other: Candidate) -> bool:

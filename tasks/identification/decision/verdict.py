@@ -27,11 +27,13 @@ from tasks.identification.decision.held_out import (
     is_noticed,
     is_predicted_better,
 )
+from tasks.identification.decision.instruments import tell_like_instruments
 from tasks.identification.decision.intervals import (
     compute_curvature_interval,
     compute_profile_interval,
     refit_named,
 )
+from tasks.identification.decision.missed import tell_miss
 from tasks.identification.decision.rivals import RivalComparison, compare_with_rivals
 from tasks.identification.decision.screening import find_detectable_sizes
 from tasks.identification.decision.search import SearchState
@@ -173,6 +175,7 @@ def find_missing_effects(
             " held-out runs do not tell them apart"
         )
     reasons += filter(None, (say_confirmation(c.own) for c in compared))
+    reasons += tell_like_instruments(campaign, named, [rival.name for _, rival in near])
     if not named and not reasons:
         reasons.append(say_rejection(tried))
     present = [name for name, value in vehicle.effects.items() if value] + [f.name for f in vehicle.forms]
@@ -211,10 +214,15 @@ def find_missing_effects(
         forked=evidence.forked,
         reasons=tuple(reasons),
     )
+    verdict = tell_miss(verdict, campaign, rules.joint.foreign_misfit)
+    told = named or (is_predicted_better(error) and not verdict.disagreement)
     return Trace(
-        verdict=verdict, start=start, end=found, compared=tuple(compared),
-        calibrated=calibrated if named or is_predicted_better(error) else (),
-    )  # fmt: skip
+        verdict=verdict,
+        start=start,
+        end=found,
+        compared=tuple(compared),
+        calibrated=calibrated if told else (),
+    )
 
 
 def find_pair_to_confirm(tried: Sequence[Candidate], null: Fit) -> tuple[Fit, Fit] | None:

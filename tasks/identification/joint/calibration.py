@@ -61,7 +61,7 @@ def fit_first_numbers(
     shown : numbers that the campaign can show
     starts : values by name
     """
-    few = tuple(n for n in shown if not n.removable or n.name in FIRST)
+    few = tuple(n for n in shown if not n.removable or (n.name in FIRST and not n.stands_in))
     return fit_jointly(train, few, starts)[0]
 
 

@@ -30,6 +30,8 @@ class JointNumber:
     needs : channels of which one must be measured
     effect : of the library, whose first number it is
     of_pressure : sigma is a share of the largest brake pressure of the training runs
+    free_with : channels without any of which it is never free, but may explain the runs in the place of another number
+    stands_in : none of those was measured
     """
 
     name: str
@@ -41,6 +43,8 @@ class JointNumber:
     needs: tuple[str, ...]
     effect: Effect
     of_pressure: bool = False
+    free_with: tuple[str, ...] = ()
+    stands_in: bool = False
 
     def say(self, value: float) -> str:
         """Return the finding in plain words.
@@ -80,7 +84,8 @@ def choose_numbers(
             number = replace(
                 number, sigma=number.sigma * max(largest, rules.least_pressure_range), of_pressure=False
             )
-        chosen.append(number)
+        alone = bool(number.free_with) and not any(name in campaign.channels for name in number.free_with)
+        chosen.append(replace(number, stands_in=alone))
     return tuple(chosen)
 
 
@@ -89,8 +94,8 @@ def free_numbers(
 ) -> tuple[JointNumber, ...]:
     """Return those of the numbers that a fit may move together; others only stand in for one of them.
 
-    Resistances are one lump until a car has coasted down, and a lag and a dead time are one delay until a log is quick
-    enough to tell them apart.
+    A late speed and a late brake look the same where no accelerometer was measured. Resistances are one lump until a
+    car has coasted down, and a lag and a dead time are one delay until a log is quick enough to tell them apart.
 
     Parameters
     ----------
@@ -104,7 +109,7 @@ def free_numbers(
     first: dict[str, str] = {}
     for number in shown:
         first.setdefault(number.group, number.name)
-    return tuple(n for n in shown if n.group not in lumped or first[n.group] == n.name)
+    return tuple(n for n in shown if not n.stands_in and (n.group not in lumped or first[n.group] == n.name))
 
 
 def coasts_down(model: RunModel, rules: JointRules) -> bool:

@@ -16,6 +16,8 @@ from tasks.identification.decision.answer import (
     make_estimate,
 )
 from tasks.identification.decision.held_out import is_predicted_better
+from tasks.identification.decision.instruments import tell_like_instruments
+from tasks.identification.decision.missed import tell_miss
 from tasks.identification.inference.disturbance import Disturbance
 from tasks.identification.joint.calibration import fit_first_numbers, is_gain_unknown
 from tasks.identification.joint.elimination import (
@@ -36,7 +38,7 @@ from tasks.identification.joint.held_out import (
 )
 from tasks.identification.joint.numbers import CALIBRATED, JointNumber, choose_numbers, free_numbers
 from tasks.identification.joint.stops import FITTED, Stop, complete_numbers, make_stop
-from tasks.identification.joint.words import tell_missed_speed, tell_rivals, tell_what_was_used
+from tasks.identification.joint.words import tell_lumped_resistance, tell_rivals, tell_what_was_used
 from tasks.identification.rules import DecisionRules, JointRules
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.table import PARAMETERS, build_parameter_vector
@@ -126,12 +128,8 @@ def judge_jointly(
     kind = _kind(effects, rivals)
     reasons += tell_what_was_used(campaign, train, agreeing, joint)
     reasons += tell_rivals(effects, rivals, shown)
-    if missed := tell_missed_speed(campaign, error["speed"], joint):
-        if not effects and not disagreement:
-            disagreement = missed
-            reasons.insert(0, missed)
-        elif effects:
-            reasons.append(f"{missed}: what is named is not all that the model lacks")
+    reasons += tell_like_instruments(campaign, effects, [rival.name for _, rival in rivals])
+    reasons += tell_lumped_resistance(fitted.numbers, [stop.model for stop in train], joint)
     verdict = Verdict(
         verdict=kind,
         effects=tuple(effects),
@@ -154,9 +152,10 @@ def judge_jointly(
         reasons=tuple(reasons),
         disagreement=disagreement,
     )  # fmt: skip
+    verdict = tell_miss(verdict, campaign, joint.foreign_misfit)
     return JointTrace(
         verdict=verdict,
-        calibrated=calibrated if effects or (is_predicted_better(error) and not disagreement) else (),
+        calibrated=calibrated if effects or (is_predicted_better(error) and not verdict.disagreement) else (),
         fitted=fitted,
         errors=standard_errors(fitted, joint),
         train=train,

@@ -6,18 +6,17 @@ import numpy as np
 
 from tasks.campaign.campaign import CHANNELS, Campaign
 from tasks.campaign.channels import BRAKE_SIGNALS
-from tasks.errors import InputError
-from tasks.identification.decision.answer import ChannelError, NamedEffect
-from tasks.identification.inference.noise import estimate_channel_noise
-from tasks.identification.joint.numbers import JointNumber, saturates_tyres
+from tasks.identification.decision.answer import NamedEffect
+from tasks.identification.inference.forward import RunModel
+from tasks.identification.joint.numbers import JointNumber, coasts_down, saturates_tyres
 from tasks.identification.joint.stops import Stop
 from tasks.identification.rules import JointRules
 
 SEPARATE = {
+    "sensor": "log the speed by a second instrument",
     "resistance": "coast down from the highest speed to 5 m/s with the clutch open, and once in gear",
     "delay": "press the brake in steps from constant speed, logging at 100 Hz or more",
     "curve": "brake at three constant pressures from the same speed, below the limit of the tyres",
-    "sensor": "log the speed by a second instrument",
 }
 """The run that tells numbers of one group apart."""
 
@@ -62,27 +61,6 @@ def tell_what_was_used(
     ]
 
 
-def tell_missed_speed(campaign: Campaign, error: ChannelError, rules: JointRules) -> str:
-    """Return by how much the speed of held-out runs is missed; empty where that is within a few times its noise.
-
-    Parameters
-    ----------
-    campaign : measured runs; those that are too short for their noise to be read are not judged
-    error : of the speed, on held-out runs
-    rules : of the joint fit
-    """
-    try:
-        noise = float(estimate_channel_noise(campaign)[1][CHANNELS.index("speed")])
-    except InputError:
-        return ""
-    if error.after <= rules.foreign_misfit * noise:
-        return ""
-    return (
-        f"the speed of the held-out runs is missed by {error.after:.3g} m/s, {error.after / noise:.0f} times its noise"
-        f" (at most {rules.foreign_misfit:g})"
-    )
-
-
 def tell_rivals(
     effects: Sequence[NamedEffect], rivals: Sequence[tuple[str, NamedEffect]], shown: Sequence[JointNumber]
 ) -> list[str]:
@@ -104,6 +82,26 @@ def tell_rivals(
             f" {numbers[other.name].say(other.value)}: {find_separating_run([numbers[one.name], numbers[other.name]])}"
         )
     return sentences
+
+
+def tell_lumped_resistance(
+    fitted: Sequence[JointNumber], models: Sequence[RunModel], rules: JointRules
+) -> list[str]:
+    """Return a sentence where one number stands for all resistance, because no run coasts down.
+
+    Parameters
+    ----------
+    fitted : numbers that are left
+    models : of the training runs
+    rules : of the joint fit
+    """
+    lump = [n.name for n in fitted if n.group == "resistance"]
+    if not lump or any(coasts_down(model, rules) for model in models):
+        return []
+    return [
+        f"{lump[0]} stands for air, tyres and engine together, and its interval holds their sum alone: to tell them"
+        f" apart, {SEPARATE['resistance']}"
+    ]
 
 
 def find_separating_run(numbers: Sequence[JointNumber]) -> str | None:

@@ -94,3 +94,15 @@ def test_a_driver_brakes_from_a_share_of_the_largest_pressure():
         assert pressure[stop.onset - 1] <= share * pressure[: stop.model.samples].max() < pressure[stop.onset]
         onsets.append(stop.onset)
     assert onsets[0] < onsets[1]
+
+
+def test_a_late_speed_stands_in_for_a_late_brake_unless_an_accelerometer_tells_the_two_apart():
+    runs = tuple(model.run for model in stops())
+    for channels, free in ((("speed",), False), (("speed", "longitudinal_acceleration"), True)):
+        campaign = Campaign(
+            name="known", vehicle="paper-reference", runs=runs, channels=channels, content_hash="", split_hash="",
+            tolerances=TOLERANCES,
+        )  # fmt: skip
+        shown = choose_numbers(load_joint_numbers(), campaign, stops(), RULES)
+        assert "speed_delay" in [n.name for n in shown]
+        assert ("speed_delay" in [n.name for n in free_numbers(shown, stops(), RULES)]) is free

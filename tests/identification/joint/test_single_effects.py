@@ -1,7 +1,8 @@
 """A driver who holds his speed until he brakes: told by the speed before the brake, which is then left out."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from types import SimpleNamespace
+from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
 import pytest
@@ -33,9 +34,14 @@ SEEN = np.isin(CHANNELS, ("speed", "longitudinal_acceleration"))
 
 @dataclass(frozen=True)
 class Told:
-    """A verdict that says nothing but its reasons."""
+    """A verdict that says nothing but its reasons and the error of the speed on held-out runs."""
 
+    after: float = 0.0
     reasons: tuple[str, ...] = ()
+
+    @property
+    def error(self) -> dict[str, SimpleNamespace]:
+        return {"speed": SimpleNamespace(after=self.after)}
 
 
 def resist(speed: float) -> float:
@@ -125,19 +131,44 @@ def test_a_foreign_car_that_coasts_is_left_to_the_joint_fit(monkeypatch):
     assert tried == ["whole", "begun"]
 
 
-def answer_in_turn(monkeypatch, drives, whole_is_foreign: bool) -> list[str]:
+@pytest.mark.parametrize(
+    ("drive", "whole", "begun", "searched", "is_begun"),
+    [
+        pytest.param(0.0, 0.5, 0.1, ["whole", "begun"], True, id="missed, and predicted from the brake on"),
+        pytest.param(0.0, 0.5, 0.4, ["whole", "begun"], False, id="missed, and no better from the brake on"),
+        pytest.param(0.0, 0.1, 0.01, ["whole"], False, id="predicted within a few times the noise"),
+        pytest.param(-0.1, 0.5, 0.1, ["whole"], False, id="a car that loses speed before the brake"),
+    ],
+)
+def test_missed_runs_that_lose_no_speed_before_the_brake_are_judged_from_it_where_that_predicts_them(
+    monkeypatch, drive, whole, begun, searched, is_begun
+):
+    """The noise of the speed is 0.03 m/s, and a run is missed from five times that on."""
+    tried = answer_in_turn(monkeypatch, (drive, drive), False, after={"whole": whole, "begun": begun})
+    trace = find_single_effects(make_campaign({}, held=False), KNOWN, SURFACE, (), (), RULES)
+    assert tried == searched and trace.verdict.after == (begun if is_begun else whole)
+    assert any("from the brake on one of 0.1 m/s" in reason for reason in trace.verdict.reasons) is is_begun
+
+
+def answer_in_turn(
+    monkeypatch, drives, whole_is_foreign: bool, after: Mapping[str, float] = MappingProxyType({})
+) -> list[str]:
     """Answers in place of searches, and the list of what was searched."""
     tried, left = [], list(drives)
 
     def answer(campaign, *_, **__):
         begun = len(campaign.runs[0].pressure) < 390
         tried.append("begun" if begun else "whole")
+        told = Told(after=after.get(tried[-1], 0.0))
         if whole_is_foreign and not begun:
             raise ForeignCarError("the runs disagree")
         base = SimpleNamespace(parts=(), values=np.empty(0), session=np.zeros(7))
-        return Trace(verdict=Told(), start=None, end=SimpleNamespace(base=base), compared=())
+        state = SimpleNamespace(base=base, evidence=None)
+        return Trace(verdict=told, start=state, end=state, compared=())
 
     monkeypatch.setattr(single_effects, "calibrate_gain", lambda *_: {})
     monkeypatch.setattr(single_effects, "find_missing_effects", answer)
     monkeypatch.setattr(single_effects, "measure_drive", lambda *_: left.pop(0))
+    kept = {"speed": SimpleNamespace(after=after.get("whole", 0.0))}
+    monkeypatch.setattr(single_effects, "compute_held_out_errors", lambda *_: (kept, {}))
     return tried

@@ -1,11 +1,17 @@
 """Reasons of a joint verdict are sentences, in the plain words of the catalogue."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
+from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from catalogs.joint_numbers import load_joint_numbers
 from tasks.identification.decision.answer import NamedEffect, Parameter
-from tasks.identification.joint.words import tell_rivals
+from tasks.identification.inference.forward import prepare_run
+from tasks.identification.joint.words import tell_lumped_resistance, tell_rivals
+from tests.identification.synthetic import SURFACE, VEHICLE, plain_run
 
 
 def named_effect(effect: str, number: str, value: float) -> NamedEffect:
@@ -65,3 +71,15 @@ def test_a_number_is_said_as_the_effect_that_it_is_alone() -> None:
     said = {number.name: number.say(0.05) for number in load_joint_numbers()}
     assert said["rolling_coefficient"] == "the wheels roll with a further resistance of 5 % of the weight"
     assert said["drag_area"] == "the air holds the car back with a further drag area of 0.05 m2"
+
+
+def test_a_resistance_without_a_coast_down_is_told_to_be_the_sum_of_all():
+    rules = load_decision_rules().joint
+    numbers = {n.name: n for n in load_joint_numbers()}
+    braking, coasting = plain_run(20.0, 2.0), plain_run(20.0, 0.0)
+    slowed = replace(coasting, response=coasting.response - np.linspace(0.0, 9.0, 400)[:, None])
+    models = [prepare_run(run, VEHICLE, SURFACE) for run in (braking, slowed)]
+    (told,) = tell_lumped_resistance([numbers["lag"], numbers["drag_area"]], models[:1], rules)
+    assert told.startswith("drag_area stands for air, tyres and engine together") and "coast down" in told
+    assert tell_lumped_resistance([numbers["lag"]], models[:1], rules) == []
+    assert tell_lumped_resistance([numbers["drag_area"]], models, rules) == []

@@ -1,0 +1,48 @@
+"""Stops that no fit has seen and that the model misses by more than their noise, whatever is named."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from tasks.campaign.campaign import CHANNELS, Campaign
+from tasks.errors import InputError
+from tasks.identification.decision.answer import ChannelError, Verdict
+from tasks.identification.inference.noise import estimate_channel_noise
+
+
+def compare_with_noise(campaign: Campaign, error: Mapping[str, ChannelError]) -> float:
+    """Return the error of the speed on held-out runs over its sensor's noise; 0 where runs are too short for it [1].
+
+    Parameters
+    ----------
+    campaign : measured runs
+    error : by channel, on held-out runs
+    """
+    try:
+        noise = float(estimate_channel_noise(campaign)[1][CHANNELS.index("speed")])
+    except InputError:
+        return 0.0
+    return error["speed"].after / noise
+
+
+def tell_miss(verdict: Verdict, campaign: Campaign, limit: float) -> Verdict:
+    """Return a verdict that says by how much the speed of held-out runs is missed, where that is more than noise.
+
+    Parameters
+    ----------
+    verdict : the answer
+    campaign : measured runs
+    limit : error over noise from which a run is missed [1]
+    """
+    ratio = compare_with_noise(campaign, verdict.error)
+    if ratio <= limit or verdict.disagreement:
+        return verdict
+    missed = (
+        f"the speed of the held-out runs is missed by {verdict.error['speed'].after:.3g} m/s, {ratio:.0f} times its"
+        f" noise (at most {limit:g})"
+    )
+    if not verdict.effects:
+        return replace(verdict, disagreement=missed, reasons=(missed, *verdict.reasons))
+    return replace(
+        verdict,
+        reasons=(*verdict.reasons, f"{missed}: what is named is not all that the model lacks"),
+    )
