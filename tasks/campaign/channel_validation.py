@@ -16,6 +16,8 @@ FROZEN_DWELLS = 20.0
 """A frozen sensor holds a value this long, and this many times longer than usual."""
 SHORT_FREEZE_SECONDS = 0.25
 """This long suffices for a sensor that hardly holds values: it must be as many times longer than 95 % of the holds."""
+ROUNDING_STEP = 1e-6
+"""Share of the largest value below which a step is rounding of a resampled value, and no step of the sensor [1]."""
 SMOOTHING = 0.2
 """Width of the mean over which two channels are compared [s]."""
 DECELERATION_PER_PRESSURE = (0.3, 8.0)
@@ -80,7 +82,7 @@ def frozen_problem(name: str, signal: Signal, speed: Signal | None) -> str | Non
     if speed is not None and len(speed.time) > 1:
         moving = np.interp(signal.time, speed.time, speed.values) > MOVING
     differences = np.abs(np.diff(signal.values))
-    changes = np.flatnonzero(differences)
+    changes = np.flatnonzero(differences > ROUNDING_STEP * float(np.max(np.abs(signal.values))))
     edges = np.concatenate(([0], changes + 1, [len(signal.time) - 1]))
     dwells = np.diff(signal.time[edges])
     usual, most = np.quantile(dwells, (0.5, 0.95)) if len(changes) > 2 else (0.0, np.inf)

@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 
 from tasks.campaign.channels import CHANNELS_BY_NAME, unit_factor
 
+TIME_ROUNDING = 8.0
+"""Spacings of a time's floating-point number by which a logged time and the clock's may differ for one instant [1]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Signal:
@@ -103,8 +106,8 @@ def convert_to_channel(signal: Signal, rule: ChannelRule) -> Signal:
 def resample_on_clock(signal: Signal, clock: NDArray[np.float64]) -> NDArray[np.float64]:
     """Resample a signal at the times of a uniform clock.
 
-    A slower signal is linear between its samples. A faster one is averaged over the clock's interval, so that
-    frequencies above the clock's limit do not alias.
+    A slower signal is linear between its samples, and equal to a sample that falls on the clock. A faster one is
+    averaged over the clock's interval, so that frequencies above the clock's limit do not alias.
 
     Parameters
     ----------
@@ -113,7 +116,7 @@ def resample_on_clock(signal: Signal, clock: NDArray[np.float64]) -> NDArray[np.
     """
     interval = float(clock[1] - clock[0])
     if float(np.median(np.diff(signal.time))) > 0.55 * interval:
-        return np.interp(clock, signal.time, signal.values)
+        return _interpolate_samples(signal, clock)
     steps = np.diff(signal.time)
     area = np.concatenate(([0.0], np.cumsum(0.5 * (signal.values[1:] + signal.values[:-1]) * steps)))
     first, last = float(signal.time[0]), float(signal.time[-1])
@@ -121,6 +124,15 @@ def resample_on_clock(signal: Signal, clock: NDArray[np.float64]) -> NDArray[np.
     right = np.minimum(clock + 0.5 * interval, last)
     # the integral is interpolated linearly between samples: accurate enough with more than two of them
     return (np.interp(right, signal.time, area) - np.interp(left, signal.time, area)) / (right - left)
+
+
+def _interpolate_samples(signal: Signal, clock: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the values between samples, and the sample itself where a sample falls on the clock within rounding."""
+    after = np.clip(np.searchsorted(signal.time, clock), 1, len(signal.time) - 1)
+    nearest = after - (clock - signal.time[after - 1] < signal.time[after] - clock)
+    rounding = TIME_ROUNDING * np.spacing(np.abs(clock))
+    on_clock = np.abs(signal.time[nearest] - clock) <= rounding
+    return np.where(on_clock, signal.values[nearest], np.interp(clock, signal.time, signal.values))
 
 
 def make_common_clock(signals: list[Signal], rate: float) -> NDArray[np.float64]:

@@ -88,3 +88,18 @@ def test_a_fault_in_a_braking_run_is_found(
     braking = [run for run in runs if run["brake_pressure"].max() > 0.3]
     found = sum(bool(problems_of(damage(run))) for run in braking)
     assert found >= share * len(braking), f"{fault}: {found} of {len(braking)}"
+
+
+def test_rounding_is_no_step_of_a_coarse_sensor() -> None:
+    """Speed in whole km/h, held while the car cruises, with what a resampling leaves of it."""
+    driven = (
+        np.concatenate((np.arange(100.0, 80.0, -1.0), np.full(40, 80.0), np.arange(79.0, 40.0, -1.0))) / 3.6
+    )
+    time = 0.1 * np.arange(len(driven))
+    rounded = driven + 1e-13 * (np.arange(len(driven)) % 2)
+    for values in (driven, rounded):
+        signal = Signal(time=time, values=values)
+        assert frozen_problem("speed", signal, signal) is None
+    lost = Signal(time=time, values=np.where(driven < 80.0 / 3.6, rounded - 5.0, rounded))
+    problem = frozen_problem("speed", lost, lost)
+    assert problem is not None and "holds 22.22 for" in problem

@@ -68,6 +68,16 @@ def test_a_slow_signal_is_linear_between_its_samples() -> None:
     )
 
 
+def test_a_sample_that_falls_on_the_clock_within_rounding_is_taken_as_it_is() -> None:
+    start = 1_761_234_585.16  # a log of Unix times, in steps that no floating-point number is
+    time = start + np.arange(400) * 0.1
+    speed = np.round(20.0 + 5.0 * np.sin(0.3 * np.arange(400))) / 3.6
+    clock = make_common_clock([Signal(time=time, values=speed)], 10.0)
+    np.testing.assert_array_equal(
+        resample_on_clock(Signal(time=np.round(time, 3), values=speed), clock), speed
+    )
+
+
 def test_a_fast_signal_keeps_its_mean_and_does_not_fold_into_the_clock() -> None:
     t = np.arange(20001) / 10_000
     tone = Signal(time=t, values=3.0 + np.sin(2 * np.pi * 100.0 * t + 0.9))
