@@ -18,6 +18,7 @@ from catalogs.channel_maps.tolerances import Tolerances as TolerancesEntry
 from catalogs.documents import read_content
 from catalogs.quantities import Text, parse_entry
 from catalogs.sentences import cap_problems, shorten, shorten_value
+from tasks.campaign.brake_gain import gain_problems
 from tasks.campaign.campaign import (
     CHANNELS,
     MASKED_SPEED,
@@ -104,7 +105,7 @@ def read_campaign(folder: str | Path) -> Campaign:
     needed = list(dict.fromkeys(needed))
     digest = hashlib.sha256(header_bytes + table_bytes)
     interval, judged = 1.0 / header.sample_rate_hz, set(held_out)
-    runs, first_of = [], dict[bytes, str]()
+    runs, first_of, readable = [], dict[bytes, str](), dict[str, dict[str, np.ndarray]]()
     for row in rows:
         path = folder / "runs" / f"{row['run']}.parquet"
         if not path.is_file():
@@ -125,6 +126,10 @@ def read_campaign(folder: str | Path) -> Campaign:
         except InputError as error:
             found = list(error.problems)
         problems += [f"{row['run']}: {problem}" for problem in found]
+        if not found:
+            readable[row["run"]] = {
+                name: fill_between_samples(name, values) for name, values in columns.items()
+            }
         if not found and signal in columns and "speed" in columns:
             columns["brake_pressure"] = BRAKE_SIGNALS[signal] * columns[signal]
             run = _make_run(row, columns, row["run"] in judged, interval)
@@ -132,6 +137,8 @@ def read_campaign(folder: str | Path) -> Campaign:
             if problem := _motion_problem(run, first, end):
                 problems.append(f"{run.name}: {problem}")
             runs.append(run.begin_at(first) if first else run)
+    if header.brake_stands_for is None:
+        problems += gain_problems(readable, interval)
     if problems:
         raise InputError(cap_problems([f"{shorten(folder.name)}: {problem}" for problem in problems]))
     split = "\n".join(["train", *sorted(train), "held_out", *sorted(held_out)])

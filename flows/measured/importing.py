@@ -18,6 +18,7 @@ from flows.store.layout import write_atomically, write_json
 from flows.store.telemetry import write_parquet
 from manifests.canonical import sha256_of_file
 from tasks.campaign.assembly import Assembled, assemble_run
+from tasks.campaign.brake_gain import gain_problems
 from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME
 from tasks.campaign.signals import Signal
 from tasks.campaign.slow_channels import measure_slow_rates
@@ -78,6 +79,9 @@ def import_measurements(
     problems = [
         f"{run.name} ({run.file.name}): {problem}" for run, found in made for problem in found.problems
     ]
+    if not _has_stand_in(channel_map):
+        readable = {run.name: found.readable for run, found in made}
+        problems += gain_problems(readable, 1.0 / channel_map.sample_rate_hz)
     if problems:
         raise InputError(problems)
     root = recording_root(Path(source))
@@ -143,6 +147,12 @@ def write_campaign(
     }
     write_json(folder / "import.json", report)
     return report
+
+
+def _has_stand_in(channel_map: ChannelMap) -> bool:
+    """Return whether another quantity is mapped to the brake pressure, whose scale nobody knows."""
+    entry = channel_map.channels.get("brake_pressure")
+    return entry is not None and entry.gain is not None
 
 
 def _brake_facts(channel_map: ChannelMap) -> dict[str, str]:

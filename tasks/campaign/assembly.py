@@ -43,11 +43,14 @@ class Assembled:
     start : the logger's time of the first sample [s]
     columns : channels by name, each float64 [N], in campaign units, NaN between the samples of a slow channel; empty
         if there are problems
+    readable : channels that can be read, each float64 [N], in campaign units, with values between the
+        samples of a slow channel too: for the checks that need all runs
     problems : one sentence each
     """
 
     start: float
     columns: dict[str, NDArray[np.float64]]
+    readable: dict[str, NDArray[np.float64]]
     problems: tuple[str, ...]
 
 
@@ -80,7 +83,7 @@ def assemble_run(
     problems = _write_sentences(found)
     usable = {channel: signals for channel, signals in parts.items() if not _is_unreadable(signals)}
     if not usable:
-        return Assembled(start=start, columns={}, problems=tuple(problems))
+        return Assembled(start=start, columns={}, readable={}, problems=tuple(problems))
     problems += _find_short_channels(usable)
     problems += _find_high_rate(usable, rate)
     clock = make_common_clock([signal for signals in usable.values() for signal in signals], rate)
@@ -89,7 +92,7 @@ def assemble_run(
             f"has {len(clock)} samples at {rate:g} Hz that all channels share; a run needs {LEAST_SAMPLES}: widen its"
             " window, or correct the unit of time"
         )
-        return Assembled(start=start, columns={}, problems=tuple(problems))
+        return Assembled(start=start, columns={}, readable={}, problems=tuple(problems))
     columns = {
         channel: np.mean([resample_on_clock(signal, clock) for signal in signals], axis=0)
         for channel, signals in usable.items()
@@ -98,11 +101,11 @@ def assemble_run(
     whole = {channel: values for channel, values in columns.items() if channel not in broken}
     problems += plausibility_problems(whole, 1.0 / rate, {rule.channel: rule.unit for rule in rules})
     if problems:
-        return Assembled(start=float(clock[0]), columns={}, problems=tuple(problems))
+        return Assembled(start=float(clock[0]), columns={}, readable=whole, problems=tuple(problems))
     cleared = {
         name: clear_between_samples(name, values, usable[name], clock) for name, values in columns.items()
     }
-    return Assembled(start=float(clock[0]), columns=cleared, problems=())
+    return Assembled(start=float(clock[0]), columns=cleared, readable=whole, problems=())
 
 
 def _write_sentences(found: list[tuple[str, str]]) -> list[str]:

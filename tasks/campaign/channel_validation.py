@@ -20,8 +20,6 @@ ROUNDING_STEP = 1e-6
 """Share of the largest value below which a step is rounding of a resampled value, and no step of the sensor [1]."""
 SMOOTHING = 0.2
 """Width of the mean over which two channels are compared [s]."""
-DECELERATION_PER_PRESSURE = (0.3, 8.0)
-"""Deceleration that a road car's brake may give per pressure; the paper's vehicle has 2.4 [m/s^2 per MPa]."""
 DIVE_PER_DECELERATION = (0.02, 2.0)
 """Pitch that a road car's body gives per deceleration; the paper's vehicle has 0.4 [deg per m/s^2]."""
 ROLLING_RADIUS = (0.2, 0.6)
@@ -131,7 +129,7 @@ def plausibility_problems(
                 f"channel {name} falls to {low:.4g} {channel.unit}, which no road car does (limit {channel.lowest:g}):"
                 " turn its sign over, or correct its offset"
             )
-    smooth = {name: _moving_mean(values, interval) for name, values in columns.items()}
+    smooth = {name: smooth_channel(values, interval) for name, values in columns.items()}
     problems += _radius_problems(smooth, interval)
     problems += brake_problems(columns, smooth, interval, stands_in=stands_in)
     if "speed" in smooth:
@@ -145,7 +143,8 @@ def plausibility_problems(
                 0.8,
                 units["longitudinal_acceleration"],
             )
-        problems += _braking_problems(smooth, rate, interval, stands_in)
+        if "pitch" in smooth:
+            problems += _pitch_problems(smooth, rate, interval)
     if "pitch" in smooth and "pitch_rate" in smooth:
         slope = np.gradient(smooth["pitch"], interval)
         problems += _pair_problems(
@@ -236,31 +235,20 @@ def _pair_problems(
     ]
 
 
-def _braking_problems(
-    columns: Mapping[str, NDArray[np.float64]], rate: NDArray[np.float64], interval: float, stands_in: bool
+def _pitch_problems(
+    columns: Mapping[str, NDArray[np.float64]], rate: NDArray[np.float64], interval: float
 ) -> list[str]:
+    """Check the sign and the size of the pitch of a car that brakes."""
     moving = columns["speed"] > MOVING
     braking = moving & (rate < -1.0)
     if "brake_pressure" in columns:
         braking &= columns["brake_pressure"] > 0.1 * float(np.max(columns["brake_pressure"]))
     if np.count_nonzero(braking) < 20:
         return []
-    problems = []
-    if "pitch" in columns:
-        # changes over half a second: the body's response to the brake, without the slow slope of the road
-        lag = max(round(0.5 / interval), 1)
-        dive, less = columns["pitch"][lag:] - columns["pitch"][:-lag], rate[:-lag] - rate[lag:]
-        found = _pair_problems("pitch", dive, "the deceleration", less, 0.5, None)
-        problems += found or _dive_problems(dive, less)
-    if "brake_pressure" in columns and not stands_in:
-        gain = -float(np.mean(rate[braking])) / float(np.mean(columns["brake_pressure"][braking]))
-        low, high = DECELERATION_PER_PRESSURE
-        if not low < gain < high:
-            problems.append(
-                f"channel brake_pressure gives {gain:.3g} m/s^2 per MPa, which must lie in {low:g} to {high:g}:"
-                " correct its unit or scale"
-            )
-    return problems
+    # changes over half a second: the body's response to the brake, without the slow slope of the road
+    lag = max(round(0.5 / interval), 1)
+    dive, less = columns["pitch"][lag:] - columns["pitch"][:-lag], rate[:-lag] - rate[lag:]
+    return _pair_problems("pitch", dive, "the deceleration", less, 0.5, None) or _dive_problems(dive, less)
 
 
 def _dive_problems(dive: NDArray[np.float64], less: NDArray[np.float64]) -> list[str]:
@@ -278,6 +266,13 @@ def _dive_problems(dive: NDArray[np.float64], less: NDArray[np.float64]) -> list
     ]
 
 
-def _moving_mean(values: NDArray[np.float64], interval: float) -> NDArray[np.float64]:
+def smooth_channel(values: NDArray[np.float64], interval: float) -> NDArray[np.float64]:
+    """Return the mean of a channel over `SMOOTHING`, float64 [M], where the whole window lies within it.
+
+    Parameters
+    ----------
+    values : float64 [N]
+    interval : of their clock [s]
+    """
     width = min(max(round(SMOOTHING / interval), 1), len(values))
     return np.convolve(values, np.ones(width) / width, mode="valid")

@@ -73,8 +73,6 @@ def shift_channel(seconds: float) -> Callable[[Columns], Columns]:
         ("acceleration turned over", scale_channel("longitudinal_acceleration", factor=-1), 1.0),
         ("acceleration in g", scale_channel("longitudinal_acceleration", factor=1 / 9.81), 1.0),
         ("speed in km/h", scale_channel("speed", factor=3.6), 1.0),
-        ("pressure in bar", scale_channel("brake_pressure", factor=10), 0.9),
-        ("pressure a tenth", scale_channel("brake_pressure", factor=0.1), 1.0),
         ("pitch in rad", scale_channel("pitch", factor=np.pi / 180), 1.0),
         ("frozen pitch", hold_channel("pitch"), 1.0),
         ("frozen speed", hold_channel("speed"), 1.0),
