@@ -63,8 +63,9 @@ def import_measurements(
         channel_map, map_file = load_channel_map(map)
     except FaultyMap as faults:
         raise InputError([*faults.problems, *_signal_problems(Path(source), faults.readable)]) from None
+    root = recording_root(Path(source))
     recordings = _read_all(recording_files(Path(source), channel_map), channel_map)
-    planned = plan_runs(channel_map, recordings)
+    planned = plan_runs(channel_map, root, recordings)
     if problems := find_run_problems(planned, recordings, channel_map.sample_rate_hz):
         raise InputError(problems)
     made = [
@@ -84,7 +85,6 @@ def import_measurements(
         problems += gain_problems(readable, 1.0 / channel_map.sample_rate_hz)
     if problems:
         raise InputError(problems)
-    root = recording_root(Path(source))
     sources = {
         file.relative_to(root).as_posix(): sha256_of_file(file)
         for recording in recordings

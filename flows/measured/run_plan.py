@@ -28,8 +28,16 @@ class PlannedRun:
     conditions: Conditions
 
 
-def plan_runs(channel_map: ChannelMap, recordings: dict[Path, dict[str, Signal]]) -> list[PlannedRun]:
+def plan_runs(
+    channel_map: ChannelMap, root: Path, recordings: dict[Path, dict[str, Signal]]
+) -> list[PlannedRun]:
     """The runs that a map asks for: as it lists them, one per brake application, or one per file.
+
+    Parameters
+    ----------
+    channel_map : lists the runs, or says how to cut them
+    root : folder in which the map's files lie
+    recordings : signals of each file
 
     Raises
     ------
@@ -39,7 +47,7 @@ def plan_runs(channel_map: ChannelMap, recordings: dict[Path, dict[str, Signal]]
     runs = [
         PlannedRun(
             name=run.name,
-            file=next(file for file in recordings if file.match(run.file)),
+            file=root / run.file,
             start=-inf if run.from_s is None else run.from_s,
             end=inf if run.to_s is None else run.to_s,
             part=run.part,

@@ -107,6 +107,21 @@ def test_files_of_one_name_in_two_folders_are_told_apart(tmp_path: Path) -> None
     assert "monday/log" in (tmp_path / "campaign" / "runs.csv").read_text()
 
 
+@pytest.mark.parametrize("other", ["day1/stop.csv", "Lap [3].csv"])
+def test_a_run_is_of_the_file_that_its_path_names(tmp_path: Path, other: str) -> None:
+    """No pattern: `stop.csv` is not the file of that name in a folder, and brackets are letters."""
+    files = {other: 3.0, "stop.csv": 4.0}
+    for file, seconds in files.items():
+        (tmp_path / "logs" / file).parent.mkdir(parents=True, exist_ok=True)
+        write_csv(tmp_path / "logs" / file, log_signal(braking_columns(seconds)))
+    runs = [{"name": f"r{number}", "file": file} for number, file in enumerate(files)]
+    report = import_measurements(
+        str(tmp_path / "logs"), map=write_map(tmp_path, runs=runs), out=str(tmp_path / "campaign")
+    )
+    assert [run["file"] for run in report["runs"]] == list(files)
+    assert [run["duration_s"] for run in report["runs"]] == pytest.approx([3.0, 4.0], abs=0.1)
+
+
 def test_one_run_per_brake_application_every_third_held_out(tmp_path: Path) -> None:
     columns = braking_columns(seconds=12.0)
     t = columns["time"]
