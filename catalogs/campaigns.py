@@ -29,6 +29,7 @@ from tasks.campaign.campaign import (
     find_motion,
 )
 from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME
+from tasks.campaign.resting_pressure import measure_resting_levels, resting_problems
 from tasks.campaign.run_validation import COLUMN_UNITS, LEAST_SAMPLES, run_problems
 from tasks.campaign.slow_channels import collect_samples, fill_between_samples
 from tasks.errors import InputError
@@ -139,6 +140,7 @@ def read_campaign(folder: str | Path) -> Campaign:
             runs.append(run.begin_at(first) if first else run)
     if header.brake_stands_for is None:
         problems += gain_problems(readable, interval)
+        problems += resting_problems(measure_resting_levels(readable, interval))
     if problems:
         raise InputError(cap_problems([f"{shorten(folder.name)}: {problem}" for problem in problems]))
     split = "\n".join(["train", *sorted(train), "held_out", *sorted(held_out)])

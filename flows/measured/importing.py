@@ -20,6 +20,7 @@ from manifests.canonical import sha256_of_file
 from tasks.campaign.assembly import Assembled, assemble_run
 from tasks.campaign.brake_gain import gain_problems
 from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME
+from tasks.campaign.resting_pressure import describe_drift, measure_resting_levels, resting_problems
 from tasks.campaign.signals import Signal
 from tasks.campaign.slow_channels import measure_slow_rates
 from tasks.errors import InputError
@@ -40,8 +41,8 @@ def import_measurements(
     Returns
     -------
     Report on what was made: ``campaign``, ``runs[]``, ``channels``, ``slow_channels_hz`` (of the channels slower than
-    their runs), ``not_measured``, ``assumed_tolerances_1sigma`` (what the map leaves open), ``sources``; or
-    ``signals``, a row for each in every recording.
+    their runs), ``not_measured``, ``assumed_tolerances_1sigma`` (what the map leaves open), ``sources``, and
+    ``warning`` where the gauge of the brake pressure drifts; or ``signals``, a row for each in every recording.
 
     Raises
     ------
@@ -80,9 +81,14 @@ def import_measurements(
     problems = [
         f"{run.name} ({run.file.name}): {problem}" for run, found in made for problem in found.problems
     ]
+    levels: dict[str, float] = {}
     if not _has_stand_in(channel_map):
-        readable = {run.name: found.readable for run, found in made}
-        problems += gain_problems(readable, 1.0 / channel_map.sample_rate_hz)
+        readable, interval = (
+            {run.name: found.readable for run, found in made},
+            1.0 / channel_map.sample_rate_hz,
+        )
+        levels = measure_resting_levels(readable, interval)
+        problems += gain_problems(readable, interval) + resting_problems(levels)
     if problems:
         raise InputError(problems)
     sources = {
@@ -90,7 +96,8 @@ def import_measurements(
         for recording in recordings
         for file in stored_files(recording)
     }
-    return write_campaign(folder, root, channel_map, made, sources, sha256_of_file(map_file))
+    warning = describe_drift(levels)
+    return write_campaign(folder, root, channel_map, made, sources, sha256_of_file(map_file), warning)
 
 
 def write_campaign(
@@ -100,6 +107,7 @@ def write_campaign(
     made: list[tuple[PlannedRun, Assembled]],
     sources: dict[str, str],
     map_hash: str,
+    warning: str | None,
 ) -> dict[str, Any]:
     """Write the folder and say what is in it; campaign.yaml comes last, so that it marks a whole campaign."""
     rate = channel_map.sample_rate_hz
@@ -144,6 +152,7 @@ def write_campaign(
         "not_measured": list(channel_map.not_measured),
         "assumed_tolerances_1sigma": channel_map.tolerances_1sigma.list_assumed(),
         "sources": sources,
+        **({} if warning is None else {"warning": warning}),
     }
     write_json(folder / "import.json", report)
     return report

@@ -115,6 +115,17 @@ def test_no_campaign_has_more_samples_than_were_measured(tmp_path: Path, rate: f
         )
 
 
+def test_a_gauge_that_does_not_rest_at_0_is_told_with_its_offset(tmp_path: Path) -> None:
+    runs = [{"name": name, "file": "log.csv"} for name in ("a", "b")]
+    log = log_signal(braking_columns())
+    text = problems_of(tmp_path, log | {"p_bar": log["p_bar"] + 0.8}, runs=runs)
+    assert "brake_pressure rests at 0.079 MPa while the car does not brake, in 2 runs alike" in text
+    write_csv(tmp_path / "other.csv", log)
+    channel_map = write_map(tmp_path, runs=[runs[0], runs[1] | {"file": "other.csv"}])
+    report = import_measurements(str(tmp_path), map=channel_map, out=str(tmp_path / "campaign"))
+    assert "set the gauge to zero" in report["warning"]
+
+
 def test_a_standing_car_does_not_freeze_its_sensors(tmp_path: Path) -> None:
     columns = braking_columns()
     for name in columns:

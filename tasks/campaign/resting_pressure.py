@@ -1,0 +1,103 @@
+"""Validation of the brake pressure at rest: a gauge that reads more than 0 while nobody brakes.
+
+The model would brake with that pressure, and a fit would find a brake that does nothing below it.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.campaign.brake_validation import MOVING
+from tasks.campaign.channel_validation import smooth_channel
+from tasks.campaign.gauge import RESTING_PRESSURE
+
+RELEASED = 0.1
+"""Share of the run's range of pressure, from its lowest, within which the brake is taken to be released [1]."""
+LOWEST = 0.05
+"""Quantile of the pressure of a moving car that counts as its lowest [1]."""
+SHORTEST_REST = 0.5
+"""Time before the first application in which the pressure must rest [s]."""
+STEADY = 0.02
+"""Interquartile range of a pressure that rests at most; a foot on the pedal varies more [MPa]."""
+ROLLING = 1.0
+"""Deceleration of a car that rolls, in gear or on a slope, at most; 0.4 MPa of brake pressure give as much [m/s^2]."""
+DRIFT = 0.04
+"""Pressure at rest from which a gauge that drifts is told [MPa]: the model brakes by 0.1 m/s^2; gauges resolve 0.03."""
+FEWEST_RUNS = 2
+"""Runs that rest at one level from which it is the gauge's and not the driver's [1]."""
+
+
+def measure_resting_levels(
+    runs: Mapping[str, Mapping[str, NDArray[np.float64]]], interval: float
+) -> dict[str, float]:
+    """Return the pressure that the gauge reads before the first application, for each run in which it rests [MPa].
+
+    Parameters
+    ----------
+    runs : channels of each run by name, each float64 [N], in campaign units
+    interval : of their clock [s]
+    """
+    levels = {run: _measure_level(columns, interval) for run, columns in runs.items()}
+    return {run: level for run, level in levels.items() if level is not None}
+
+
+def resting_problems(levels: Mapping[str, float]) -> list[str]:
+    """Return the problem of a gauge that rests above 0 by the same pressure in all runs: an offset corrects it.
+
+    Parameters
+    ----------
+    levels : pressure at rest by run [MPa]
+    """
+    if not _is_offset(levels):
+        return []
+    level = float(np.median(list(levels.values())))
+    return [
+        f"channel brake_pressure rests at {level:.3f} MPa while the car does not brake, in {len(levels)} runs alike:"
+        f" lower its offset by {level:.3f} (offset: {-level:.3f} where the map gives none)"
+    ]
+
+
+def describe_drift(levels: Mapping[str, float]) -> str | None:
+    """Return a warning of a gauge that rests above 0 in some runs, which no offset corrects; None if it does not.
+
+    Parameters
+    ----------
+    levels : pressure at rest by run [MPa]
+    """
+    if not levels or max(levels.values()) < DRIFT or _is_offset(levels):
+        return None
+    low, high = min(levels, key=lambda run: levels[run]), max(levels, key=lambda run: levels[run])
+    return (
+        f"channel brake_pressure rests at {levels[low]:.3f} ({low}) to {levels[high]:.3f} MPa ({high}) while the car"
+        " does not brake: the model brakes with it; set the gauge to zero before every run"
+    )
+
+
+def _is_offset(levels: Mapping[str, float]) -> bool:
+    """Return whether all runs rest above 0, and one offset leaves less than the pressure that counts as none."""
+    if len(levels) < FEWEST_RUNS:
+        return False
+    values = np.array(list(levels.values()))
+    return float(np.median(values)) > RESTING_PRESSURE and float(np.ptp(values)) <= RESTING_PRESSURE
+
+
+def _measure_level(columns: Mapping[str, NDArray[np.float64]], interval: float) -> float | None:
+    """Return the pressure before the first application [MPa]; None where it does not rest there."""
+    if not {"brake_pressure", "speed"} <= columns.keys():
+        return None
+    pressure = smooth_channel(columns["brake_pressure"], interval)
+    speed = smooth_channel(columns["speed"], interval)
+    moving = np.flatnonzero(speed > MOVING)
+    if not moving.size:
+        return None
+    lowest, highest = float(np.quantile(pressure[moving], LOWEST)), float(np.max(pressure[moving]))
+    applied = np.flatnonzero(pressure > lowest + max(RELEASED * (highest - lowest), STEADY))
+    before = moving[moving < (applied[0] if applied.size else len(pressure))]
+    if len(before) * interval < SHORTEST_REST:
+        return None
+    low, level, high = np.quantile(pressure[before], (0.25, 0.5, 0.75))
+    if high - low > STEADY:
+        return None
+    slower = float(speed[before[0]] - speed[before[-1]]) / (len(before) * interval)
+    return float(level) if slower < ROLLING else None
