@@ -42,7 +42,8 @@ def import_measurements(
     -------
     Report on what was made: ``campaign``, ``runs[]``, ``channels``, ``slow_channels_hz`` (of the channels slower than
     their runs), ``not_measured``, ``assumed_tolerances_1sigma`` (what the map leaves open), ``sources``, and
-    ``warning`` where the gauge of the brake pressure drifts; or ``signals``, a row for each in every recording.
+    ``warning`` where the gauge of the brake pressure drifts, ``left_out[]`` (why) where segments are no runs; or
+    ``signals``, a row for each in every recording.
 
     Raises
     ------
@@ -66,7 +67,7 @@ def import_measurements(
         raise InputError([*faults.problems, *_signal_problems(Path(source), faults.readable)]) from None
     root = recording_root(Path(source))
     recordings = _read_all(recording_files(Path(source), channel_map), channel_map)
-    planned = plan_runs(channel_map, root, recordings)
+    planned, left_out = plan_runs(channel_map, root, recordings)
     if problems := find_run_problems(planned, recordings, channel_map.sample_rate_hz):
         raise InputError(problems)
     made = [
@@ -83,10 +84,8 @@ def import_measurements(
     ]
     levels: dict[str, float] = {}
     if not _has_stand_in(channel_map):
-        readable, interval = (
-            {run.name: found.readable for run, found in made},
-            1.0 / channel_map.sample_rate_hz,
-        )
+        interval = 1.0 / channel_map.sample_rate_hz
+        readable = {run.name: found.readable for run, found in made}
         levels = measure_resting_levels(readable, interval)
         problems += gain_problems(readable, interval) + resting_problems(levels)
     if problems:
@@ -96,8 +95,12 @@ def import_measurements(
         for recording in recordings
         for file in stored_files(recording)
     }
-    warning = describe_drift(levels)
-    return write_campaign(folder, root, channel_map, made, sources, sha256_of_file(map_file), warning)
+    beside: dict[str, Any] = {}
+    if warning := describe_drift(levels):
+        beside["warning"] = warning
+    if left_out:
+        beside["left_out"] = left_out
+    return write_campaign(folder, root, channel_map, made, sources, sha256_of_file(map_file), beside)
 
 
 def write_campaign(
@@ -107,7 +110,7 @@ def write_campaign(
     made: list[tuple[PlannedRun, Assembled]],
     sources: dict[str, str],
     map_hash: str,
-    warning: str | None,
+    beside: dict[str, Any],
 ) -> dict[str, Any]:
     """Write the folder and say what is in it; campaign.yaml comes last, so that it marks a whole campaign."""
     rate = channel_map.sample_rate_hz
@@ -152,7 +155,7 @@ def write_campaign(
         "not_measured": list(channel_map.not_measured),
         "assumed_tolerances_1sigma": channel_map.tolerances_1sigma.list_assumed(),
         "sources": sources,
-        **({} if warning is None else {"warning": warning}),
+        **beside,
     }
     write_json(folder / "import.json", report)
     return report

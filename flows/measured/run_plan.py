@@ -10,9 +10,10 @@ from catalogs.campaign_files import MOST_SAMPLES
 from catalogs.channel_maps import ChannelMap, SegmentEntry
 from catalogs.channel_maps.conditions import Conditions
 from catalogs.names import name_problem
-from catalogs.sentences import shorten
-from tasks.campaign.episodes import pressure_episodes
-from tasks.campaign.signals import Signal, convert_to_channel
+from catalogs.sentences import cap_problems, shorten
+from tasks.campaign.channels import BRAKE_SIGNALS
+from tasks.campaign.segments import SegmentRule, cut_segments, find_brake_rule
+from tasks.campaign.signals import Signal
 from tasks.errors import InputError
 
 
@@ -30,8 +31,10 @@ class PlannedRun:
 
 def plan_runs(
     channel_map: ChannelMap, root: Path, recordings: dict[Path, dict[str, Signal]]
-) -> list[PlannedRun]:
+) -> tuple[list[PlannedRun], list[str]]:
     """The runs that a map asks for: as it lists them, one per brake application, or one per file.
+
+    Brake applications that are no runs are told beside them, one sentence each.
 
     Parameters
     ----------
@@ -44,6 +47,8 @@ def plan_runs(
     InputError
         If there is none.
     """
+    if channel_map.segment is not None:
+        return _cut_recordings(channel_map, channel_map.segment, root, recordings)
     runs = [
         PlannedRun(
             name=run.name,
@@ -55,7 +60,7 @@ def plan_runs(
         )
         for run in channel_map.runs
     ]
-    if not runs and channel_map.segment is None:
+    if not runs:
         runs = [
             PlannedRun(
                 name=file.stem,
@@ -67,11 +72,7 @@ def plan_runs(
             )
             for file in recordings
         ]
-    if channel_map.segment is not None:
-        runs = _cut_segments(channel_map, channel_map.segment, recordings)
-    if not runs:
-        raise InputError("the map's segment finds no brake application: lower above_mpa or minimum_s")
-    return runs
+    return runs, []
 
 
 def find_run_problems(
@@ -119,30 +120,45 @@ def _shared_stretches(planned: list[PlannedRun]) -> list[str]:
     return problems
 
 
-def _cut_segments(
-    channel_map: ChannelMap, segment: SegmentEntry, recordings: dict[Path, dict[str, Signal]]
-) -> list[PlannedRun]:
-    rule = next((rule for rule in channel_map.rules if rule.channel == "brake_pressure"), None)
+def _cut_recordings(
+    channel_map: ChannelMap, segment: SegmentEntry, root: Path, recordings: dict[Path, dict[str, Signal]]
+) -> tuple[list[PlannedRun], list[str]]:
+    rule = find_brake_rule(channel_map.rules)
     if rule is None:
-        raise InputError("a map with segment needs the channel brake_pressure")
-    runs: list[PlannedRun] = []
-    for file, signals in recordings.items():
-        pressure = convert_to_channel(signals[rule.sources[0]], rule)
-        episodes = pressure_episodes(
-            pressure.time, pressure.values, threshold=segment.above_mpa, merge_gap=segment.merge_gap_s
+        raise InputError(
+            f"a map with segment needs one of the channels {', '.join(BRAKE_SIGNALS)}: it names none"
         )
-        for episode in episodes:
-            if episode.duration < segment.minimum_s:
+    cut = SegmentRule(
+        threshold=segment.above_mpa,
+        merge_gap=segment.merge_gap_s,
+        minimum=segment.minimum_s,
+        before=segment.before_s,
+        after=segment.after_s,
+    )
+    runs: list[PlannedRun] = []
+    left_out: list[str] = []
+    for file, signals in recordings.items():
+        for part in cut_segments(signals, channel_map.rules, rule, cut):
+            if part.fault:
+                place = f"{shorten(file.relative_to(root))} from {part.start:.3f} to {part.end:.3f} s"
+                left_out.append(f"{place}: {part.fault}")
                 continue
             number = len(runs) + 1
             runs.append(
                 PlannedRun(
                     name=f"run-{number:02d}",
                     file=file,
-                    start=max(episode.onset_time - segment.before_s, float(pressure.time[0])),
-                    end=min(episode.end_time + segment.after_s, float(pressure.time[-1])),
+                    start=part.start,
+                    end=part.end,
                     part="held_out" if number % segment.held_out_every == 0 else "train",
                     conditions=channel_map.conditions,
                 )
             )
-    return runs
+    if not runs:
+        raise InputError(
+            [
+                "the map's segment finds no brake application that is a run: lower above_mpa or minimum_s",
+                *cap_problems(left_out),
+            ]
+        )
+    return runs, left_out

@@ -46,6 +46,17 @@ def signal_problems(signal: Signal) -> list[str]:
         problems.append(
             f"has {np.count_nonzero(bad)} samples that are not numbers, the first at {at:.3f} s: cut the run there"
         )
+    return problems + clock_problems(signal)
+
+
+def clock_problems(signal: Signal) -> list[str]:
+    """Return the problems of a signal's clock: gaps, and times that do not advance.
+
+    Parameters
+    ----------
+    signal : of at least 2 samples
+    """
+    problems = []
     steps = np.diff(signal.time)
     usual = float(np.median(steps))
     back = np.flatnonzero(steps <= 0)

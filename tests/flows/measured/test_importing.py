@@ -15,6 +15,7 @@ from catalogs.entries import entry_names
 from flows.commands.measured_results import shorten_import
 from flows.measured.importing import import_measurements
 from tasks.campaign.campaign import CHANNELS
+from tasks.campaign.channels import MAIN_CHANNELS
 from tasks.errors import InputError
 from tests.campaign.recorded import braking_columns, log_signal
 from tests.flows.measured.recordings import Columns, import_columns, write_csv, write_map
@@ -145,6 +146,33 @@ def test_one_run_per_brake_application_every_third_held_out(tmp_path: Path) -> N
         ("run-01", "train"), ("run-02", "train"), ("run-03", "held_out"),
     ]  # fmt: skip
     assert [run["start_s"] for run in report["runs"]] == pytest.approx([1.02, 4.02, 7.02], abs=0.02)
+
+
+def test_a_segment_that_is_no_run_is_listed_and_the_others_come_in(tmp_path: Path) -> None:
+    columns = braking_columns(seconds=12.0)
+    t = columns["time"]
+    applied = sum(((t >= start) & (t < start + 1.0)).astype(float) for start in (0.2, 5.0, 8.0))
+    columns["brake_pressure"] = 0.9 * applied + 0.001 * np.sin(40 * t)
+    driven = np.where(t < 2.0, 0.0, np.minimum(10.0 * (t - 2.0), 20.0 + 0.1 * t))
+    columns["speed"] = driven - np.cumsum(2.0 * applied * (t > 2.0)) / 100
+    command = write_csv(
+        tmp_path / "log.csv", log_signal(columns) | {"pedal": columns["brake_pressure"] * 10.0}
+    )
+    segment = {
+        "above_mpa": 0.5, "merge_gap_s": 0.1, "minimum_s": 0.5, "before_s": 2.5, "after_s": 0.8, "held_out_every": 2,
+    }  # fmt: skip
+    channels = {
+        "brake_command": {"source": "pedal", "unit": "%"},
+        "speed": {"source": "v_kmh", "unit": "km/h"},
+    }
+    others = [channel.name for channel in MAIN_CHANNELS if channel.name != "speed"]
+    channel_map = write_map(tmp_path, segment=segment, channels=channels, not_measured=others)
+    report = import_measurements(command, map=channel_map, out=str(tmp_path / "campaign"))
+    (left_out,) = report["left_out"]
+    assert left_out.startswith("log.csv from 0.000 to 1.990 s: the car stands")
+    assert [(run["run"], run["start_s"]) for run in report["runs"]] == [
+        ("run-01", pytest.approx(2.5)), ("run-02", pytest.approx(6.79)),
+    ]  # fmt: skip
 
 
 def test_the_same_recording_gives_the_same_bytes(tmp_path: Path) -> None:

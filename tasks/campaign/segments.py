@@ -1,0 +1,123 @@
+"""Segments of a whole drive, one per brake application, and why some of them are no runs."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tasks.campaign.brake_validation import MOVING
+from tasks.campaign.campaign import CHANNELS
+from tasks.campaign.channel_validation import clock_problems
+from tasks.campaign.channels import BRAKE_SIGNALS
+from tasks.campaign.episodes import Episode, pressure_episodes
+from tasks.campaign.signals import ChannelRule, Signal, convert_to_channel
+from tasks.campaign.slow_channels import take_updates
+
+
+@dataclass(frozen=True, kw_only=True)
+class SegmentRule:
+    """How a drive is cut.
+
+    Parameters
+    ----------
+    threshold : pressure from which the brake counts as applied, or what stands for it [MPa]
+    merge_gap : applied samples at most this far apart are one application [s]
+    minimum : duration of an application from which it is a segment [s]
+    before, after : time of the segment before and after its application [s]
+    """
+
+    threshold: float
+    merge_gap: float
+    minimum: float
+    before: float
+    after: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Segment:
+    """One brake application with the time about it.
+
+    Parameters
+    ----------
+    start, end : in the logger's time [s]
+    fault : why it is no run; empty where it is one
+    """
+
+    start: float
+    end: float
+    fault: str = ""
+
+
+def find_brake_rule(rules: Sequence[ChannelRule]) -> ChannelRule | None:
+    """Return the rule of the best brake signal that a map names; None if it names none.
+
+    Parameters
+    ----------
+    rules : the channel map
+    """
+    by_channel = {rule.channel: rule for rule in rules}
+    return next((by_channel[name] for name in BRAKE_SIGNALS if name in by_channel), None)
+
+
+def cut_segments(
+    signals: Mapping[str, Signal], rules: Sequence[ChannelRule], brake: ChannelRule, cut: SegmentRule
+) -> list[Segment]:
+    """Return the segments of one recording, none of which begins before the end of the one before it.
+
+    Parameters
+    ----------
+    signals : logged signals by name
+    rules : the channel map
+    brake : of the signal at which the drive is cut
+    cut : how
+    """
+    applied = convert_to_channel(signals[brake.sources[0]], brake)
+    episodes = pressure_episodes(
+        applied.time,
+        BRAKE_SIGNALS[brake.channel] * applied.values,
+        threshold=cut.threshold,
+        merge_gap=cut.merge_gap,
+    )
+    parts = _convert_signals(signals, rules)
+    speed = next((signal for channel, signal in parts if channel == "speed"), None)
+    first, last = float(applied.time[0]), float(applied.time[-1])
+    segments: list[Segment] = []
+    long = [episode for episode in episodes if episode.duration >= cut.minimum]
+    for episode, following in zip(long, [*long[1:], None], strict=True):
+        start = max(episode.onset_time - cut.before, segments[-1].end if segments else first)
+        end = min(episode.end_time + cut.after, last)
+        if following is not None and end > following.onset_time:
+            end = 0.5 * (episode.end_time + following.onset_time)
+        segments.append(_judge_segment(Segment(start=start, end=end), episode, speed, parts))
+    return segments
+
+
+def _judge_segment(
+    segment: Segment, episode: Episode, speed: Signal | None, parts: Sequence[tuple[str, Signal]]
+) -> Segment:
+    """Return a segment from where the car moves, or with its fault."""
+    if speed is not None:
+        lead = speed.cut_window(segment.start, episode.onset_time)
+        slow = np.flatnonzero(lead.values < MOVING)
+        if slow.size and slow[-1] == len(lead.time) - 1:
+            return replace(
+                segment, fault=f"the car stands, or is slower than {MOVING:g} m/s, where the brake is applied"
+            )
+        if slow.size:
+            segment = replace(segment, start=float(lead.time[slow[-1] + 1]))
+    for channel, signal in parts:
+        inside = signal.cut_window(segment.start, segment.end)
+        if len(inside.time) < 2:
+            return replace(segment, fault=f"channel {channel} has {len(inside.time)} samples in it")
+        if problems := clock_problems(inside):
+            return replace(segment, fault=f"channel {channel} {problems[0]}")
+    return segment
+
+
+def _convert_signals(signals: Mapping[str, Signal], rules: Sequence[ChannelRule]) -> list[tuple[str, Signal]]:
+    """Return the signals that become channels, at their true times, with their channels."""
+    return [
+        (rule.channel, convert_to_channel(take_updates(signal) if rule.channel in CHANNELS else signal, rule))
+        for rule in rules
+        for signal in (signals[name] for name in rule.sources)
+    ]

@@ -1,0 +1,75 @@
+"""A whole drive is cut at its brake applications, and what is no run is told."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from tasks.campaign.segments import Segment, SegmentRule, cut_segments, find_brake_rule
+from tasks.campaign.signals import ChannelRule, Signal
+
+CUT = SegmentRule(threshold=0.3, merge_gap=0.5, minimum=0.5, before=2.0, after=0.5)
+SPEED = ChannelRule(channel="speed", sources=("v",), unit="m/s")
+TIME = np.arange(3000) * 0.01
+UNITS = {"brake_pressure": ("MPa", 1.0), "brake_command": ("%", 10.0), "pedal_force": ("N", 50.0)}
+"""Unit of each brake signal, and its value where 1 MPa is braked with."""
+
+
+def cut_drive(
+    *applied: tuple[float, float], channel: str = "brake_pressure", speed: NDArray[np.float64] | None = None,
+    kept: NDArray[np.bool_] | None = None,
+) -> list[Segment]:  # fmt: skip
+    """Segments of a drive of 30 s that brakes with 1 MPa from and to the given times."""
+    unit, size = UNITS[channel]
+    time, brake = TIME, np.zeros(len(TIME))
+    for start, end in applied:
+        brake[(time >= start - 1e-9) & (time <= end + 1e-9)] = size
+    rules = [SPEED, ChannelRule(channel=channel, sources=("b",), unit=unit)]
+    kept = np.ones(len(TIME), dtype=bool) if kept is None else kept
+    driven = np.full(len(TIME), 20.0) - 0.01 * TIME if speed is None else speed
+    signals = {"b": Signal(time=TIME, values=brake), "v": Signal(time=TIME[kept], values=driven[kept])}
+    rule = find_brake_rule(rules)
+    assert rule is not None
+    return cut_segments(signals, rules, rule, CUT)
+
+
+@pytest.mark.parametrize("channel", UNITS)
+def test_every_brake_signal_cuts_by_the_pressure_that_it_stands_for(channel: str) -> None:
+    (segment,) = cut_drive((10.0, 12.0), channel=channel)
+    assert (segment.start, segment.end) == pytest.approx((8.0, 12.5)) and not segment.fault
+    assert find_brake_rule([SPEED]) is None
+
+
+def test_a_segment_begins_where_the_one_before_it_ends() -> None:
+    first, second, third = cut_drive((10.0, 12.0), (13.0, 14.0), (14.6, 16.0))
+    assert (first.start, first.end) == pytest.approx((8.0, 12.5))
+    assert (second.start, second.end) == pytest.approx((12.5, 14.5))
+    assert (third.start, third.end) == pytest.approx((14.5, 16.5))
+
+
+def test_no_segment_reaches_into_the_next_application() -> None:
+    cut = SegmentRule(threshold=0.3, merge_gap=0.5, minimum=0.5, before=2.0, after=3.0)
+    brake = np.where(((TIME >= 10.0) & (TIME < 12.0)) | ((TIME >= 13.0) & (TIME < 14.0)), 1.0, 0.0)
+    rule = ChannelRule(channel="brake_pressure", sources=("b",), unit="MPa")
+    first, second = cut_segments({"b": Signal(time=TIME, values=brake)}, [rule], rule, cut)
+    assert first.end == second.start == pytest.approx(12.5, abs=0.01)
+
+
+def test_a_brake_of_a_standing_car_is_no_run() -> None:
+    speed = np.clip(2.0 * (TIME - 5.0), 0.0, 20.0)
+    standing, driving = cut_drive((0.0, 4.0), (20.0, 22.0), speed=speed)
+    assert "the car stands" in standing.fault and not driving.fault
+    (crawling,) = cut_drive((10.0, 12.0), speed=np.full(len(TIME), 1.5))
+    assert "slower than 2 m/s" in crawling.fault
+
+
+def test_a_segment_begins_where_the_car_has_driven_off() -> None:
+    (segment,) = cut_drive((10.0, 12.0), speed=np.clip(4.0 * (TIME - 8.5), 0.0, 20.0))
+    assert segment.start == pytest.approx(9.0, abs=0.011) and not segment.fault
+
+
+def test_a_segment_with_a_gap_of_its_clock_is_left_out_and_no_other() -> None:
+    kept = (TIME < 10.5) | (TIME > 11.0)
+    broken, whole = cut_drive((10.0, 12.0), (20.0, 22.0), kept=kept)
+    assert broken.fault.startswith("channel speed has 1 gaps") and not whole.fault
+    silent, whole = cut_drive((10.0, 12.0), (20.0, 22.0), kept=TIME > 15.0)
+    assert silent.fault == "channel speed has 0 samples in it" and not whole.fault
