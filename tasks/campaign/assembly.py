@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from tasks.campaign.campaign import CHANNELS
 from tasks.campaign.channel_validation import frozen_problem, plausibility_problems, signal_problems
 from tasks.campaign.channels import UNITS
+from tasks.campaign.derived_acceleration import derived_problem
 from tasks.campaign.run_validation import LEAST_SAMPLES
 from tasks.campaign.signals import (
     ChannelRule,
@@ -80,6 +81,7 @@ def assemble_run(
             found += [(rule.channel, problem) for problem in signal_problems(signal)]
         parts[rule.channel] = [convert_to_channel(signal, rule) for signal in logged]
     found += _find_frozen_channels(parts)
+    found += _find_derived_acceleration(parts, rules)
     problems = _write_sentences(found)
     usable = {channel: signals for channel, signals in parts.items() if not _is_unreadable(signals)}
     if not usable:
@@ -128,6 +130,21 @@ def _find_frozen_channels(parts: Mapping[str, list[Signal]]) -> list[tuple[str, 
         for signal in signals
         if len(signal.time) > 2 and (problem := frozen_problem(channel, signal, speed)) is not None
     ]
+
+
+def _find_derived_acceleration(
+    parts: Mapping[str, list[Signal]], rules: Sequence[ChannelRule]
+) -> list[tuple[str, str]]:
+    name = "longitudinal_acceleration"
+    delays = {rule.channel: rule.delay for rule in rules}
+    if not {name, "speed"} <= parts.keys() or any(_is_unreadable(parts[c]) for c in (name, "speed")):
+        return []
+    acceleration, speed = (
+        Signal(time=parts[channel][0].time + delays[channel], values=parts[channel][0].values)
+        for channel in (name, "speed")
+    )
+    problem = derived_problem(acceleration, speed)
+    return [] if problem is None else [(name, problem)]
 
 
 def _find_short_channels(parts: Mapping[str, list[Signal]]) -> list[str]:

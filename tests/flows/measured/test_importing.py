@@ -131,6 +131,7 @@ def test_one_run_per_brake_application_every_third_held_out(tmp_path: Path) -> N
     columns["brake_pressure"] = 0.9 * (pulses + touch) + 0.001 * np.sin(40 * t)
     columns["longitudinal_acceleration"] = -1.5 * columns["brake_pressure"] + 1e-3 * np.cos(50 * t)
     columns["speed"] = 20.0 + np.cumsum(columns["longitudinal_acceleration"]) / 100
+    columns["longitudinal_acceleration"] += 0.05 * np.cos(70 * t)  # an accelerometer of its own
     for name in ("wheel_speed_front", "wheel_speed_rear"):
         columns[name] = columns["speed"] / 0.32
     columns["pitch"] = 0.5 * columns["brake_pressure"]
