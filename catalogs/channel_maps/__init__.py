@@ -15,6 +15,7 @@ from catalogs.quantities import CatalogueEntry, Number, Text
 from catalogs.sentences import cap_problems, describe_rules, shorten, shorten_value
 from tasks.campaign.channels import CHANNELS_BY_NAME, MAIN_CHANNELS, UNITS
 from tasks.campaign.signals import ChannelRule, Gain
+from tasks.campaign.wheel_validation import describe_wheel_gain
 from tasks.errors import InputError
 
 HIGHEST_RATE = 1_000_000.0
@@ -167,7 +168,10 @@ class ChannelMap(CatalogueEntry):
                 try:
                     _ = entry.rule(name).factor
                 except InputError as error:
-                    problems += [f"channel {name}: {problem}" for problem in error.problems]
+                    problems += [
+                        f"channel {name}: {problem}{describe_wheel_gain(name, entry.unit)}"
+                        for problem in error.problems
+                    ]
         compared = [name for name in MAIN_NAMES if name in channels]
         given = [(source, name) for name in compared for source in channels[name].rule(name).sources]
         for signal in dict.fromkeys(source for source, _ in given):

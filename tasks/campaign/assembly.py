@@ -19,6 +19,7 @@ from tasks.campaign.signals import (
     resample_on_clock,
 )
 from tasks.campaign.slow_channels import clear_between_samples, take_updates
+from tasks.campaign.wheel_validation import km_h_problems
 
 ALIASES = {
     "kmh": "km/h", "kph": "km/h", "mps": "m/s", "m/s²": "m/s^2", "m/s2": "m/s^2", "Nm": "N m", "N.m": "N m",
@@ -101,7 +102,8 @@ def assemble_run(
     }
     broken = {channel for channel, _ in found}
     whole = {channel: values for channel, values in columns.items() if channel not in broken}
-    problems += plausibility_problems(whole, 1.0 / rate, {rule.channel: rule.unit for rule in rules})
+    units = {rule.channel: rule.unit for rule in rules}
+    problems += plausibility_problems(whole, 1.0 / rate, units) + km_h_problems(whole, 1.0 / rate, units)
     if problems:
         return Assembled(start=float(clock[0]), columns={}, readable=whole, problems=tuple(problems))
     cleared = {

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from tasks.campaign.brake_validation import MOVING, brake_problems
 from tasks.campaign.channels import CHANNELS_BY_NAME, UNITS, guess_unit
 from tasks.campaign.signals import Signal
+from tasks.campaign.wheel_validation import radius_problems
 
 GAP_STEPS = 5.0
 """A step between samples longer than this many median steps is a gap."""
@@ -22,10 +23,6 @@ SMOOTHING = 0.2
 """Width of the mean over which two channels are compared [s]."""
 DIVE_PER_DECELERATION = (0.02, 2.0)
 """Pitch that a road car's body gives per deceleration; the paper's vehicle has 0.4 [deg per m/s^2]."""
-ROLLING_RADIUS = (0.2, 0.6)
-"""Rolling radius of a road car [m]."""
-AXLES_APART = 0.07
-"""Share by which the rolling radii of a road car's axles differ at most [1]."""
 LARGEST_ACCELERATION, LARGEST_CORRECTION = 20.0, 0.5
 """Rate [m/s^2] and correction [m/s] by which speed changes at once at most, besides ten usual steps of its sensor."""
 
@@ -141,7 +138,7 @@ def plausibility_problems(
                 " turn its sign over, or correct its offset"
             )
     smooth = {name: smooth_channel(values, interval) for name, values in columns.items()}
-    problems += _radius_problems(smooth, interval)
+    problems += radius_problems(smooth, interval)
     problems += brake_problems(columns, smooth, interval, stands_in=stands_in)
     if "speed" in smooth:
         rate = np.gradient(smooth["speed"], interval)
@@ -185,38 +182,6 @@ def _step_problems(columns: Mapping[str, NDArray[np.float64]], interval: float) 
         f"channel speed must not jump; {wrong.size} steps do, the largest by {steps[at]:.3g} m/s at sample {at + 1}"
         f" ({(at + 1) * interval:.3f} s into the run): samples are lost or its clock jumps, cut the run there"
     ]
-
-
-def _radius_problems(columns: Mapping[str, NDArray[np.float64]], interval: float) -> list[str]:
-    problems = []
-    radii = {}
-    for name in ("wheel_speed_front", "wheel_speed_rear"):
-        if name not in columns or "speed" not in columns:
-            continue
-        rolling = (columns["speed"] > MOVING) & (np.abs(columns[name]) > 1e-3)
-        if np.count_nonzero(rolling) < 10:
-            continue
-        free = rolling & (np.gradient(columns["speed"], interval) > -1.0)
-        taken = free if np.count_nonzero(free) >= 10 else rolling
-        radius = float(np.median(columns["speed"][taken] / columns[name][taken]))
-        low, high = ROLLING_RADIUS
-        if radius < 0:
-            problems.append(f"channel {name} is negative while the car drives forward: turn its sign over")
-        elif not low < radius < high:
-            problems.append(
-                f"channels speed and {name} give a rolling radius of {radius:.3g} m, which must lie in {low:g} to"
-                f" {high:g}: correct the unit of one of them"
-            )
-        elif taken is free:
-            radii[name] = radius
-    if len(radii) == 2 and abs(np.log(radii["wheel_speed_front"] / radii["wheel_speed_rear"])) > AXLES_APART:
-        front, rear = radii.values()
-        problems.append(
-            f"channels wheel_speed_front and wheel_speed_rear give rolling radii of {front:.3g} and {rear:.3g} m, which"
-            f" must agree within {AXLES_APART:.0%}: correct the unit of one of them"
-            + (" (one looks like km/h)" if min(abs(3.6 * front - 1), abs(3.6 * rear - 1)) < 0.01 else "")
-        )
-    return problems
 
 
 def _pair_problems(

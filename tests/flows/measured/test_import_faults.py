@@ -66,6 +66,7 @@ def _held(x: np.ndarray) -> np.ndarray:
         ("pitch_rate_up", lambda x: np.degrees(x), "pitch_rate"),
         ("az", lambda x: x - 9.81, "must exclude gravity"),
         ("w_r", lambda x: -x, "wheel_speed_rear is negative"),
+        ("w_r", lambda x: 3.6 * 0.32 * x, "wheel_speed_rear looks like km/h"),
         ("pitch_up", _held, "pitch: is frozen: it holds"),
         ("v_kmh", _held, "speed: is frozen: it holds"),
         ("p_bar", lambda x: np.where(np.arange(len(x)) < 300, x, np.nan), "brake_pressure: has samples from"),
@@ -173,6 +174,14 @@ def test_a_standing_car_does_not_freeze_its_sensors(tmp_path: Path) -> None:
         (
             {"channels": {"wheel_speed_front": {"source": ["w", "w"], "unit": "rpm"}}},
             "signal w must be one measurement; it stands for wheel_speed_front, wheel_speed_front",
+        ),
+        (
+            {"channels": {"wheel_speed_rear": {"source": "w", "unit": "km/h"}}},
+            "give the source's true unit, or a gain, here of the value 1/(3.6 x radius)",
+        ),
+        (
+            {"channels": {"wheel_speed_rear": {"source": "w", "unit": "mph"}}},
+            "or a gain, here of the value 0.447/radius",
         ),
         ({"conditions": {"weather": "rain"}}, "conditions: weather rain needs precipitation_mm_h above 0"),
         ({"conditions": {"precipitation_mm_h": 25.0}}, "conditions: weather dry has no precipitation"),
