@@ -96,9 +96,12 @@ def sample_column(
     """
     time = stamps * unit_factor(clock.unit, "s")
     usable = np.isfinite(time) & ~np.isnan(values)
+    time, values = time[usable], values[usable]
     if clock.repeats == "keep_first":
-        usable &= np.concatenate(([True], np.diff(time) != 0.0))[: len(time)]
-    return Signal(time=time[usable], values=values[usable], unit=unit)
+        # among its own samples: a bus log has a row for each message, and most of its cells are empty
+        first = np.concatenate(([True], np.diff(time) != 0.0))[: len(time)]
+        time, values = time[first], values[first]
+    return Signal(time=time, values=values, unit=unit)
 
 
 def summarise_signal(name: str, signal: Signal, note: str = "") -> SignalSummary:

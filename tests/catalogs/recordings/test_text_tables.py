@@ -40,6 +40,12 @@ def test_each_value_stands_under_its_own_name(tmp_path: Path, text: bytes) -> No
     assert read(tmp_path, text) == {"t": [0.0, 1.0], "v": [10.0, 11.0]}
 
 
+@pytest.mark.parametrize("text", [b"t,p,v\n0,1,\n0,,10\n1,2,\n1,,11\n", b"t,v\n0,10\n0,12\n1,11\n1,13\n"])
+def test_the_first_sample_of_a_time_is_the_first_that_has_a_value(tmp_path: Path, text: bytes) -> None:
+    rest = "time: {source: t, repeats: keep_first}\n"
+    assert read(tmp_path, text, rest) == {"t": [0.0, 1.0], "v": [10.0, 11.0]}
+
+
 @pytest.mark.parametrize(
     ("text", "rest", "words"),
     [
