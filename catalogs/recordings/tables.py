@@ -84,10 +84,28 @@ def _take_all_parquet(path: Path, _: CsvEntry) -> tuple[Columns, dict[str, str],
     return columns | {name: np.full(rows, np.nan) for name in notes}, units, notes
 
 
+def _find_encoding(path: Path, content: bytes) -> str:
+    """Return how a text is written: UTF-8, else Latin-1, in which loggers write the signs of degree and square.
+
+    Raises
+    ------
+    InputError
+        If it holds zero bytes, as UTF-16 does, and files that are no text.
+    """
+    if b"\0" in content:
+        raise InputError(f"{path}: must be UTF-8 or Latin-1 text; it holds zero bytes: save it as UTF-8")
+    try:
+        content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return "latin-1"
+    return "utf-8-sig"
+
+
 def _load_frame(path: Path, options: CsvEntry) -> pd.DataFrame:
     content = read_content(path, "recording", LARGEST_FILE)
+    encoding = _find_encoding(path, content)
     head = content.split(b"\n", options.skip_rows + 1)[options.skip_rows : options.skip_rows + 1]
-    names = b"".join(head).decode("utf-8", "replace").strip()
+    names = b"".join(head).decode(encoding, "replace").strip()
     found = [separator for separator in SEPARATORS if separator in names]
     if found and len(options.separator) == 1 and options.separator not in names:
         raise InputError(
@@ -102,11 +120,9 @@ def _load_frame(path: Path, options: CsvEntry) -> pd.DataFrame:
                 sep=options.separator,
                 decimal=options.decimal,
                 skiprows=options.skip_rows,
-                encoding="utf-8-sig",
+                encoding=encoding,
                 index_col=False,  # else rows that end in a separator move every value to its neighbour's name
             )
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: must be UTF-8 text; it is not: save it as UTF-8") from None
     except pd.errors.ParserWarning:
         raise InputError(
             f"{path}: rows must have a name for each value; they have more values than the first line has names:"

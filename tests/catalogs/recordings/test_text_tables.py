@@ -34,6 +34,7 @@ def read(folder: Path, text: bytes, rest: str = "") -> dict[str, list[float]]:
         b"t,v\n0,10,\n1,11,\n",  # a separator at the end of each row
         b"t,v,\n0,10,\n1,11,\n",
         b"\xef\xbb\xbft,v\r\n0,10\r\n1,11\r\n",
+        "t,v,slope [\u00b0]\n0,10,1\n1,11,1\n".encode("latin-1"),
     ],
 )
 def test_each_value_stands_under_its_own_name(tmp_path: Path, text: bytes) -> None:
@@ -58,7 +59,7 @@ def test_the_first_sample_of_a_time_is_the_first_that_has_a_value(tmp_path: Path
         (b"t,v\n0,10\n1,Err\n", "", "v must be of numbers; row 2 .* 'Err': correct it, or leave it empty"),
         (b"t,v\n12:00:01,10\n12:00:02,11\n", "", "t must be of numbers; row 1 .* write times as a number of seconds"),
         (b"t,v\n2026-01-01,10\n", "", "t must be of numbers; row 1 .* write times as a number of seconds"),
-        ("t,v,\u00b0\n0,10,1\n".encode("latin-1"), "", "must be UTF-8 text; it is not: save it as UTF-8"),
+        ("t,v\n0,10\n".encode("utf-16"), "", "must be UTF-8 or Latin-1 text; it holds zero bytes: save it as UTF-8"),
     ],
 )  # fmt: skip
 def test_what_is_no_number_is_named_with_what_to_do(
@@ -66,6 +67,14 @@ def test_what_is_no_number_is_named_with_what_to_do(
 ) -> None:
     with pytest.raises(InputError, match=words):
         read(tmp_path, text, rest)
+
+
+def test_a_name_in_latin_1_is_read_as_it_is_written(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_bytes("slope [\u00b0],a [m/s\u00b2]\n1,2\n".encode("latin-1"))
+    assert [row.signal for row in summarise_signals(tmp_path / "log.csv", None)] == [
+        "slope [\u00b0]",
+        "a [m/s\u00b2]",
+    ]
 
 
 def test_a_list_of_signals_shows_those_that_are_text(tmp_path: Path) -> None:
