@@ -8,7 +8,7 @@ import yaml
 
 from catalogs.campaigns import read_campaign
 from catalogs.effects import load_effects
-from tasks.campaign.campaign import MASKED_SPEED, find_motion
+from tasks.campaign.campaign import CHANNELS, MASKED_SPEED, find_motion
 from tests.catalogs.campaign_folder import (
     NAMES,
     braking_columns,
@@ -200,6 +200,25 @@ def test_coarse_sensors_and_locked_wheels_are_no_faults(folder: Path) -> None:
     columns["wheel_speed_rear"][170:210] = 0.0
     write_run(folder, "run-02", columns)
     assert len(read_campaign(folder).runs) == 6
+
+
+def test_a_gentle_stop_behind_an_engine_that_brakes_is_no_fault_of_the_gauge(folder: Path) -> None:
+    columns = braking_columns(1)
+    columns["brake_pressure"] *= 0.1
+    columns["speed"] = 20.0 - np.cumsum(1.5 * np.clip((columns["time"] - 1.0) / 0.3, 0.0, 1.0)) * 0.01
+    columns = {name: columns[name] for name in ("time", "brake_pressure", "speed")}
+    others = [name for name in CHANNELS if name != "speed"]
+    change_header(folder, lambda h: h.update(not_measured=others))
+    write_run(folder, "run-02", columns)
+    assert len(read_campaign(folder).runs) == 6
+
+
+def test_a_gauge_that_does_not_rest_at_0_in_any_run_is_told_once(folder: Path) -> None:
+    for number, name in enumerate(NAMES):
+        columns = braking_columns(number)
+        write_run(folder, name, columns | {"brake_pressure": columns["brake_pressure"] + 0.08})
+    text = list_problems(folder)
+    assert text.count("brake_pressure rests at 0.080 MPa while the car does not brake, in 6 runs alike") == 1
 
 
 def test_every_measured_campaign_at_hand_is_sound() -> None:
