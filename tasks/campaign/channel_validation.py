@@ -95,7 +95,8 @@ def frozen_problem(name: str, signal: Signal, speed: Signal | None) -> str | Non
     jumps = differences[changes]
     beside = np.maximum(np.concatenate(([0.0], jumps)), np.concatenate((jumps, [0.0])))
     # a coarse sensor holds a value until its next step; after a freeze the next step is larger
-    coarse = beside < 1.5 * jumps.min() if len(changes) > 2 else np.zeros(len(dwells), dtype=bool)
+    step = max(float(jumps.min()), _find_smallest_step(signal.values, changes)) if len(changes) > 2 else 0.0
+    coarse = beside < 1.5 * step
     locked = signal.values[edges[:-1]] == 0.0  # a locked wheel reads 0 for a while
     held = (dwells >= FROZEN_SECONDS) & (dwells >= FROZEN_DWELLS * usual)
     held |= (dwells >= SHORT_FREEZE_SECONDS) & (dwells >= FROZEN_DWELLS * most) & ~locked
@@ -107,6 +108,21 @@ def frozen_problem(name: str, signal: Signal, speed: Signal | None) -> str | Non
         f"is frozen: it holds {signal.values[edges[at]]:.4g} for {dwells[at]:.2f} s from {signal.time[edges[at]]:.3f} s"
         " while the car moves"
     )
+
+
+def _find_smallest_step(values: NDArray[np.float64], changes: NDArray[np.int64]) -> float:
+    """Return the smallest change of a sensor, where one that a resampling split between two samples counts as one.
+
+    Parameters
+    ----------
+    values : float64 [N]
+    changes : samples after which the value is another one, int64 [M]
+    """
+    follows = np.diff(changes) == 1
+    pairs = np.abs(values[changes[:-1] + 2 * follows] - values[changes[:-1]])[follows]
+    alone = ~np.concatenate(([False], follows)) & ~np.concatenate((follows, [False]))
+    single = np.abs(values[changes + 1] - values[changes])[alone]
+    return float(np.min(np.concatenate((pairs, single)), initial=np.inf))
 
 
 def plausibility_problems(

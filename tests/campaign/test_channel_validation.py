@@ -95,7 +95,8 @@ def test_rounding_is_no_step_of_a_coarse_sensor() -> None:
     )
     time = 0.1 * np.arange(len(driven))
     rounded = driven + 1e-13 * (np.arange(len(driven)) % 2)
-    for values in (driven, rounded):
+    uneven = np.interp(time, time + 0.02 * np.sin(np.arange(len(time))), driven)  # put on an even clock
+    for values in (driven, rounded, uneven):
         signal = Signal(time=time, values=values)
         assert frozen_problem("speed", signal, signal) is None
     lost = Signal(time=time, values=np.where(driven < 80.0 / 3.6, rounded - 5.0, rounded))
