@@ -21,7 +21,6 @@ from catalogs.sentences import cap_problems, shorten, shorten_value
 from tasks.campaign.brake_gain import gain_problems
 from tasks.campaign.campaign import (
     CHANNELS,
-    MASKED_SPEED,
     SESSION,
     Campaign,
     Run,
@@ -29,8 +28,7 @@ from tasks.campaign.campaign import (
     find_motion,
 )
 from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME
-from tasks.campaign.resting_pressure import measure_resting_levels, resting_problems
-from tasks.campaign.run_validation import COLUMN_UNITS, LEAST_SAMPLES, run_problems
+from tasks.campaign.run_validation import COLUMN_UNITS, motion_problem, run_problems
 from tasks.campaign.slow_channels import collect_samples, fill_between_samples
 from tasks.errors import InputError
 
@@ -134,13 +132,12 @@ def read_campaign(folder: str | Path) -> Campaign:
         if not found and signal in columns and "speed" in columns:
             columns["brake_pressure"] = BRAKE_SIGNALS[signal] * columns[signal]
             run = _make_run(row, columns, row["run"] in judged, interval)
-            first, end = find_motion(run.speed)
-            if problem := _motion_problem(run, first, end):
+            if problem := motion_problem(run.speed, interval, run.hazard_length > 0.0):
                 problems.append(f"{run.name}: {problem}")
+            first, _ = find_motion(run.speed)
             runs.append(run.begin_at(first) if first else run)
     if header.brake_stands_for is None:
         problems += gain_problems(readable, interval)
-        problems += resting_problems(measure_resting_levels(readable, interval))
     if problems:
         raise InputError(cap_problems([f"{shorten(folder.name)}: {problem}" for problem in problems]))
     split = "\n".join(["train", *sorted(train), "held_out", *sorted(held_out)])
@@ -260,21 +257,6 @@ def _make_run(row: dict[str, str], columns: dict[str, np.ndarray], held_out: boo
         throttle=columns.get("throttle"),
         sampled=collect_samples(columns),
     )
-
-
-def _motion_problem(run: Run, first: int, end: int) -> str | None:
-    """Sentence on a run of which too little is used; None if there is enough."""
-    if end - first < LEAST_SAMPLES:
-        return (
-            f"channel speed must stay at or above {MASKED_SPEED:g} m/s for {LEAST_SAMPLES} samples; it does for"
-            f" {end - first}: the car stands or crawls, leave the run out"
-        )
-    if first and run.hazard_length > 0.0:
-        return (
-            f"channel speed must begin at or above {MASKED_SPEED:g} m/s in a run with a road feature, whose place"
-            f" counts from the first sample; it is slower for {first * run.interval:g} s: cut the run there"
-        )
-    return None
 
 
 def _make_tolerances(entry: TolerancesEntry) -> Tolerances:

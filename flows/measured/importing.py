@@ -2,12 +2,14 @@
 
 import csv
 import io
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import yaml
+from numpy.typing import NDArray
 
 from catalogs.channel_maps import ChannelMap, FaultyMap, load_channel_map
 from catalogs.channel_maps.conditions import Conditions
@@ -20,10 +22,18 @@ from manifests.canonical import sha256_of_file
 from tasks.campaign.assembly import Assembled, assemble_run
 from tasks.campaign.brake_gain import gain_problems
 from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME
-from tasks.campaign.resting_pressure import describe_drift, measure_resting_levels, resting_problems
+from tasks.campaign.resting_pressure import describe_rest, measure_resting_levels
+from tasks.campaign.run_validation import motion_problem
 from tasks.campaign.signals import Signal
 from tasks.campaign.slow_channels import measure_slow_rates
+from tasks.campaign.wheel_validation import describe_km_h
 from tasks.errors import InputError
+
+COMPUTED = (
+    "channel longitudinal_acceleration is the rate of the speed, not an accelerometer of its own: it is left out, as"
+    " under not_measured"
+)
+"""Warning of an accelerometer that is none."""
 
 
 def import_measurements(
@@ -42,7 +52,7 @@ def import_measurements(
     -------
     Report on what was made: ``campaign``, ``runs[]``, ``channels``, ``slow_channels_hz`` (of the channels slower than
     their runs), ``not_measured``, ``assumed_tolerances_1sigma`` (what the map leaves open), ``sources``, and
-    ``warning`` where the gauge of the brake pressure drifts, ``left_out[]`` (why) where segments are no runs; or
+    ``warnings[]`` (what may be wrong, or was left out), ``left_out[]`` (why) where segments are no runs; or
     ``signals``, a row for each in every recording.
 
     Raises
@@ -82,22 +92,32 @@ def import_measurements(
     problems = [
         f"{run.name} ({run.file.name}): {problem}" for run, found in made for problem in found.problems
     ]
-    levels: dict[str, float] = {}
+    interval = 1.0 / channel_map.sample_rate_hz
+    readable = {run.name: found.readable for run, found in made}
     if not _has_stand_in(channel_map):
-        interval = 1.0 / channel_map.sample_rate_hz
-        readable = {run.name: found.readable for run, found in made}
-        levels = measure_resting_levels(readable, interval)
-        problems += gain_problems(readable, interval) + resting_problems(levels)
+        problems += gain_problems(readable, interval)
+    problems += [
+        f"{run.name} ({run.file.name}): {problem}"
+        for run, found in made
+        if "speed" in found.readable
+        and (
+            problem := motion_problem(found.readable["speed"], interval, run.conditions.hazard_length_m > 0.0)
+        )
+    ]
     if problems:
         raise InputError(problems)
+    warnings = _list_warnings(channel_map, readable)
+    if any(found.computed for _, found in made):
+        channel_map, made = _leave_out_acceleration(channel_map, made)
+        warnings.append(COMPUTED)
     sources = {
         file.relative_to(root).as_posix(): sha256_of_file(file)
         for recording in recordings
         for file in stored_files(recording)
     }
     beside: dict[str, Any] = {}
-    if warning := describe_drift(levels):
-        beside["warning"] = warning
+    if warnings:
+        beside["warnings"] = warnings
     if left_out:
         beside["left_out"] = left_out
     return write_campaign(folder, root, channel_map, made, sources, sha256_of_file(map_file), beside)
@@ -159,6 +179,31 @@ def write_campaign(
     }
     write_json(folder / "import.json", report)
     return report
+
+
+def _list_warnings(channel_map: ChannelMap, readable: dict[str, dict[str, NDArray[np.float64]]]) -> list[str]:
+    """Return what may be wrong in all runs together, one sentence each."""
+    interval = 1.0 / channel_map.sample_rate_hz
+    warnings = describe_km_h(readable, interval, {rule.channel: rule.unit for rule in channel_map.rules})
+    if not _has_stand_in(channel_map):
+        rest = describe_rest(measure_resting_levels(readable, interval))
+        warnings += [] if rest is None else [rest]
+    return warnings
+
+
+def _leave_out_acceleration(
+    channel_map: ChannelMap, made: list[tuple[PlannedRun, Assembled]]
+) -> tuple[ChannelMap, list[tuple[PlannedRun, Assembled]]]:
+    """Return the map and its runs as if the acceleration stood under ``not_measured``."""
+    name = "longitudinal_acceleration"
+    channels = {channel: entry for channel, entry in channel_map.channels.items() if channel != name}
+    left = channel_map.model_copy(
+        update={"channels": channels, "not_measured": (*channel_map.not_measured, name)}
+    )
+    return left, [
+        (run, replace(found, columns={c: x for c, x in found.columns.items() if c != name}))
+        for run, found in made
+    ]
 
 
 def _has_stand_in(channel_map: ChannelMap) -> bool:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tasks.campaign.campaign import CHANNELS
 from tasks.campaign.channel_validation import frozen_problem, plausibility_problems, signal_problems
 from tasks.campaign.channels import UNITS
-from tasks.campaign.derived_acceleration import derived_problem
+from tasks.campaign.derived_acceleration import is_rate_of_speed
 from tasks.campaign.run_validation import LEAST_SAMPLES
 from tasks.campaign.signals import (
     ChannelRule,
@@ -19,7 +19,6 @@ from tasks.campaign.signals import (
     resample_on_clock,
 )
 from tasks.campaign.slow_channels import clear_between_samples, take_updates
-from tasks.campaign.wheel_validation import km_h_problems
 
 ALIASES = {
     "kmh": "km/h", "kph": "km/h", "mps": "m/s", "m/s²": "m/s^2", "m/s2": "m/s^2", "Nm": "N m", "N.m": "N m",
@@ -48,12 +47,14 @@ class Assembled:
     readable : channels that can be read, each float64 [N], in campaign units, with values between the
         samples of a slow channel too: for the checks that need all runs
     problems : one sentence each
+    computed : the logger computed the acceleration from the speed
     """
 
     start: float
     columns: dict[str, NDArray[np.float64]]
     readable: dict[str, NDArray[np.float64]]
     problems: tuple[str, ...]
+    computed: bool = False
 
 
 def assemble_run(
@@ -82,7 +83,6 @@ def assemble_run(
             found += [(rule.channel, problem) for problem in signal_problems(signal)]
         parts[rule.channel] = [convert_to_channel(signal, rule) for signal in logged]
     found += _find_frozen_channels(parts)
-    found += _find_derived_acceleration(parts, rules)
     problems = _write_sentences(found)
     usable = {channel: signals for channel, signals in parts.items() if not _is_unreadable(signals)}
     if not usable:
@@ -102,14 +102,14 @@ def assemble_run(
     }
     broken = {channel for channel, _ in found}
     whole = {channel: values for channel, values in columns.items() if channel not in broken}
-    units = {rule.channel: rule.unit for rule in rules}
-    problems += plausibility_problems(whole, 1.0 / rate, units) + km_h_problems(whole, 1.0 / rate, units)
+    problems += plausibility_problems(whole, 1.0 / rate, {rule.channel: rule.unit for rule in rules})
     if problems:
         return Assembled(start=float(clock[0]), columns={}, readable=whole, problems=tuple(problems))
     cleared = {
         name: clear_between_samples(name, values, usable[name], clock) for name, values in columns.items()
     }
-    return Assembled(start=float(clock[0]), columns=cleared, readable=whole, problems=())
+    computed = _is_acceleration_computed(parts, rules)
+    return Assembled(start=float(clock[0]), columns=cleared, readable=whole, problems=(), computed=computed)
 
 
 def _write_sentences(found: list[tuple[str, str]]) -> list[str]:
@@ -134,19 +134,17 @@ def _find_frozen_channels(parts: Mapping[str, list[Signal]]) -> list[tuple[str, 
     ]
 
 
-def _find_derived_acceleration(
-    parts: Mapping[str, list[Signal]], rules: Sequence[ChannelRule]
-) -> list[tuple[str, str]]:
+def _is_acceleration_computed(parts: Mapping[str, list[Signal]], rules: Sequence[ChannelRule]) -> bool:
+    """Return whether the acceleration is the rate of the speed, on the logger's time of both."""
     name = "longitudinal_acceleration"
     delays = {rule.channel: rule.delay for rule in rules}
-    if not {name, "speed"} <= parts.keys() or any(_is_unreadable(parts[c]) for c in (name, "speed")):
-        return []
+    if not {name, "speed"} <= parts.keys():
+        return False
     acceleration, speed = (
         Signal(time=parts[channel][0].time + delays[channel], values=parts[channel][0].values)
         for channel in (name, "speed")
     )
-    problem = derived_problem(acceleration, speed)
-    return [] if problem is None else [(name, problem)]
+    return is_rate_of_speed(acceleration, speed)
 
 
 def _find_short_channels(parts: Mapping[str, list[Signal]]) -> list[str]:

@@ -1,4 +1,4 @@
-"""Validation of an accelerometer that is none: the logger computed its signal from the speed.
+"""An accelerometer that is none: the logger computed its signal from the speed.
 
 As a second measurement it would count the noise of the speed twice, and hide what an accelerometer tells: pitch and
 slope. Receivers of satellites log such a signal beside the speed.
@@ -25,8 +25,8 @@ EVEN = 1.5
 """Steps of the clock up to which a rate is taken across them, in median steps [1]."""
 
 
-def derived_problem(acceleration: Signal, speed: Signal) -> str | None:
-    """Return the problem of an acceleration that equals a difference of the speed to rounding; None if it does not.
+def is_rate_of_speed(acceleration: Signal, speed: Signal) -> bool:
+    """Return whether an acceleration equals a difference of the speed to rounding.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def derived_problem(acceleration: Signal, speed: Signal) -> str | None:
     speed : on the same time [m/s]
     """
     if min(len(acceleration.time), len(speed.time)) < FEWEST_SAMPLES:
-        return None
+        return False
     step = np.diff(speed.time)
     usual = float(np.median(step))
     slope = np.diff(speed.values) / step
@@ -45,9 +45,7 @@ def derived_problem(acceleration: Signal, speed: Signal) -> str | None:
         (speed.time[1:], slope, even, usual),
         (speed.time[:-1], slope, even, usual),
     )
-    if not any(_is_equal_to_rounding(acceleration, speed, *rate) for rate in rates):
-        return None
-    return "is the rate of the speed, not an accelerometer of its own: list it under not_measured"
+    return any(_is_equal_to_rounding(acceleration, speed, *rate) for rate in rates)
 
 
 def _is_equal_to_rounding(

@@ -1,4 +1,4 @@
-"""Validation of the brake pressure at rest: a gauge that reads more than 0 while nobody brakes.
+"""The brake pressure at rest: a gauge that reads more than 0 while nobody brakes.
 
 The model would brake with that pressure, and a fit would find a brake that does nothing below it.
 """
@@ -42,30 +42,23 @@ def measure_resting_levels(
     return {run: level for run, level in levels.items() if level is not None}
 
 
-def resting_problems(levels: Mapping[str, float]) -> list[str]:
-    """Return the problem of a gauge that rests above 0 by the same pressure in all runs: an offset corrects it.
+def describe_rest(levels: Mapping[str, float]) -> str | None:
+    """Return a warning of a gauge that rests above 0; None if it does not.
+
+    An offset corrects a gauge that rests by the same pressure in all runs, and none one that drifts.
 
     Parameters
     ----------
     levels : pressure at rest by run [MPa]
     """
-    if not _is_offset(levels):
-        return []
-    level = float(np.median(list(levels.values())))
-    return [
-        f"channel brake_pressure rests at {level:.3f} MPa while the car does not brake, in {len(levels)} runs alike:"
-        f" lower its offset by {level:.3f} (offset: {-level:.3f} where the map gives none)"
-    ]
-
-
-def describe_drift(levels: Mapping[str, float]) -> str | None:
-    """Return a warning of a gauge that rests above 0 in some runs, which no offset corrects; None if it does not.
-
-    Parameters
-    ----------
-    levels : pressure at rest by run [MPa]
-    """
-    if not levels or max(levels.values()) < DRIFT or _is_offset(levels):
+    if _is_offset(levels):
+        level = float(np.median(list(levels.values())))
+        return (
+            f"channel brake_pressure rests at {level:.3f} MPa while the car does not brake, in {len(levels)} runs"
+            f" alike: lower its offset by {level:.3f} (offset: {-level:.3f} where the map gives none), unless the foot"
+            " was on"
+        )
+    if not levels or max(levels.values()) < DRIFT:
         return None
     low, high = min(levels, key=lambda run: levels[run]), max(levels, key=lambda run: levels[run])
     return (

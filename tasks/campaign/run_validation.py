@@ -5,6 +5,7 @@ from collections.abc import Collection, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from tasks.campaign.campaign import MASKED_SPEED, find_motion
 from tasks.campaign.channel_validation import frozen_problem, plausibility_problems, signal_problems
 from tasks.campaign.channels import CHANNELS_BY_NAME
 from tasks.campaign.signals import Signal
@@ -67,6 +68,29 @@ def run_problems(
         problems += [] if frozen is None else [f"channel {name} {frozen}"]
     taken = COLUMN_UNITS | ({"brake_pressure": "1"} if brake_stands_in else {})
     return problems + plausibility_problems(usable, interval, taken)
+
+
+def motion_problem(speed: NDArray[np.float64], interval: float, has_feature: bool) -> str | None:
+    """Return the problem of a run of which too little is used; None if there is enough.
+
+    Parameters
+    ----------
+    speed : float64 [N] [m/s]
+    interval : time between samples [s]
+    has_feature : the road has a feature, whose place counts from the first sample
+    """
+    first, end = find_motion(speed)
+    if end - first < LEAST_SAMPLES:
+        return (
+            f"channel speed must stay at or above {MASKED_SPEED:g} m/s for {LEAST_SAMPLES} samples; it does for"
+            f" {end - first}: the car stands or crawls, leave the run out"
+        )
+    if first and has_feature:
+        return (
+            f"channel speed must begin at or above {MASKED_SPEED:g} m/s in a run with a road feature, whose place"
+            f" counts from the first sample; it is slower for {first * interval:g} s: cut the run there"
+        )
+    return None
 
 
 def _clock_problems(time: NDArray[np.float64], interval: float) -> list[str]:

@@ -55,27 +55,28 @@ def radius_problems(columns: Mapping[str, NDArray[np.float64]], interval: float)
     return problems
 
 
-def km_h_problems(
-    columns: Mapping[str, NDArray[np.float64]], interval: float, units: Mapping[str, str]
+def describe_km_h(
+    runs: Mapping[str, Mapping[str, NDArray[np.float64]]], interval: float, units: Mapping[str, str]
 ) -> list[str]:
-    """Return the problems of wheel speeds in km/h that a map takes for rad/s: 1/3.6 m is a small tyre's radius too.
+    """Return warnings of wheel speeds in km/h that a map takes for rad/s: 1/3.6 m is a small tyre's radius too.
 
     Parameters
     ----------
-    columns : channels by name, each float64 [N], in campaign units
+    runs : channels of each run by name, each float64 [N], in campaign units
     interval : of their clock [s]
     units : the unit that the map gives each channel
     """
-    problems = []
+    warnings = []
     for name in WHEELS:
-        measured = _measure_radius(columns, name, interval) if units.get(name) == "rad/s" else None
-        if measured is not None and abs(3.6 * measured[0] - 1.0) < LIKE_KM_H:
-            problems.append(
-                f"channel {name} looks like km/h: speed over it is {measured[0]:.3g} m, which is 1/3.6: give unit: km/h"
-                " and gain: {value: 1/(3.6 x rolling radius in m), unit: rad/s}; if it is in rad/s all the same, give"
-                " unit: rpm and scale: 9.5493"
+        measured = [_measure_radius(columns, name, interval) for columns in runs.values()]
+        radii = [found[0] for found in measured if found is not None]
+        if units.get(name) == "rad/s" and radii and abs(3.6 * np.median(radii) - 1.0) < LIKE_KM_H:
+            warnings.append(
+                f"channel {name} looks like km/h: speed over it is {np.median(radii):.3g} m, which is 1/3.6: give"
+                " unit: km/h and gain: {value: 1/(3.6 x rolling radius in m), unit: rad/s}, unless the tyres are as"
+                " small"
             )
-    return problems
+    return warnings
 
 
 def describe_wheel_gain(channel: str, unit: str) -> str:

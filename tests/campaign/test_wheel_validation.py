@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tasks.campaign.wheel_validation import km_h_problems
+from tasks.campaign.wheel_validation import describe_km_h
 
 INTERVAL = 0.01
 SPEED = np.linspace(30.0, 10.0, 600)
@@ -21,8 +21,8 @@ SPEED = np.linspace(30.0, 10.0, 600)
     ],
 )
 def test_a_wheel_speed_in_km_h_that_is_taken_for_rad_s_is_told(radius: float, unit: str, told: bool) -> None:
-    columns = {"speed": SPEED, "wheel_speed_front": SPEED / radius}
-    problems = km_h_problems(columns, INTERVAL, {"speed": "km/h", "wheel_speed_front": unit})
+    runs = {f"run-{k}": {"speed": SPEED, "wheel_speed_front": SPEED / radius} for k in range(2)}
+    problems = describe_km_h(runs, INTERVAL, {"speed": "km/h", "wheel_speed_front": unit})
     assert len(problems) == told
     assert all("wheel_speed_front looks like km/h" in problem for problem in problems)
     assert all("1/(3.6 x rolling radius in m)" in problem for problem in problems)

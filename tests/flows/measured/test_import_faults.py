@@ -66,7 +66,7 @@ def _held(x: np.ndarray) -> np.ndarray:
         ("pitch_rate_up", lambda x: np.degrees(x), "pitch_rate"),
         ("az", lambda x: x - 9.81, "must exclude gravity"),
         ("w_r", lambda x: -x, "wheel_speed_rear is negative"),
-        ("w_r", lambda x: 3.6 * 0.32 * x, "wheel_speed_rear looks like km/h"),
+        ("w_r", lambda x: 3.6 * 0.32 * x, "(one looks like km/h)"),
         ("pitch_up", _held, "pitch: is frozen: it holds"),
         ("v_kmh", _held, "speed: is frozen: it holds"),
         ("p_bar", lambda x: np.where(np.arange(len(x)) < 300, x, np.nan), "brake_pressure: has samples from"),
@@ -84,6 +84,14 @@ def test_what_is_wrong_is_named_with_run_and_channel(
     text = problems_of(tmp_path, log)
     assert words in text
     assert all(line.startswith("log (log.csv): ") or "braking of log" in line for line in text.splitlines())
+
+
+def test_a_run_in_which_the_car_crawls_is_named(tmp_path: Path) -> None:
+    log = log_signal(braking_columns())
+    log["v_kmh"] = 3.6 + 0.001 * log["v_kmh"]
+    assert "log (log.csv): channel speed must stay at or above 2 m/s for 20 samples" in problems_of(
+        tmp_path, log
+    )
 
 
 def test_all_problems_come_at_once(tmp_path: Path) -> None:
@@ -119,12 +127,25 @@ def test_no_campaign_has_more_samples_than_were_measured(tmp_path: Path, rate: f
 def test_a_gauge_that_does_not_rest_at_0_is_told_with_its_offset(tmp_path: Path) -> None:
     runs = [{"name": name, "file": "log.csv"} for name in ("a", "b")]
     log = log_signal(braking_columns())
-    text = problems_of(tmp_path, log | {"p_bar": log["p_bar"] + 0.8}, runs=runs)
-    assert "brake_pressure rests at 0.079 MPa while the car does not brake, in 2 runs alike" in text
+    write_csv(tmp_path / "log.csv", log | {"p_bar": log["p_bar"] + 0.8})
     write_csv(tmp_path / "other.csv", log)
-    channel_map = write_map(tmp_path, runs=[runs[0], runs[1] | {"file": "other.csv"}])
-    report = import_measurements(str(tmp_path), map=channel_map, out=str(tmp_path / "campaign"))
-    assert "set the gauge to zero" in report["warning"]
+    for second, told in (("log.csv", "rests at 0.079 MPa"), ("other.csv", "set the gauge to zero")):
+        channel_map = write_map(tmp_path, runs=[runs[0], runs[1] | {"file": second}])
+        report = import_measurements(str(tmp_path), map=channel_map, out=str(tmp_path / second[:-4]))
+        assert len(report["warnings"]) == 1 and told in report["warnings"][0]
+
+
+def test_an_acceleration_that_is_the_rate_of_the_speed_is_left_out_and_told(tmp_path: Path) -> None:
+    log = log_signal(braking_columns())
+    log["ax_g"] = np.gradient(log["v_kmh"] / 3.6, 0.01) / 9.80665
+    write_csv(tmp_path / "log.csv", log)
+    report = import_measurements(str(tmp_path), map=write_map(tmp_path), out=str(tmp_path / "campaign"))
+    assert any("left out, as under not_measured" in warning for warning in report["warnings"])
+    assert "longitudinal_acceleration" in report["not_measured"]
+    assert "longitudinal_acceleration" not in report["channels"]
+    header = yaml.safe_load((tmp_path / "campaign" / "campaign.yaml").read_text())
+    assert "longitudinal_acceleration" in header["not_measured"]
+    assert "longitudinal_acceleration" not in pd.read_parquet(tmp_path / "campaign" / "runs" / "log.parquet")
 
 
 def test_a_standing_car_does_not_freeze_its_sensors(tmp_path: Path) -> None:
