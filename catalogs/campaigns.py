@@ -28,6 +28,7 @@ from tasks.campaign.campaign import (
     find_motion,
 )
 from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME
+from tasks.campaign.resting_pressure import find_gauge_zero, measure_resting_levels
 from tasks.campaign.run_validation import COLUMN_UNITS, motion_problem, run_problems
 from tasks.campaign.slow_channels import collect_samples, fill_between_samples
 from tasks.errors import InputError
@@ -140,16 +141,20 @@ def read_campaign(folder: str | Path) -> Campaign:
         problems += gain_problems(readable, interval)
     if problems:
         raise InputError(cap_problems([f"{shorten(folder.name)}: {problem}" for problem in problems]))
+    taught = {name: columns for name, columns in readable.items() if name not in judged}
+    is_gauge = signal == "brake_pressure" and header.brake_stands_for is None
+    zero = find_gauge_zero(measure_resting_levels(taught, interval)) if is_gauge else 0.0
     split = "\n".join(["train", *sorted(train), "held_out", *sorted(held_out)])
     return Campaign(
         name=header.campaign,
         vehicle=header.vehicle,
-        runs=tuple(runs),
+        runs=tuple(run.lower_pressure(zero) if zero else run for run in runs),
         tolerances=_make_tolerances(header.tolerances_1sigma),
         content_hash=digest.hexdigest(),
         split_hash=hashlib.sha256(split.encode()).hexdigest(),
         channels=tuple(name for name in CHANNELS if name in needed),
         brake_signal=signal if header.brake_stands_for is None else header.brake_stands_for,
+        gauge_zero=zero,
     )
 
 

@@ -127,6 +127,15 @@ class Run:
             else np.flatnonzero(self.sampled[:, channel])
         )
 
+    def lower_pressure(self, zero: float) -> "Run":
+        """Return a run whose brake pressure is counted from what the gauge reads at rest.
+
+        Parameters
+        ----------
+        zero : that reading [MPa]
+        """
+        return replace(self, pressure=np.maximum(self.pressure - zero, 0.0))
+
     def begin_at(self, first: int) -> "Run":
         """Return a run on a flat road from a sample on.
 
@@ -164,6 +173,7 @@ class Campaign:
     split_hash : SHA-256 over the names of the training and held-out runs
     channels : of `CHANNELS`, those that were measured
     brake_signal : signal or unit that stands for the brake pressure
+    gauge_zero : what its gauge read at rest in all runs alike, taken off their pressures [MPa]
     """
 
     name: str
@@ -174,6 +184,7 @@ class Campaign:
     split_hash: str
     channels: tuple[str, ...] = CHANNELS
     brake_signal: str = "brake_pressure"
+    gauge_zero: float = 0.0
 
     @property
     def is_measured(self) -> NDArray[np.bool_]:

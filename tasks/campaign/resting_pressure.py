@@ -42,21 +42,34 @@ def measure_resting_levels(
     return {run: level for run, level in levels.items() if level is not None}
 
 
-def describe_rest(levels: Mapping[str, float]) -> str | None:
-    """Return a warning of a gauge that rests above 0; None if it does not.
+def find_gauge_zero(levels: Mapping[str, float]) -> float:
+    """Return what a gauge reads without pressure: one level at which all runs rest; 0 where they differ [MPa].
 
-    An offset corrects a gauge that rests by the same pressure in all runs, and none one that drifts.
+    Pads that needed just that pressure to touch would brake by the same torque, so nothing is lost by taking it off.
 
     Parameters
     ----------
     levels : pressure at rest by run [MPa]
     """
-    if _is_offset(levels):
-        level = float(np.median(list(levels.values())))
+    if len(levels) < FEWEST_RUNS:
+        return 0.0
+    values = np.array(list(levels.values()))
+    level = float(np.median(values))
+    return level if level > RESTING_PRESSURE and float(np.ptp(values)) <= RESTING_PRESSURE else 0.0
+
+
+def describe_rest(levels: Mapping[str, float]) -> str | None:
+    """Return a warning of a gauge that rests above 0; None if it does not.
+
+    Parameters
+    ----------
+    levels : pressure at rest by run [MPa]
+    """
+    if zero := find_gauge_zero(levels):
         return (
-            f"channel brake_pressure rests at {level:.3f} MPa while the car does not brake, in {len(levels)} runs"
-            f" alike: lower its offset by {level:.3f} (offset: {-level:.3f} where the map gives none), unless the foot"
-            " was on"
+            f"channel brake_pressure rests at {zero:.3f} MPa while the car does not brake, in {len(levels)} runs alike:"
+            f" close-loop takes that for the gauge's zero; lower its offset by {zero:.3f} (offset: {-zero:.3f} where"
+            " the map gives none)"
         )
     if not levels or max(levels.values()) < DRIFT:
         return None
@@ -65,14 +78,6 @@ def describe_rest(levels: Mapping[str, float]) -> str | None:
         f"channel brake_pressure rests at {levels[low]:.3f} ({low}) to {levels[high]:.3f} MPa ({high}) while the car"
         " does not brake: the model brakes with it; set the gauge to zero before every run"
     )
-
-
-def _is_offset(levels: Mapping[str, float]) -> bool:
-    """Return whether all runs rest above 0, and one offset leaves less than the pressure that counts as none."""
-    if len(levels) < FEWEST_RUNS:
-        return False
-    values = np.array(list(levels.values()))
-    return float(np.median(values)) > RESTING_PRESSURE and float(np.ptp(values)) <= RESTING_PRESSURE
 
 
 def _measure_level(columns: Mapping[str, NDArray[np.float64]], interval: float) -> float | None:

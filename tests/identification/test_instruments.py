@@ -2,9 +2,6 @@
 
 from dataclasses import replace
 
-import numpy as np
-import pytest
-
 from tasks.campaign.campaign import Campaign
 from tasks.identification.decision.answer import NamedEffect, Parameter
 from tasks.identification.decision.instruments import tell_like_instruments
@@ -19,21 +16,23 @@ def named(name: str) -> NamedEffect:
     )  # fmt: skip
 
 
-def campaign_at_rest(pressure: float, signal: str = "brake_pressure") -> Campaign:
+def campaign_at_rest(pressure: float) -> Campaign:
     runs = [replace(plain_run(20.0, peak), name=f"run-{peak:g}") for peak in (1.0, 2.0, 3.0)]
     return Campaign(
         name="gauge", vehicle="paper-reference", tolerances=TOLERANCES, content_hash="", split_hash="",
-        runs=tuple(replace(run, pressure=run.pressure + pressure * np.ones(400)) for run in runs), brake_signal=signal,
+        runs=tuple(replace(run, pressure=run.pressure + pressure) for run in runs),
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("name", ["push_out_pressure", "brake_fade"])
-def test_a_gauge_that_rests_above_0_is_told_and_looks_like_pads_that_touch_late(name: str) -> None:
-    (told,) = tell_like_instruments(campaign_at_rest(0.08), [named(name)], ())
-    assert "rests at 0.080 MPa" in told and "offset: -0.080" in told
-    assert ("touch look the same" in told) is (name == "push_out_pressure")
-    assert tell_like_instruments(campaign_at_rest(0.0), [named(name)], ()) == []
-    assert tell_like_instruments(campaign_at_rest(0.08, "brake_command"), [named(name)], ()) == []
+def test_a_gauge_that_drifts_is_told_and_a_zero_that_was_taken_off_is_too() -> None:
+    drifting = campaign_at_rest(0.0)
+    runs = tuple(replace(run, pressure=run.pressure + 0.04 * k) for k, run in enumerate(drifting.runs))
+    (told,) = tell_like_instruments(replace(drifting, runs=runs), (), ())
+    assert "rests at 0.000 (run-1) to 0.080 MPa (run-3)" in told
+    (told,) = tell_like_instruments(replace(drifting, gauge_zero=0.08), (), ())
+    assert "rests at 0.080 MPa" in told and "touch would look the same" in told
+    assert tell_like_instruments(drifting, (), ()) == []
+    assert tell_like_instruments(replace(drifting, runs=runs, brake_signal="brake_command"), (), ()) == []
 
 
 def test_a_late_brake_is_told_to_look_like_a_late_clock_unless_the_speeds_own_delay_is_a_rival() -> None:

@@ -10,7 +10,7 @@ from tasks.identification.decision.answer import NamedEffect
 def tell_like_instruments(
     campaign: Campaign, named: Sequence[NamedEffect], rivals: Collection[str]
 ) -> list[str]:
-    """Return a sentence for each fault of the log that a named effect may be, and for a gauge that rests above 0.
+    """Return a sentence for each fault of the log that a named effect may be, and on a gauge that rests above 0.
 
     Parameters
     ----------
@@ -24,9 +24,13 @@ def tell_like_instruments(
             "brakes that answer late look the same as responses that are all logged late by one time: check that the"
             " brake signal and the others share a clock"
         )
-    if campaign.brake_signal == "brake_pressure":
+    if campaign.gauge_zero:
+        told.append(
+            f"the brake pressure rests at {campaign.gauge_zero:.3f} MPa while the car does not brake, in all training"
+            " runs alike: taken for the gauge's zero; pads that need that pressure to touch would look the same"
+        )
+    elif campaign.brake_signal == "brake_pressure":
         runs = {run.name: {"brake_pressure": run.pressure, "speed": run.speed} for run in campaign.runs}
         rest = describe_rest(measure_resting_levels(runs, campaign.runs[0].interval))
-        like = "; pads that need that pressure to touch look the same" if "push_out_pressure" in names else ""
-        told += [] if rest is None else [f"{rest}{like}"]
+        told += [] if rest is None else [rest]
     return told
