@@ -104,6 +104,19 @@ def test_an_effect_of_the_brake_is_found_although_the_speed_was_held_and_the_ver
     assert all(np.argmax(run.model.run.pressure > 0.0) < 10 for run in trace.start.evidence.train)
 
 
+def test_a_held_speed_hides_no_resistance_from_a_file_that_has_none():
+    """Before the brake both keep their speed, the car by its engine and the model for want of drag."""
+    library = tuple(e for e in load_effects() if e.name in ("brake_lag", "aerodynamic_drag"))
+    campaign = make_campaign(LAG, held=True)
+    assert abs(measure(campaign, VEHICLE)) < 0.02
+    trace = find_single_effects(campaign, VEHICLE, SURFACE, library, load_joint_numbers(), RULES)
+    found = {effect.name: effect.parameters[0] for effect in trace.verdict.effects}
+    assert found.keys() == {"brake_lag", "aerodynamic_drag"}
+    assert found["brake_lag"].ci_low < LAG["lag"] < found["brake_lag"].ci_high
+    assert found["aerodynamic_drag"].value == pytest.approx(0.95, abs=0.1), "air and tyres together"
+    assert "taken for coasting before the brake" in trace.verdict.reasons[-1]
+
+
 @pytest.mark.parametrize(
     ("drives", "whole_is_foreign", "searched"),
     [
