@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.campaign import CHANNELS
 from tasks.campaign.channel_validation import frozen_problem, plausibility_problems, signal_problems
 from tasks.campaign.channels import UNITS
 from tasks.campaign.derived_acceleration import is_rate_of_speed
+from tasks.campaign.held_inputs import take_samples
 from tasks.campaign.run_validation import LEAST_SAMPLES
 from tasks.campaign.signals import (
     ChannelRule,
@@ -18,7 +18,7 @@ from tasks.campaign.signals import (
     make_common_clock,
     resample_on_clock,
 )
-from tasks.campaign.slow_channels import clear_between_samples, take_updates
+from tasks.campaign.slow_channels import clear_between_samples
 
 ALIASES = {
     "kmh": "km/h", "kph": "km/h", "mps": "m/s", "m/s²": "m/s^2", "m/s2": "m/s^2", "Nm": "N m", "N.m": "N m",
@@ -72,10 +72,7 @@ def assemble_run(
     found: list[tuple[str, str]] = []
     parts: dict[str, list[Signal]] = {}
     for rule in rules:
-        logged = [signals[name] for name in rule.sources]
-        if rule.channel in CHANNELS:
-            logged = [take_updates(signal) for signal in logged]
-        logged = [signal.cut_window(start, end) for signal in logged]
+        logged = [take_samples(rule.channel, signals[name]).cut_window(start, end) for name in rule.sources]
         for signal in logged:
             stated = ALIASES.get(signal.unit, signal.unit)
             if stated in UNITS and stated != rule.unit:

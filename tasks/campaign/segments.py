@@ -6,12 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tasks.campaign.brake_validation import MOVING
-from tasks.campaign.campaign import CHANNELS
 from tasks.campaign.channel_validation import clock_problems
 from tasks.campaign.channels import BRAKE_SIGNALS
 from tasks.campaign.episodes import Episode, pressure_episodes
+from tasks.campaign.held_inputs import take_samples
 from tasks.campaign.signals import ChannelRule, Signal, convert_to_channel
-from tasks.campaign.slow_channels import take_updates
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,7 +116,7 @@ def _judge_segment(
 def _convert_signals(signals: Mapping[str, Signal], rules: Sequence[ChannelRule]) -> list[tuple[str, Signal]]:
     """Return the signals that become channels, at their true times, with their channels."""
     return [
-        (rule.channel, convert_to_channel(take_updates(signal) if rule.channel in CHANNELS else signal, rule))
+        (rule.channel, convert_to_channel(take_samples(rule.channel, signal), rule))
         for rule in rules
         for signal in (signals[name] for name in rule.sources)
     ]

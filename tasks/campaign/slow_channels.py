@@ -107,8 +107,8 @@ def take_updates(signal: Signal) -> Signal:
     """Return a signal without the rows that repeat a sample, where the logger does so for a fixed number of rows.
 
     A table with one row per 10 ms holds a receiver's 10 Hz as ten equal rows. A coarse sensor repeats values too, but
-    not for the same number of rows each time, and by one step of its resolution. An input is left as it is: a command
-    may be held by the one who gives it.
+    not for the same number of rows each time, and by one step of its resolution. An input rests and is
+    held by the driver, so it has a rule of its own, `take_input_updates`.
 
     Parameters
     ----------
