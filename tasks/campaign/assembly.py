@@ -29,7 +29,7 @@ ALIASES = {
 """Spellings of the units that this project knows, as files have them."""
 
 LEAST_COVERED = 0.9
-"""Share of a run that each of its channels covers at least [1]."""
+"""Share of a run that each of its channels covers at least, where its own last step at either end counts [1]."""
 HIGHEST_RATIO = 1.25
 """Of a campaign's rate over that of the fastest signal, whose samples need not be even [1]: a log of 20 Hz that was put
 on 80 Hz gave another verdict, with a fiftieth of the interval."""
@@ -145,17 +145,24 @@ def _is_acceleration_computed(parts: Mapping[str, list[Signal]], rules: Sequence
 
 
 def _find_short_channels(parts: Mapping[str, list[Signal]]) -> list[str]:
-    """Return a sentence for each channel without which the run would be longer: a sensor that fell silent."""
+    """Return a sentence for each channel without which the run would be longer: a sensor that fell silent.
+
+    A receiver of 1 Hz has its first and its last sample up to a second within the run.
+    """
     spans = {
-        channel: (max(s.time[0] for s in signals), min(s.time[-1] for s in signals))
+        channel: (
+            max(float(s.time[0]) for s in signals),
+            min(float(s.time[-1]) for s in signals),
+            max(float(np.median(np.diff(s.time))) for s in signals),
+        )
         for channel, signals in parts.items()
     }
-    first, last = min(start for start, _ in spans.values()), max(end for _, end in spans.values())
+    first, last = min(start for start, _, _ in spans.values()), max(end for _, end, _ in spans.values())
     return [
         f"channel {channel}: has samples from {start:.3f} to {end:.3f} s of a run from {first:.3f} to {last:.3f} s: cut"
         " the run there, or leave the channel out"
-        for channel, (start, end) in spans.items()
-        if end - start < LEAST_COVERED * (last - first)
+        for channel, (start, end, step) in spans.items()
+        if min(end + step, last) - max(start - step, first) < LEAST_COVERED * (last - first)
     ]
 
 

@@ -104,3 +104,17 @@ def test_a_run_is_empty_between_the_samples_of_a_slow_signal_and_inputs_are_not(
     assert np.isfinite(found.columns["brake_pressure"]).all()
     assert np.isfinite(found.columns["longitudinal_acceleration"]).all()
     assert measure_slow_rates([found.columns], 100.0) == {"speed": 10.0}
+
+
+@pytest.mark.parametrize(("first", "silent", "sound"), [(63, 600, True), (0, 600, True), (0, 430, False)])
+def test_a_slow_channel_covers_its_run_up_to_one_of_its_own_steps(
+    first: int, silent: int, sound: bool
+) -> None:
+    rows = np.arange(first, silent, 100)
+    signals = {"gps": Signal(time=CLOCK[rows], values=SPEED[rows]), "imu": Signal(time=CLOCK, values=SPEED)}
+    rules = [
+        ChannelRule(channel="speed", sources=("gps",), unit="m/s"),
+        ChannelRule(channel="lateral_acceleration", sources=("imu",), unit="m/s^2", scale=0.01),
+    ]
+    problems = assemble_run(signals, rules, 0.0, np.inf, 100.0).problems
+    assert not problems if sound else "speed: has samples from 0.000 to 4.000 s of a run" in problems[0]
