@@ -126,11 +126,12 @@ class SegmentEntry(CatalogueEntry):
 
 
 class CsvEntry(CatalogueEntry):
-    """How text files are written."""
+    """How text files are written: rows above the names, and whether a row of units stands below them."""
 
     separator: Text = ","
     decimal: Literal[".", ","] = "."
     skip_rows: Annotated[int, Field(strict=True, ge=0)] = 0
+    units_row: Annotated[bool, Field(strict=True)] = False
 
 
 class ChannelMap(CatalogueEntry):

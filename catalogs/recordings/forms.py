@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from catalogs.channel_maps import ChannelMap, TimeEntry
 from catalogs.sentences import shorten
-from tasks.campaign.channels import unit_factor
+from tasks.campaign.channels import ALIASES, UNITS, unit_factor
 from tasks.campaign.signals import Signal
 from tasks.errors import InputError
 
@@ -80,6 +80,21 @@ def require_clock(path: Path, channel_map: ChannelMap) -> TimeEntry:
     if channel_map.time is None:
         raise InputError(f"{path}: a file without its own clock needs time: {{source: COLUMN}} in the map")
     return channel_map.time
+
+
+def describe_clock_unit(path: Path, clock: TimeEntry, stated: str) -> str:
+    """Return the problem of a clock that is in another unit by its file than by the map; empty if there is none.
+
+    Parameters
+    ----------
+    path : of the recording
+    clock : from the channel map
+    stated : unit that the file states; empty if it states none
+    """
+    unit = ALIASES.get(stated, stated)
+    if UNITS.get(unit, ("",))[0] != "time" or unit == clock.unit:
+        return ""
+    return f"{path.name}: clock {clock.source} is in {unit} by its file, in {clock.unit} by the map: correct the map"
 
 
 def sample_column(

@@ -20,6 +20,7 @@ from catalogs.recordings.forms import (
     LARGEST_FILE,
     Form,
     SignalSummary,
+    describe_clock_unit,
     describe_missing,
     require_clock,
     sample_column,
@@ -34,6 +35,8 @@ Columns = dict[str, NDArray[np.float64]]
 Take = Callable[[Path, tuple[str, ...], CsvEntry], tuple[Columns, dict[str, str]]]
 ListColumns = Callable[[Path, CsvEntry], tuple[Columns, dict[str, str], dict[str, str]]]
 SEPARATORS = (";", ",", "\t", "|")
+UNITS_REMEDY = "give csv: {units_row: true} in the map"
+NUMBER = re.compile(r"[+-]?\d*[.,]?\d+([eE][+-]?\d+)?")
 DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 
 
@@ -42,6 +45,8 @@ def _read_with(take: Take) -> Callable[[Path, ChannelMap], dict[str, Signal]]:
         clock, names = require_clock(path, channel_map), signal_names(channel_map)
         columns, units = take(path, tuple(dict.fromkeys((clock.source, *names))), channel_map.csv)
         stamps = columns[clock.source]
+        if problem := describe_clock_unit(path, clock, units.get(clock.source, "")):
+            raise InputError(problem)
         return {name: sample_column(stamps, columns[name], clock, units.get(name, "")) for name in names}
 
     return read
@@ -101,25 +106,34 @@ def _find_encoding(path: Path, content: bytes) -> str:
     return "utf-8-sig"
 
 
-def _load_frame(path: Path, options: CsvEntry) -> pd.DataFrame:
+def _load_frame(path: Path, options: CsvEntry) -> tuple[pd.DataFrame, list[str]]:
+    """Return a table below its names, and the unit of each column, none without a row of units."""
     content = read_content(path, "recording", LARGEST_FILE)
     encoding = _find_encoding(path, content)
-    head = content.split(b"\n", options.skip_rows + 1)[options.skip_rows : options.skip_rows + 1]
-    names = b"".join(head).decode(encoding, "replace").strip()
+    filled = (
+        (number, line)
+        for number, line in enumerate(io.BytesIO(content))
+        if number >= options.skip_rows and line.strip()
+    )
+    names = next(filled, (0, b""))[1].decode(encoding, "replace").strip()
     found = [separator for separator in SEPARATORS if separator in names]
     if found and len(options.separator) == 1 and options.separator not in names:
         raise InputError(
             f"{path}: names of signals must be separated by {shorten_value(options.separator)}; the first line is"
             f" {shorten_value(names)}: give csv: {{separator: {json.dumps(found[0])}}} in the map"
         )
+    skipped: int | list[int] = options.skip_rows
+    row = next(filled, None) if options.units_row else None
+    if row is not None:
+        skipped = [*range(options.skip_rows), row[0]]
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", pd.errors.ParserWarning)
-            return pd.read_csv(
+            frame = pd.read_csv(
                 io.BytesIO(content),
                 sep=options.separator,
                 decimal=options.decimal,
-                skiprows=options.skip_rows,
+                skiprows=skipped,
                 encoding=encoding,
                 index_col=False,  # else rows that end in a separator move every value to its neighbour's name
             )
@@ -130,31 +144,74 @@ def _load_frame(path: Path, options: CsvEntry) -> pd.DataFrame:
         ) from None
     except (ValueError, TypeError, OverflowError, re.error) as error:
         raise InputError(f"{path}: must be a table of text; {shorten(error)}") from None
+    return frame, [] if row is None else _split_units(path, row[1].decode(encoding), options)
+
+
+def _split_units(path: Path, row: str, options: CsvEntry) -> list[str]:
+    """Return the units of a row, without brackets.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or holds numbers, and so is a row of samples.
+    """
+    try:
+        cells = pd.read_csv(
+            io.StringIO(row), sep=options.separator, header=None, dtype=str, keep_default_na=False
+        )
+    except pd.errors.ParserError as error:
+        raise InputError(f"{path}: the row of units must be a row of text; {shorten(error)}") from None
+    units = [str(cell).strip().strip("[]()") for cell in cells.iloc[0]]
+    if any(NUMBER.fullmatch(unit) and unit != "1" for unit in units):
+        raise InputError(
+            f"{path}: with csv: {{units_row: true}} the row below the names must hold units; it is"
+            f" {shorten_value(row.strip())}: leave units_row away"
+        )
+    return units
 
 
 def _take_csv(path: Path, wanted: tuple[str, ...], options: CsvEntry) -> tuple[Columns, dict[str, str]]:
-    frame = _load_frame(path, options)
+    frame, units = _load_frame(path, options)
     names = [str(name).strip() for name in frame.columns]
     problems = describe_missing(path, wanted, names, names)
     columns: Columns = {}
+    notes: dict[str, str] = {}
     for name in wanted:
         if names.count(name) > 1:
             problems.append(
                 f"{path.name}: signal {name} must stand once; {names.count(name)} columns have its name"
             )
         elif name in names:
-            columns[name], note = _convert_column(frame.iloc[:, names.index(name)])
-            problems += [f"{path.name}: signal {name} must be of numbers; {note}"] if note else []
+            columns[name], notes[name] = _convert_column(frame.iloc[:, names.index(name)])
+    if any(notes.values()) and _is_first_row_of_units(columns):
+        first = ", ".join(
+            shorten_value(str(frame.iloc[0, names.index(name)])) for name in columns if notes[name]
+        )
+        problems.append(
+            f"{path.name}: row 1 below the names must hold numbers; it holds {first}, which looks like a row of units:"
+            f" {UNITS_REMEDY}"
+        )
+    else:
+        problems += [
+            f"{path.name}: signal {name} must be of numbers; {note}" for name, note in notes.items() if note
+        ]
     if problems:
         raise InputError(problems)
-    return columns, {}
+    return columns, dict(zip(names, units, strict=False))
+
+
+def _is_first_row_of_units(columns: Columns) -> bool:
+    """Return whether the first row has a number in no column, while later rows have some."""
+    table = np.isfinite(np.column_stack(list(columns.values())))
+    return not table[:1].any() and bool(table[1:].any())
 
 
 def _take_all_csv(path: Path, options: CsvEntry) -> tuple[Columns, dict[str, str], dict[str, str]]:
-    frame = _load_frame(path, options)
+    frame, units = _load_frame(path, options)
     read = {str(name).strip(): _convert_column(frame.iloc[:, k]) for k, name in enumerate(frame.columns)}
     notes = {name: note for name, (_, note) in read.items() if note}
-    return {name: values for name, (values, _) in read.items()}, {}, notes
+    columns = {name: values for name, (values, _) in read.items()}
+    return columns, dict(zip(read, units, strict=False)), notes
 
 
 def _convert_column(column: pd.Series) -> tuple[NDArray[np.float64], str]:
@@ -170,7 +227,7 @@ def _convert_column(column: pd.Series) -> tuple[NDArray[np.float64], str]:
     elif re.search(r"\d[:-]\d", text):
         remedy = "write times as a number of seconds"
     elif row == 0 and np.count_nonzero(wrong) == 1:
-        remedy = "remove this row, which seems to hold units"
+        remedy = f"if this is a row of units, {UNITS_REMEDY}; else correct it"
     else:
         remedy = "correct it, or leave it empty"
     return values, f"row {row + 1} below the names has {shorten_value(text)}: {remedy}"

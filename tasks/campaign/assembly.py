@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.channel_validation import frozen_problem, plausibility_problems, signal_problems
-from tasks.campaign.channels import UNITS
+from tasks.campaign.channels import ALIASES, UNITS
 from tasks.campaign.derived_acceleration import is_rate_of_speed
 from tasks.campaign.held_inputs import take_samples
 from tasks.campaign.run_validation import LEAST_SAMPLES
@@ -19,14 +19,6 @@ from tasks.campaign.signals import (
     resample_on_clock,
 )
 from tasks.campaign.slow_channels import clear_between_samples
-
-ALIASES = {
-    "kmh": "km/h", "kph": "km/h", "mps": "m/s", "m/s²": "m/s^2", "m/s2": "m/s^2", "Nm": "N m", "N.m": "N m",
-    "°": "deg", "°/s": "deg/s", "1/min": "rpm", "-": "1",
-    "Unit_Bar": "bar", "Unit_KiloMeterPerHour": "km/h", "Unit_DegreOfArc": "deg", "Unit_DegreOfArcPerSecon": "deg/s",
-    "Unit_MeterPerSeconSquar": "m/s^2",
-}  # fmt: skip
-"""Spellings of the units that this project knows, as files have them."""
 
 LEAST_COVERED = 0.9
 """Share of a run that each of its channels covers at least, where its own last step at either end counts [1]."""

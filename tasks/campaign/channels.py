@@ -18,6 +18,13 @@ UNITS: dict[str, tuple[str, float]] = {
     "1": ("ratio", 1.0), "%": ("ratio", 1e-2),
 }  # fmt: skip
 """Unit to its dimension and its size in the dimension's SI unit."""
+ALIASES = {
+    "kmh": "km/h", "kph": "km/h", "mps": "m/s", "m/s²": "m/s^2", "m/s2": "m/s^2", "Nm": "N m", "N.m": "N m",
+    "G": "g", "sec": "s", "°": "deg", "°/s": "deg/s", "1/min": "rpm", "-": "1",
+    "Unit_Bar": "bar", "Unit_KiloMeterPerHour": "km/h", "Unit_DegreOfArc": "deg", "Unit_DegreOfArcPerSecon": "deg/s",
+    "Unit_MeterPerSeconSquar": "m/s^2",
+}  # fmt: skip
+"""Spellings of the units that this project knows, as files have them."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -55,7 +55,15 @@ def test_the_first_sample_of_a_time_is_the_first_that_has_a_value(tmp_path: Path
         (b"t\tv\n0\t10\n", "", r'give csv: {separator: "\\t"} in the map'),
         (b"\n\nt;v\n0;10\n", "csv: {skip_rows: 2}", r'give csv: {separator: ";"}'),
         (b"t;v\n0;10,5\n1;11,5\n", "csv: {separator: ;}", "v must be of numbers; row 1 .* '10,5': give csv: {decimal"),
-        (b"t,v\ns,m/s\n0,10\n1,11\n", "", "v must be of numbers; row 1 .* 'm/s': remove this row"),
+        (
+            b"t,v\ns,m/s\n0,10\n1,11\n", "",
+            "it holds 's', 'm/s', which looks like a row of units: give csv: {units_row: true} in the map",
+        ),
+        (b"t,v\n,m/s\n0,10\n1,11\n", "", "it holds 'm/s', which looks like a row of units"),
+        (b"t,v\n0,Err\n1,11\n", "", "v must be of numbers; row 1 .* 'Err': if this is a row of units, give csv"),
+        (b"t,v\n0,10\n1,11\n", "csv: {units_row: true}", "must hold units; it is '0,10': leave units_row away"),
+        (b't,v\ns,"m\n0,1\n1,2\n', "csv: {units_row: true}", "the row of units must be a row of text"),
+        (b"t,v\nms,m/s\n0,10\n1,11\n", "csv: {units_row: true}", "clock t is in ms by its file, in s by the map"),
         (b"t,v\n0,10\n1,Err\n", "", "v must be of numbers; row 2 .* 'Err': correct it, or leave it empty"),
         (b"t,v\n12:00:01,10\n12:00:02,11\n", "", "t must be of numbers; row 1 .* write times as a number of seconds"),
         (b"t,v\n2026-01-01,10\n", "", "t must be of numbers; row 1 .* write times as a number of seconds"),
@@ -67,6 +75,31 @@ def test_what_is_no_number_is_named_with_what_to_do(
 ) -> None:
     with pytest.raises(InputError, match=words):
         read(tmp_path, text, rest)
+
+
+AIM = '"Format","AiM"\n\n"t","v","slope"\n"s","[km/h]","\u00b0"\n\n"0.0","10","1"\n"1.0","11","1"\n'
+"""As AiM's loggers export, with rows above the names, a row of units and an empty one below."""
+
+
+@pytest.mark.parametrize("encoding", ["latin-1", "utf-8"])
+def test_a_row_of_units_is_read_where_the_map_tells_of_it(tmp_path: Path, encoding: str) -> None:
+    rest = "csv: {skip_rows: 2, units_row: true}\n"
+    assert read(tmp_path, AIM.encode(encoding), rest) == {"t": [0.0, 1.0], "v": [10.0, 11.0]}
+    channel_map, _ = load_channel_map(tmp_path / "map.yaml")
+    rows = summarise_signals(tmp_path / "log.csv", channel_map)
+    assert [(row.signal, row.unit, row.samples) for row in rows] == [
+        ("t", "s", 2),
+        ("v", "km/h", 2),
+        ("slope", "\u00b0", 2),
+    ]
+
+
+def test_a_unit_below_the_names_must_be_the_maps(tmp_path: Path) -> None:
+    read(tmp_path, AIM.encode(), "csv: {skip_rows: 2, units_row: true}\n")
+    with pytest.raises(InputError, match="channel speed: is in km/h by its file, in m/s by the map"):
+        import_measurements(
+            str(tmp_path / "log.csv"), map=str(tmp_path / "map.yaml"), out=str(tmp_path / "campaign")
+        )
 
 
 def test_a_name_in_latin_1_is_read_as_it_is_written(tmp_path: Path) -> None:
@@ -81,11 +114,11 @@ def test_a_list_of_signals_shows_those_that_are_text(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("t,v\ns,m/s\n0,10\n1,12\n")
     rows = {row.signal: row for row in summarise_signals(tmp_path / "log.csv", None)}
     assert (rows["v"].samples, rows["v"].lowest, rows["v"].highest) == (2, 10.0, 12.0)
-    assert "'m/s': remove this row, which seems to hold units" in rows["v"].note
+    assert "'m/s': if this is a row of units, give csv: {units_row: true}" in rows["v"].note
     shown = CliRunner().invoke(
         app, ["import-measurements", str(tmp_path), "--list-signals"], env={"COLUMNS": "200"}
     )
-    assert shown.exit_code == 0 and "remove this row" in shown.output
+    assert shown.exit_code == 0 and "units_row: true" in shown.output
 
 
 @pytest.mark.parametrize("column", ["t", "v"])
