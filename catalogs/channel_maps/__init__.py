@@ -15,6 +15,7 @@ from catalogs.quantities import CatalogueEntry, Number, Text
 from catalogs.sentences import cap_problems, describe_rules, shorten, shorten_value
 from tasks.campaign.channels import CHANNELS_BY_NAME, MAIN_CHANNELS, UNITS
 from tasks.campaign.signals import ChannelRule, Gain
+from tasks.campaign.time_of_day import TIME_OF_DAY
 from tasks.campaign.wheel_validation import describe_wheel_gain
 from tasks.errors import InputError
 
@@ -85,8 +86,8 @@ class TimeEntry(CatalogueEntry):
     @field_validator("unit")
     @classmethod
     def _is_of_time(cls, unit: str) -> str:
-        if UNITS.get(unit, ("", 0.0))[0] != "time":
-            raise ValueError(f"time unit must be one of s, ms, us, ns; it is {unit}")
+        if unit != TIME_OF_DAY and UNITS.get(unit, ("", 0.0))[0] != "time":
+            raise ValueError(f"time unit must be one of s, ms, us, ns, {TIME_OF_DAY}; it is {unit}")
         return unit
 
 

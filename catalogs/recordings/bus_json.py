@@ -15,8 +15,8 @@ from catalogs.recordings.forms import (
     signal_names,
     summarise_signal,
 )
-from tasks.campaign.channels import unit_factor
 from tasks.campaign.signals import Signal
+from tasks.campaign.time_of_day import convert_to_seconds
 from tasks.errors import InputError
 
 
@@ -31,7 +31,7 @@ def read_bus(path: Path, channel_map: ChannelMap) -> dict[str, Signal]:
     content, names = _load_content(path), signal_names(channel_map)
     problems = describe_missing(path, names, content, content)
     found = {
-        name: _take_signal(content[name], _time_factor(channel_map)) for name in names if name in content
+        name: _take_signal(content[name], _find_time_unit(channel_map)) for name in names if name in content
     }
     problems += [
         f"{path.name}: signal {name} must have values of [time, value], and a unit as text"
@@ -51,11 +51,11 @@ def summarise_bus(path: Path, channel_map: ChannelMap | None) -> list[SignalSumm
     InputError
         If the file cannot be read.
     """
-    factor = 1.0 if channel_map is None else _time_factor(channel_map)
+    time_unit = _find_time_unit(channel_map)
     return [
         summarise_signal(name, signal)
         for name, entry in _load_content(path).items()
-        if (signal := _take_signal(entry, factor)) is not None
+        if (signal := _take_signal(entry, time_unit)) is not None
     ]
 
 
@@ -68,11 +68,11 @@ def _load_content(path: Path) -> dict[str, Any]:
     return content
 
 
-def _time_factor(channel_map: ChannelMap) -> float:
-    return unit_factor(channel_map.time.unit, "s") if channel_map.time else 1.0
+def _find_time_unit(channel_map: ChannelMap | None) -> str:
+    return "s" if channel_map is None or channel_map.time is None else channel_map.time.unit
 
 
-def _take_signal(entry: Any, factor: float) -> Signal | None:
+def _take_signal(entry: Any, time_unit: str) -> Signal | None:
     """Return the signal that an entry holds; None if it holds none."""
     try:
         pairs = np.asarray(entry["values"], dtype=np.float64)
@@ -82,7 +82,7 @@ def _take_signal(entry: Any, factor: float) -> Signal | None:
     if (pairs.size and pairs.shape[1:] != (2,)) or not isinstance(unit, str):
         return None
     pairs = pairs.reshape(-1, 2)
-    return Signal(time=pairs[:, 0] * factor, values=pairs[:, 1], unit=unit)
+    return Signal(time=convert_to_seconds(pairs[:, 0], time_unit), values=pairs[:, 1], unit=unit)
 
 
 BUS_JSON = Form(read=read_bus, summarise=summarise_bus)

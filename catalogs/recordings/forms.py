@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from catalogs.channel_maps import ChannelMap, TimeEntry
 from catalogs.sentences import shorten
-from tasks.campaign.channels import ALIASES, UNITS, unit_factor
+from tasks.campaign.channels import ALIASES, UNITS
 from tasks.campaign.signals import Signal
+from tasks.campaign.time_of_day import TIME_OF_DAY, convert_to_seconds, has_digits_of_day
 from tasks.errors import InputError
 
 LARGEST_FILE = 2**30
@@ -82,15 +83,23 @@ def require_clock(path: Path, channel_map: ChannelMap) -> TimeEntry:
     return channel_map.time
 
 
-def describe_clock_unit(path: Path, clock: TimeEntry, stated: str) -> str:
-    """Return the problem of a clock that is in another unit by its file than by the map; empty if there is none.
+def describe_clock_unit(path: Path, clock: TimeEntry, stated: str, stamps: NDArray[np.float64]) -> str:
+    """Return the problem of a clock whose unit in the map is not that of the file; empty if there is none.
 
     Parameters
     ----------
     path : of the recording
     clock : from the channel map
     stated : unit that the file states; empty if it states none
+    stamps : float64 [N] [the clock's unit]
     """
+    if clock.unit == TIME_OF_DAY:
+        if has_digits_of_day(stamps):
+            return ""
+        return (
+            f"{path.name}: clock {clock.source} must be in {TIME_OF_DAY}, with minutes and seconds below 60; it reads"
+            f" {np.nanmin(stamps):g} to {np.nanmax(stamps):g}: correct its unit in the map"
+        )
     unit = ALIASES.get(stated, stated)
     if UNITS.get(unit, ("",))[0] != "time" or unit == clock.unit:
         return ""
@@ -109,7 +118,7 @@ def sample_column(
     clock : from the channel map
     unit : unit that the file states
     """
-    time = stamps * unit_factor(clock.unit, "s")
+    time = convert_to_seconds(stamps, clock.unit)
     usable = np.isfinite(time) & ~np.isnan(values)
     time, values = time[usable], values[usable]
     if clock.repeats == "keep_first":

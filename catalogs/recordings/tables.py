@@ -45,7 +45,7 @@ def _read_with(take: Take) -> Callable[[Path, ChannelMap], dict[str, Signal]]:
         clock, names = require_clock(path, channel_map), signal_names(channel_map)
         columns, units = take(path, tuple(dict.fromkeys((clock.source, *names))), channel_map.csv)
         stamps = columns[clock.source]
-        if problem := describe_clock_unit(path, clock, units.get(clock.source, "")):
+        if problem := describe_clock_unit(path, clock, units.get(clock.source, ""), stamps):
             raise InputError(problem)
         return {name: sample_column(stamps, columns[name], clock, units.get(name, "")) for name in names}
 

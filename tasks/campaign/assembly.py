@@ -6,7 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.channel_validation import frozen_problem, plausibility_problems, signal_problems
+from tasks.campaign.channel_validation import (
+    DIGITS_OF_DAY,
+    frozen_problem,
+    plausibility_problems,
+    signal_problems,
+)
 from tasks.campaign.channels import ALIASES, UNITS
 from tasks.campaign.derived_acceleration import is_rate_of_speed
 from tasks.campaign.held_inputs import take_samples
@@ -71,7 +76,8 @@ def assemble_run(
                 found.append((rule.channel, f"is in {stated} by its file, in {rule.unit} by the map"))
             found += [(rule.channel, problem) for problem in signal_problems(signal)]
         parts[rule.channel] = [convert_to_channel(signal, rule) for signal in logged]
-    found += _find_frozen_channels(parts)
+    if not any(problem == DIGITS_OF_DAY for _, problem in found):
+        found += _find_frozen_channels(parts)
     problems = _write_sentences(found)
     usable = {channel: signals for channel, signals in parts.items() if not _is_unreadable(signals)}
     if not usable:

@@ -8,8 +8,14 @@ from numpy.typing import NDArray
 from tasks.campaign.brake_validation import MOVING, brake_problems
 from tasks.campaign.channels import CHANNELS_BY_NAME, UNITS, guess_unit
 from tasks.campaign.signals import Signal
+from tasks.campaign.time_of_day import TIME_OF_DAY, looks_like_time_of_day
 from tasks.campaign.wheel_validation import radius_problems
 
+DIGITS_OF_DAY = (
+    "has a clock that jumps by 40 at each minute, because its numbers are the digits of hours, minutes and seconds:"
+    f" give unit: {TIME_OF_DAY} under time in the map"
+)
+"""Problem of a time of day that is taken for seconds."""
 GAP_STEPS = 5.0
 """A step between samples longer than this many median steps is a gap."""
 FROZEN_SECONDS = 0.5
@@ -53,6 +59,8 @@ def clock_problems(signal: Signal) -> list[str]:
     ----------
     signal : of at least 2 samples
     """
+    if looks_like_time_of_day(signal.time):
+        return [DIGITS_OF_DAY]
     problems = []
     steps = np.diff(signal.time)
     usual = float(np.median(steps))

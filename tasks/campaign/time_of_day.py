@@ -1,0 +1,62 @@
+"""The time of day written as one number of its digits, as satellite receivers log it: 73059.95 is 7:30:59.95."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.campaign.channels import unit_factor
+
+TIME_OF_DAY = "HHMMSS"
+"""What a channel map gives as the unit of such a clock."""
+DAY = 86400.0
+"""Length of a day [s]."""
+
+
+def convert_to_seconds(stamps: NDArray[np.float64], unit: str) -> NDArray[np.float64]:
+    """Return the times of a logger in seconds, float64 [N] [s].
+
+    Parameters
+    ----------
+    stamps : float64 [N] [``unit``]
+    unit : of time, or `TIME_OF_DAY`
+    """
+    return read_time_of_day(stamps) if unit == TIME_OF_DAY else stamps * unit_factor(unit, "s")
+
+
+def read_time_of_day(stamps: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the time since the midnight before the first stamp, float64 [N] [s].
+
+    Parameters
+    ----------
+    stamps : float64 [N] digits of hours, minutes and seconds [1]; NaN where a row holds no time
+    """
+    hours, minutes = np.floor(stamps / 1e4), np.floor(stamps / 1e2) % 100.0
+    time = np.asarray(3600.0 * hours + 60.0 * minutes + stamps % 100.0)
+    told = np.isfinite(time)
+    time[told] += DAY * np.cumsum(np.diff(time[told], prepend=time[told][:1]) < -0.5 * DAY)
+    return time
+
+
+def has_digits_of_day(stamps: NDArray[np.float64]) -> bool:
+    """Return whether all stamps can be times of day: no minute and no second reaches 60, no hour 24.
+
+    Parameters
+    ----------
+    stamps : float64 [N] [1]
+    """
+    told = stamps[np.isfinite(stamps)]
+    below = (told >= 0.0) & (told < 24e4) & (told % 1e4 < 6e3) & (told % 1e2 < 60.0)
+    return bool(below.all())
+
+
+def looks_like_time_of_day(time: NDArray[np.float64]) -> bool:
+    """Return whether a clock that is taken for seconds jumps by 40 at a minute, and goes on as usual there.
+
+    Parameters
+    ----------
+    time : float64 [N], N at least 2, ascending [s]
+    """
+    crossings = np.diff(np.floor(time / 1e2)) != 0.0
+    if not crossings.any() or not has_digits_of_day(time):
+        return False
+    steps = np.diff(read_time_of_day(time))
+    return bool(np.any(steps[crossings] < 2.0 * np.median(steps)))
