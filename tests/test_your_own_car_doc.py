@@ -62,9 +62,12 @@ def test_the_errors_and_the_numbers_are_those_of_the_verdict(walked: tuple[Path,
         "pressure_nonlinearity"
     ]
     for name, value, interval in rows("number"):
-        told = [float(value), *(float(end) for end in interval.split(" to "))]
-        found = [numbers[name][key] for key in ("value", "ci_low", "ci_high")]
-        assert told == pytest.approx(found, rel=0.05, abs=0.05), (told, found)
+        low, high = (float(end) for end in interval.split(" to "))
+        assert float(value) == pytest.approx(numbers[name]["value"], rel=0.05)
+        # the last bit of a log moves where a fit of few runs ends, and with it its errors
+        assert [low, high] == pytest.approx(
+            [numbers[name][key] for key in ("ci_low", "ci_high")], abs=0.1 * (high - low)
+        )
 
 
 def test_the_pages_of_the_tutorial_are_there_and_say_what_it_says(walked: tuple[Path, list[str]]) -> None:
