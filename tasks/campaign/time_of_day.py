@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from tasks.campaign.channels import unit_factor
 
 TIME_OF_DAY = "HHMMSS"
-"""What a channel map gives as the unit of such a clock."""
+"""Unit of such a clock in a channel map."""
 DAY = 86400.0
 """Length of a day [s]."""
 

@@ -18,7 +18,7 @@ def make_stop(rest: float = 0.0, peak: float = 2.0, *, drag: float = 0.3, seed: 
     return {"brake_pressure": np.maximum(brake + rest + noise, 0.0), "speed": np.maximum(speed, 0.0)}
 
 
-def warn(*runs: Columns) -> str | None:
+def warn_of_gauge(*runs: Columns) -> str | None:
     return describe_rest(
         measure_resting_levels({f"s{n}": run for n, run in enumerate(runs, start=1)}, INTERVAL)
     )
@@ -26,16 +26,16 @@ def warn(*runs: Columns) -> str | None:
 
 def test_a_gauge_that_rests_at_one_level_in_all_runs_has_an_offset() -> None:
     runs = [make_stop(0.08 + 0.002 * k, peak, seed=k) for k, peak in enumerate((0.15, 2.0, 0.0))]
-    warning = warn(*runs)
+    warning = warn_of_gauge(*runs)
     assert warning is not None
     assert "rests at 0.082 MPa while the car does not brake, in 3 runs alike" in warning
     assert "offset: -0.082" in warning
 
 
 def test_a_gauge_that_rests_at_another_level_in_each_run_is_warned_of() -> None:
-    warning = warn(make_stop(0.01), make_stop(0.08), make_stop(0.05))
+    warning = warn_of_gauge(make_stop(0.01), make_stop(0.08), make_stop(0.05))
     assert warning is not None and "rests at 0.010 (s1) to 0.080 MPa (s2)" in warning
-    alone = warn(make_stop(0.08))
+    alone = warn_of_gauge(make_stop(0.08))
     assert alone is not None and "offset" not in alone  # one run does not tell the gauge from the driver
 
 
@@ -50,10 +50,10 @@ def test_a_gauge_that_rests_at_another_level_in_each_run_is_warned_of() -> None:
     ],
 )
 def test_a_sound_gauge_raises_no_alarm(run: Columns) -> None:
-    assert warn(run, run) is None
+    assert warn_of_gauge(run, run) is None
 
 
 def test_a_pedal_that_is_pressed_slowly_does_not_rest() -> None:
     run = make_stop(0.0)
     run["brake_pressure"] = run["brake_pressure"] + np.clip(np.arange(500) / 1000, 0.0, 0.2)
-    assert warn(run, run) is None
+    assert warn_of_gauge(run, run) is None

@@ -19,6 +19,7 @@ from tasks.identification.decision import discovery
 from tasks.identification.decision import verdict as decision
 from tasks.identification.decision.answer import ChannelError, Verdict
 from tasks.identification.decision.disputes import ForeignCarError
+from tasks.identification.decision.screening import can_show
 from tasks.identification.decision.verdict import find_missing_effects
 from tasks.identification.inference.forward import predict_channels, prepare_run
 from tasks.identification.rules import DecisionRules
@@ -68,6 +69,7 @@ def judged(
     rules: DecisionRules = RULES,
     experiments: tuple[tuple[str, RunPlan], ...] = EXPERIMENTS[-1:],
     hardly_known: dict[str, tuple[float, float]] | None = None,
+    gauge_zero: float = 0.0,
 ) -> Verdict:
     """The verdict on a campaign; to weigh every planned run takes as long as all that comes before it."""
     slots = OUTSIDE[outside].slots if outside else ()
@@ -77,7 +79,7 @@ def judged(
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("tasks.identification.decision.experiment.EXPERIMENTS", experiments)
         return find_missing_effects(
-            replace(campaign, runs=runs), vehicle, SURFACE, tuple(LIBRARY.values()), rules,
+            replace(campaign, runs=runs, gauge_zero=gauge_zero), vehicle, SURFACE, tuple(LIBRARY.values()), rules,
             hardly_known=hardly_known or {},
         ).verdict  # fmt: skip
 
@@ -189,6 +191,14 @@ class TestRunsThatDisagreeUntilAFormIsInTheModel:
         )
 
 
+def test_what_a_gauge_read_at_rest_is_told_beside_why_nothing_is_named() -> None:
+    verdict = judged({}, gauge_zero=0.05)
+    assert verdict.verdict == "NOTHING"
+    refusal, gauge = verdict.reasons
+    assert "best candidate" in refusal or "no effect of the library explains enough" in refusal
+    assert "rests at 0.050 MPa" in gauge
+
+
 def test_an_instrument_that_feels_gravity_is_a_sensor_and_no_missing_physics() -> None:
     verdict = judged({"gravity_leak": 1.0}, design=LEVEL)
     assert (verdict.verdict, names(verdict)) == ("SENSOR", ["sensor_gravity_leak"])
@@ -266,5 +276,5 @@ class TestACarThatIsGrown:
 )
 def test_an_effect_by_slip_needs_a_wheel_speed(channels, seen):
     library = load_effects()
-    found = {effect.name for effect in library if decision._is_visible(effect, channels)}
+    found = {effect.name for effect in library if can_show(effect, VEHICLE, channels)}
     assert found == {e.name for e in library} - (set() if seen else {"relaxation_length"})

@@ -1,11 +1,34 @@
 """Linear screening of the library: gain, estimate and detectable size of its effects, and the inflation of the runs."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.derivatives import list_second_values
 from tasks.identification.inference.fit import Fit
+from tasks.vehicle.effects.library import Effect
+from tasks.vehicle.parameters import Vehicle
+
+
+def can_show(effect: Effect, vehicle: Vehicle, channels: Sequence[str]) -> bool:
+    """Return whether runs can show an effect that a vehicle lacks.
+
+    An effect of several parameters that the vehicle has already cannot be found as a change of it. One that depends on
+    slip needs a wheel speed: without one it is a lag of the car's force, and any other lag of a car with other
+    equations passes for it. Of eight logs of the double-track car without an effect, speed and acceleration alone
+    named three relaxation lengths.
+
+    Parameters
+    ----------
+    effect : of the library
+    vehicle : the judged vehicle
+    channels : that were measured
+    """
+    has_already = len(effect.parameters) > 1 and any(vehicle.effects.get(p.name) for p in effect.parameters)
+    sees_slip = any(name.startswith("wheel_speed") for name in channels)
+    return not has_already and (effect.variable != "slip" or sees_slip)
 
 
 def screen_library(

@@ -27,15 +27,15 @@ from tasks.identification.decision.held_out import (
     is_noticed,
     is_predicted_better,
 )
-from tasks.identification.decision.instruments import tell_like_instruments
 from tasks.identification.decision.intervals import (
     compute_curvature_interval,
     compute_profile_interval,
     refit_named,
 )
+from tasks.identification.decision.log_faults import tell_log_faults
 from tasks.identification.decision.missed import tell_miss
 from tasks.identification.decision.rivals import RivalComparison, compare_with_rivals
-from tasks.identification.decision.screening import find_detectable_sizes
+from tasks.identification.decision.screening import can_show, find_detectable_sizes
 from tasks.identification.decision.search import SearchState
 from tasks.identification.decision.superseded import drop_superseded
 from tasks.identification.decision.words import say_confirmation, say_rejection
@@ -99,17 +99,12 @@ def find_missing_effects(
         If the car's equations are not the model's, so that single effects cannot be told; `judge_jointly` can.
     """
     progress("derivatives")
+    shown = [effect for effect in effects if can_show(effect, vehicle, campaign.channels)]
     evidence, null = prepare_evidence(
         campaign,
         vehicle,
         surface,
-        tuple(
-            e
-            for e in effects
-            if not _is_fixed(e, vehicle)
-            and e.parameters[0].name not in hardly_known
-            and _is_visible(e, campaign.channels)
-        ),
+        tuple(e for e in shown if e.parameters[0].name not in hardly_known),
         rules,
         hardly_known,
     )
@@ -175,9 +170,9 @@ def find_missing_effects(
             " held-out runs do not tell them apart"
         )
     reasons += filter(None, (say_confirmation(c.own) for c in compared))
-    reasons += tell_like_instruments(campaign, named, [rival.name for _, rival in near])
     if not named and not reasons:
         reasons.append(say_rejection(tried))
+    reasons += tell_log_faults(campaign, named, [rival.name for _, rival in near])
     present = [name for name, value in vehicle.effects.items() if value] + [f.name for f in vehicle.forms]
     if present:
         reasons.append(f"{vehicle.name} already has {', '.join(present)}: what is named comes on top of that")
@@ -268,20 +263,6 @@ def _object_to_last(
                 f" {1.0 - share:.0%} to the error of any channel of the held-out runs: not named"
             )
     return None
-
-
-def _is_fixed(effect: Effect, vehicle: Vehicle) -> bool:
-    """Whether the vehicle has an effect of several parameters already: those cannot be found as a change of it."""
-    return len(effect.parameters) > 1 and any(vehicle.effects.get(p.name) for p in effect.parameters)
-
-
-def _is_visible(effect: Effect, channels: Sequence[str]) -> bool:
-    """Whether an effect that depends on slip has the wheel speed that slip is made of.
-
-    Without one it is a lag of the car's force, and any other lag of a car with other equations passes for it: of
-    eight logs of the double-track car without an effect, speed and acceleration alone named three relaxation lengths.
-    """
-    return effect.variable != "slip" or any(name.startswith("wheel_speed") for name in channels)
 
 
 def _to_tell_apart(

@@ -16,7 +16,7 @@ from tasks.identification.decision.answer import (
     make_estimate,
 )
 from tasks.identification.decision.held_out import is_predicted_better
-from tasks.identification.decision.instruments import tell_like_instruments
+from tasks.identification.decision.log_faults import tell_log_faults
 from tasks.identification.decision.missed import tell_miss
 from tasks.identification.inference.disturbance import Disturbance
 from tasks.identification.joint.calibration import fit_first_numbers, is_gain_unknown
@@ -128,7 +128,7 @@ def judge_jointly(
     kind = _kind(effects, rivals)
     reasons += tell_what_was_used(campaign, train, agreeing, joint)
     reasons += tell_rivals(effects, rivals, shown)
-    reasons += tell_like_instruments(campaign, effects, [rival.name for _, rival in rivals])
+    reasons += tell_log_faults(campaign, effects, [rival.name for _, rival in rivals])
     reasons += tell_lumped_resistance(fitted.numbers, [stop.model for stop in train], joint)
     verdict = Verdict(
         verdict=kind,

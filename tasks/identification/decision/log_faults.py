@@ -7,9 +7,7 @@ from tasks.campaign.resting_pressure import describe_rest, measure_resting_level
 from tasks.identification.decision.answer import NamedEffect
 
 
-def tell_like_instruments(
-    campaign: Campaign, named: Sequence[NamedEffect], rivals: Collection[str]
-) -> list[str]:
+def tell_log_faults(campaign: Campaign, named: Sequence[NamedEffect], rivals: Collection[str]) -> list[str]:
     """Return a sentence for each fault of the log that a named effect may be, and on a gauge that rests above 0.
 
     Parameters

@@ -1,14 +1,14 @@
-"""What a fault of the log looks like exactly is told beside the name, for no search can tell the two apart."""
+"""A fault of the log that looks exactly like a named effect is told beside it, for no search can tell the two apart."""
 
 from dataclasses import replace
 
 from tasks.campaign.campaign import Campaign
 from tasks.identification.decision.answer import NamedEffect, Parameter
-from tasks.identification.decision.instruments import tell_like_instruments
+from tasks.identification.decision.log_faults import tell_log_faults
 from tests.identification.synthetic import TOLERANCES, plain_run
 
 
-def named(name: str) -> NamedEffect:
+def make_effect(name: str) -> NamedEffect:
     p = Parameter(name=name, value=0.1, ci_low=0.0, ci_high=1.0, lower=0.0, upper=1.0, unit="s")
     return NamedEffect(
         name=name, effect_class="effect", port="", variable="", parameters=(p,), score=0.0, gain=0.0,
@@ -27,17 +27,17 @@ def campaign_at_rest(pressure: float) -> Campaign:
 def test_a_gauge_that_drifts_is_told_and_a_zero_that_was_taken_off_is_too() -> None:
     drifting = campaign_at_rest(0.0)
     runs = tuple(replace(run, pressure=run.pressure + 0.04 * k) for k, run in enumerate(drifting.runs))
-    (told,) = tell_like_instruments(replace(drifting, runs=runs), (), ())
+    (told,) = tell_log_faults(replace(drifting, runs=runs), (), ())
     assert "rests at 0.000 (run-1) to 0.080 MPa (run-3)" in told
-    (told,) = tell_like_instruments(replace(drifting, gauge_zero=0.08), (), ())
+    (told,) = tell_log_faults(replace(drifting, gauge_zero=0.08), (), ())
     assert "rests at 0.080 MPa" in told and "touch would look the same" in told
-    assert tell_like_instruments(drifting, (), ()) == []
-    assert tell_like_instruments(replace(drifting, runs=runs, brake_signal="brake_command"), (), ()) == []
+    assert tell_log_faults(drifting, (), ()) == []
+    assert tell_log_faults(replace(drifting, runs=runs, brake_signal="brake_command"), (), ()) == []
 
 
 def test_a_late_brake_is_told_to_look_like_a_late_clock_unless_the_speeds_own_delay_is_a_rival() -> None:
-    campaign, late = campaign_at_rest(0.0), [named("brake_dead_time")]
-    (told,) = tell_like_instruments(campaign, late, ["brake_lag"])
+    campaign, late = campaign_at_rest(0.0), [make_effect("brake_dead_time")]
+    (told,) = tell_log_faults(campaign, late, ["brake_lag"])
     assert "share a clock" in told
-    assert tell_like_instruments(campaign, late, ["sensor_speed_delay"]) == []
-    assert tell_like_instruments(campaign, [named("brake_lag")], ()) == []
+    assert tell_log_faults(campaign, late, ["sensor_speed_delay"]) == []
+    assert tell_log_faults(campaign, [make_effect("brake_lag")], ()) == []
