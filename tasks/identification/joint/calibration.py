@@ -1,6 +1,6 @@
 """The brake's gain, found before anything else: of a car that its file knows but for it, single effects can be told."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -51,7 +51,7 @@ def is_gain_unknown(campaign: Campaign, rules: JointRules) -> bool:
 
 
 def fit_first_numbers(
-    train: Sequence[Stop], shown: Sequence[JointNumber], starts: Sequence[Mapping[str, float]]
+    train: Sequence[Stop], shown: Iterable[JointNumber], starts: Sequence[Mapping[str, float]]
 ) -> JointFit:
     """Fit the few numbers that matter most, from the best of several starts.
 

@@ -8,10 +8,14 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from tasks.identification.inference.noise import correlate_with_next
-from tasks.identification.joint.fit import JointFit, fit_jointly
+from tasks.identification.joint.fit import JointFit, describe_fit, fit_jointly
 from tasks.identification.joint.numbers import JointNumber
 from tasks.identification.joint.stops import Stop
 from tasks.identification.rules import JointRules
+
+FORESEEN_SHARE = 0.05
+"""Share of what a substitute must make good, from which on it is fitted [1]; a fit of a late brake makes good ten times
+what its derivatives foresee where no delay is free."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -190,6 +194,35 @@ def refit_numbers(
     return fit_jointly(stops, numbers, [begin], scales=fitted.scales, offsets=fitted.offsets)[0]
 
 
+def foresee_falls(
+    stops: Sequence[Stop], fitted: JointFit, others: Sequence[JointNumber]
+) -> NDArray[np.float64]:
+    """Return by how much the cost of a fit would fall with each other number free beside it, linearly, float64 [O].
+
+    Parameters
+    ----------
+    stops : its runs
+    fitted : the fit
+    others : that are not free in it
+    """
+    numbers = (*fitted.numbers, *others)
+    values = np.append(fitted.values, np.zeros(len(others)))
+    beside = describe_fit(stops, numbers, values, fitted.offsets, fitted.scales, fitted.cost)
+    information = np.diag([1.0 / n.sigma**2 for n in numbers])
+    gradient = np.zeros(len(numbers))
+    for residual, slope in zip(beside.residuals, beside.slopes, strict=True):
+        weighted = slope.T / np.sqrt(1.0 + residual**2)  # as the robust loss weighs them
+        information += weighted @ slope
+        gradient += weighted @ residual
+    falls = np.zeros(len(others))
+    for i, other in enumerate(others):
+        free = [*range(len(fitted.numbers)), len(fitted.numbers) + i]
+        variance = np.linalg.inv(information[np.ix_(free, free)])[-1, -1]
+        if -variance * gradient[free[-1]] > other.lower:
+            falls[i] = 0.5 * variance * gradient[free[-1]] ** 2
+    return falls
+
+
 def find_substitutes(
     stops: Sequence[Stop],
     fitted: JointFit,
@@ -219,7 +252,9 @@ def find_substitutes(
         rest = tuple(n for n in fitted.numbers if n is not number)
         without = refit_numbers(stops, fitted, rest)
         worth = without.cost - fitted.cost
-        for other in others:
+        for other, fall in zip(others, foresee_falls(stops, without, others), strict=True):
+            if fall < FORESEEN_SHARE * share * worth:
+                continue
             instead = refit_numbers(stops, without, (*rest, other), {other.name: 0.5 * other.sigma})
             if instead.cost < fitted.cost + (1.0 - share) * worth:
                 found.append(Substitute(of=number.name, name=other.name, fitted=instead))

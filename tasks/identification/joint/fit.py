@@ -8,6 +8,12 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from tasks.campaign.campaign import CHANNELS
+from tasks.identification.joint.derivatives import (
+    OFFSET_STEP,
+    differentiate_run,
+    name_values,
+    weigh_misfit,
+)
 from tasks.identification.joint.numbers import JointNumber
 from tasks.identification.joint.stops import (
     FITTED,
@@ -20,9 +26,6 @@ from tasks.identification.joint.stops import (
 
 SCALES = {"speed": 0.15, "longitudinal_acceleration": 0.6, "wheel_speed_front": 0.6, "wheel_speed_rear": 0.6}
 """Size of a misfit that counts one before the residuals say how large it is [the channel's unit]."""
-STEPS = 1.0 / 30.0
-"""Finite-difference step over the prior sigma."""
-OFFSET_STEP = 0.02
 FACTORS = (1.0, 0.5, 2.0)
 """Brake gains from which a fit starts, over the gain that the deceleration by pressure suggests."""
 MOST_EVALUATIONS = 30
@@ -58,7 +61,7 @@ class JointFit:
     @property
     def by_name(self) -> dict[str, float]:
         """Values of the numbers."""
-        return {n.name: float(v) for n, v in zip(self.numbers, self.values, strict=True)}
+        return name_values(self.numbers, self.values)
 
 
 def fit_jointly(
@@ -121,30 +124,13 @@ def lead_offsets(
     end = max(stop.onset - 1, 3) if stop.onset < stop.model.samples else max(stop.model.samples // 5, 3)
 
     def residual(x: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.concatenate((_weighted(stop, numbers, x, scales, end), x / OFFSET_SIGMA))
+        return np.concatenate((weigh_misfit(stop, numbers, x, scales, end), x / OFFSET_SIGMA))
 
     limit = OFFSET_LIMIT
     found = least_squares(
         residual, np.zeros(len(OFFSETS)), bounds=(-limit, limit), diff_step=OFFSET_STEP, max_nfev=15
     )
     return np.asarray(found.x)
-
-
-def _weighted(
-    stop: Stop,
-    numbers: Mapping[str, float],
-    offsets: NDArray[np.float64],
-    scales: NDArray[np.float64],
-    end: int | None = None,
-) -> NDArray[np.float64]:
-    """Return measured less model over the scales until an instant, float64 [M]; each sample weighs as at 20 Hz."""
-    left = stop.measured - predict_stop(stop, numbers, offsets)[:, stop.channels]
-    apart = stop.model.samples / stop.model.count_samples()[stop.channels]
-    weight = np.sqrt(np.minimum(apart * stop.model.run.interval / 0.05, 1.0))
-    weighted = np.asarray(weight * left / scales[stop.channels], dtype=np.float64)[:end]
-    if stop.model.sampled is None:
-        return weighted.ravel()
-    return weighted[stop.model.sampled[:end, stop.channels]]
 
 
 def _fit_from(
@@ -155,7 +141,6 @@ def _fit_from(
     offsets: NDArray[np.float64] | None,
 ) -> JointFit:
     k, own = len(numbers), len(OFFSETS)
-    sigma = np.array([n.sigma for n in numbers])
     lower = np.concatenate(([n.lower for n in numbers], np.tile(-OFFSET_LIMIT, len(stops))))
     upper = np.concatenate(([n.upper for n in numbers], np.tile(OFFSET_LIMIT, len(stops))))
     began = np.zeros((len(stops), own)) if offsets is None else offsets
@@ -163,44 +148,63 @@ def _fit_from(
         ([start.get(n.name, 0.3 * n.sigma if n.lower == 0.0 else 0.0) for n in numbers], began.ravel())
     )
     x = np.clip(x, lower + 1e-6 * (upper - lower), upper - 1e-6 * (upper - lower))
-    prior = np.concatenate((1.0 / sigma, np.tile(1.0 / OFFSET_SIGMA, len(stops))))
-    steps = np.concatenate((STEPS * sigma, np.full(own * len(stops), OFFSET_STEP)))
-    names = [n.name for n in numbers]
+    prior = np.concatenate(([1.0 / n.sigma for n in numbers], np.tile(1.0 / OFFSET_SIGMA, len(stops))))
 
-    def of_run(i: int, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        values = dict(zip(names, x[:k].tolist(), strict=True))
-        return _weighted(stops[i], values, x[k + own * i : k + own * (i + 1)], scales)
+    def split(i: int, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        return x[:k], x[k + own * i : k + own * (i + 1)]
 
     def residual(x: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.concatenate((*(of_run(i, x) for i in range(len(stops))), prior * x))
-
-    def run_slopes(i: int, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        here = of_run(i, x)
-        columns = np.zeros((len(here), len(x)))
-        for j in (*range(k), *range(k + own * i, k + own * (i + 1))):
-            step = steps[j] if x[j] + steps[j] <= upper[j] else -steps[j]
-            moved = x.copy()
-            moved[j] += step
-            columns[:, j] = (of_run(i, moved) - here) / step
-        return columns
+        runs = []
+        for i, stop in enumerate(stops):
+            values, offset = split(i, x)
+            runs.append(weigh_misfit(stop, name_values(numbers, values), offset, scales))
+        return np.concatenate((*runs, prior * x))
 
     def jacobian(x: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.vstack((*(run_slopes(i, x) for i in range(len(stops))), np.diag(prior)))
+        runs = []
+        for i, stop in enumerate(stops):
+            _, columns = differentiate_run(stop, numbers, *split(i, x), scales)
+            placed = np.zeros((len(columns), len(x)))
+            placed[:, :k], placed[:, k + own * i : k + own * (i + 1)] = columns[:, :k], columns[:, k:]
+            runs.append(placed)
+        return np.vstack((*runs, np.diag(prior)))
 
     found = least_squares(
         residual, x, jac=jacobian, bounds=(lower, upper), loss="soft_l1", x_scale="jac", ftol=ENOUGH, xtol=ENOUGH,
         max_nfev=MOST_EVALUATIONS,
     )  # fmt: skip
-    residuals = tuple(of_run(i, found.x) for i in range(len(stops)))
-    full = [run_slopes(i, found.x) for i in range(len(stops))]
-    slopes = tuple(
-        _without_offsets(columns[:, :k], columns[:, k + own * i : k + own * (i + 1)])
-        for i, columns in enumerate(full)
-    )
-    information = np.diag(1.0 / sigma**2) + sum(a.T @ a for a in slopes)
+    return describe_fit(stops, numbers, found.x[:k], found.x[k:].reshape(-1, own), scales, float(found.cost))
+
+
+def describe_fit(
+    stops: Sequence[Stop],
+    numbers: tuple[JointNumber, ...],
+    values: NDArray[np.float64],
+    offsets: NDArray[np.float64],
+    scales: NDArray[np.float64],
+    cost: float,
+) -> JointFit:
+    """Return a point of the fit with its residuals and derivatives.
+
+    Parameters
+    ----------
+    stops : training runs
+    numbers : of the fit
+    values : float64 [K] of the numbers
+    offsets : float64 [R, 3] of the runs
+    scales : float64 [7] size of a misfit that counts one
+    cost : robust misfit with the priors, over 2
+    """
+    k = len(numbers)
+    runs = [
+        differentiate_run(stop, numbers, values, own, scales)
+        for stop, own in zip(stops, offsets, strict=True)
+    ]
+    slopes = tuple(_without_offsets(columns[:, :k], columns[:, k:]) for _, columns in runs)
+    information = np.diag([1.0 / n.sigma**2 for n in numbers]) + sum(a.T @ a for a in slopes)
     return JointFit(
-        numbers=numbers, values=found.x[:k], offsets=found.x[k:].reshape(-1, own), cost=float(found.cost),
-        residuals=residuals, slopes=slopes, information=np.asarray(information), scales=scales,
+        numbers=numbers, values=values, offsets=offsets, cost=cost, residuals=tuple(left for left, _ in runs),
+        slopes=slopes, information=np.asarray(information), scales=scales,
     )  # fmt: skip
 
 

@@ -91,11 +91,13 @@ def choose_numbers(
 
 def free_numbers(
     shown: Sequence[JointNumber], models: Sequence[RunModel], rules: JointRules
-) -> tuple[JointNumber, ...]:
-    """Return those of the numbers that a fit may move together; others only stand in for one of them.
+) -> list[tuple[JointNumber, ...]]:
+    """Return the sets of numbers that a fit may move together; others only stand in for one of them.
 
-    A late speed and a late brake look the same where no accelerometer was measured. Resistances are one lump until a
-    car has coasted down, and a lag and a dead time are one delay until a log is quick enough to tell them apart.
+    A late speed and a late brake look the same where no accelerometer was measured, and a lag and a dead time are one
+    delay until a log is quick enough to tell them apart. Resistances are one lump until a car has coasted down: there
+    is a set for each of them, because a lump of the wrong shape makes other numbers wrong. Air drag that stands for an
+    electric motor's drag at 8 m/s leaves a bent brake curve.
 
     Parameters
     ----------
@@ -103,13 +105,13 @@ def free_numbers(
     models : of its training runs
     rules : of the joint fit
     """
-    lumped = {"delay"} if models[0].run.interval > rules.delay_interval else set()
-    if not any(coasts_down(model, rules) for model in models):
-        lumped.add("resistance")
-    first: dict[str, str] = {}
-    for number in shown:
-        first.setdefault(number.group, number.name)
-    return tuple(n for n in shown if not n.stands_in and (n.group not in lumped or first[n.group] == n.name))
+    late = [n for n in shown if n.group == "delay" and not n.stands_in]
+    other_delays = set(late[1:]) if models[0].run.interval > rules.delay_interval else set()
+    free = tuple(n for n in shown if not n.stands_in and n not in other_delays)
+    resistances = [n for n in free if n.group == "resistance"]
+    if len(resistances) < 2 or any(coasts_down(model, rules) for model in models):
+        return [free]
+    return [tuple(n for n in free if n is one or n not in resistances) for one in resistances]
 
 
 def coasts_down(model: RunModel, rules: JointRules) -> bool:

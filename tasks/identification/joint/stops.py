@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from tasks.campaign.campaign import CHANNELS, Run
 from tasks.identification.inference.driver import LIFT, find_brake_onset
 from tasks.identification.inference.forward import (
+    READ_ALONE,
     RunModel,
     compute_instrument_readings,
     compute_starting_speed,
@@ -17,7 +18,8 @@ from tasks.identification.inference.forward import (
 )
 from tasks.identification.rules import JointRules
 from tasks.surface.state import SurfaceParameters
-from tasks.vehicle.effects.table import PARAMETERS, build_parameter_vector
+from tasks.vehicle.effects.table import PARAMETER_INDEX, PARAMETERS, build_parameter_vector
+from tasks.vehicle.model.simulation import Simulation
 from tasks.vehicle.parameters import Vehicle
 
 FITTED = ("speed", "longitudinal_acceleration", "wheel_speed_front", "wheel_speed_rear")
@@ -27,6 +29,8 @@ OFFSETS = ("initial_speed", "drive", "acceleration_bias")
 OFFSET_SIGMA = np.array([0.3, 2.0, 0.3])
 """Their priors."""
 OFFSET_LIMIT = np.array([3.0, 8.0, 3.0])
+STARTED = [row for row in PARAMETERS.values() if row.start != 0.0]
+"""Thresholds and references, each of which acts with the number of its effect."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,10 +102,8 @@ def _drive_share(model: RunModel, onset: int) -> NDArray[np.float64]:
     return np.clip(0.5 - late / LIFT, 0.0, 1.0)
 
 
-def predict_stop(
-    stop: Stop, numbers: Mapping[str, float], offsets: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return the readings of a run, float64 [N, 7] in the order of `CHANNELS`.
+def simulate_stop(stop: Stop, numbers: Mapping[str, float], offsets: NDArray[np.float64]) -> Simulation:
+    """Return the motion of a run.
 
     Parameters
     ----------
@@ -115,9 +117,37 @@ def predict_stop(
         torque = offsets[1] * model.vehicle.mass * model.vehicle.wheel_radius * stop.drive
         model = replace(model, run=replace(model.run, drive_torque=torque))
     speed = compute_starting_speed(model, theta) + float(offsets[0])
-    y = compute_instrument_readings(model, theta, simulate_run(model, theta, initial_speed=speed))
+    return simulate_run(model, theta, initial_speed=speed)
+
+
+def predict_stop(
+    stop: Stop, numbers: Mapping[str, float], offsets: NDArray[np.float64], motion: Simulation | None = None
+) -> NDArray[np.float64]:
+    """Return the readings of a run, float64 [N, 7] in the order of `CHANNELS`.
+
+    Parameters
+    ----------
+    stop, numbers, offsets : as `simulate_stop` takes them
+    motion : of the run with these numbers, where it is known
+    """
+    theta = build_parameter_vector(complete_numbers(numbers))
+    moved = simulate_stop(stop, numbers, offsets) if motion is None else motion
+    y = compute_instrument_readings(stop.model, theta, moved)
     y[:, CHANNELS.index("longitudinal_acceleration")] += offsets[2]
     return y
+
+
+def is_only_read(stop: Stop, name: str) -> bool:
+    """Whether one of `OFFSETS` or of the numbers leaves the motion of a run as it is, and moves its readings at most.
+
+    Parameters
+    ----------
+    stop : the run
+    name : of the offset or number
+    """
+    if name == "drive":
+        return not stop.drive.any()
+    return name == "acceleration_bias" or PARAMETER_INDEX.get(name) in READ_ALONE
 
 
 def complete_numbers(numbers: Mapping[str, float]) -> dict[str, float]:
@@ -127,10 +157,5 @@ def complete_numbers(numbers: Mapping[str, float]) -> dict[str, float]:
     ----------
     numbers : of the table of effects
     """
-    complete = dict(numbers)
-    for name, value in numbers.items():
-        if value != 0.0:
-            for row in PARAMETERS.values():
-                if row.effect == PARAMETERS[name].effect and row.start != 0.0:
-                    complete.setdefault(row.name, row.start)
-    return complete
+    moved = {PARAMETERS[name].effect for name, value in numbers.items() if value != 0.0}
+    return {row.name: row.start for row in STARTED if row.effect in moved} | dict(numbers)

@@ -167,12 +167,16 @@ def judge_jointly(
 
 
 def _fit_everything(
-    train: Sequence[Stop], starts: Sequence[Mapping[str, float]], shown: tuple[JointNumber, ...]
+    train: Sequence[Stop], starts: Sequence[Mapping[str, float]], sets: Sequence[tuple[JointNumber, ...]]
 ) -> JointFit:
-    """Return the fit of every number: from the best of several starts of the few that matter most."""
-    best = fit_first_numbers(train, shown, starts)
+    """Return the best fit of a set of numbers: each from the best of several starts of the few that matter most."""
+    best = fit_first_numbers(train, {n.name: n for numbers in sets for n in numbers}.values(), starts)
     scales = misfit_scales(best, train)
-    return fit_jointly(train, shown, [best.by_name], scales=scales, offsets=best.offsets)[0]
+    fits = [
+        fit_jointly(train, numbers, [best.by_name], scales=scales, offsets=best.offsets)[0]
+        for numbers in sets
+    ]
+    return min(fits, key=lambda fitted: fitted.cost)
 
 
 def _settle(

@@ -32,6 +32,11 @@ def fit_of(residuals: list[np.ndarray], value: float = 0.1) -> JointFit:
     )  # fmt: skip
 
 
+def foresee_much(_stops, _fitted, others):
+    """Foresee that every number makes good all that is missing."""
+    return np.full(len(others), 1e6)
+
+
 def test_residuals_that_remember_widen_an_error_up_to_a_limit():
     fitted = fit_of([np.full(400, 2.0)])  # correlated by 0.9975 from sample to sample
     for most in (0.5, RULES.most_residual_correlation):
@@ -67,6 +72,7 @@ def test_whatever_explains_nearly_as_much_is_a_rival_of_whichever_kind(monkeypat
         return replace(fitted, numbers=numbers, cost=min(cost.get(name, 110.0) for name in left or {""}))
 
     monkeypatch.setattr(elimination, "refit_numbers", look_up_cost)
+    monkeypatch.setattr(elimination, "foresee_falls", foresee_much)
     found = find_substitutes([], named, list(NUMBERS.values()), 0.85)
     assert [(one.of, one.name) for one in found] == [("pressure_curve", "engine_torque")]
 
@@ -81,6 +87,7 @@ def test_a_gain_that_the_file_claims_to_know_may_stand_for_a_resistance(monkeypa
         )
 
     monkeypatch.setattr(elimination, "refit_numbers", look_up_cost)
+    monkeypatch.setattr(elimination, "foresee_falls", foresee_much)
     assert find_substitutes([], named, list(NUMBERS.values()), 0.85) == []
     (found,) = find_substitutes([], named, list(NUMBERS.values()), 0.85, {"pressure_gain"})
     assert (found.of, found.name) == ("pressure_gain", "rolling_coefficient")
