@@ -18,7 +18,9 @@ def shorten_import(result: dict[str, Any]) -> dict[str, Any]:
     if "signals" not in result:
         assumed = result["assumed_tolerances_1sigma"]
         told = ", ".join(f"{name} {sigma:g}" for name, sigma in assumed.items())
-        return result | {"assumed_tolerances_1sigma": told or "none"}
+        runs = [run | {"start_s": _write_time(run["start_s"])} for run in result.get("runs", [])]
+        listed = {"runs": runs} if runs else {}
+        return result | listed | {"assumed_tolerances_1sigma": told or "none"}
     return {
         file: [_shorten_signal(row, any(row["note"] for row in rows)) for row in rows]
         for file, rows in result["signals"].items()
@@ -26,15 +28,18 @@ def shorten_import(result: dict[str, Any]) -> dict[str, Any]:
 
 
 def _shorten_signal(row: dict[str, Any], noted: bool) -> dict[str, Any]:
-    def format_range(low: float | None, high: float | None) -> str | None:
-        return None if low is None else f"{low:.6g} to {high:.6g}"
-
+    start, low = row["start_s"], row["lowest"]
     return {
         **{key: row[key] for key in ("signal", "unit", "samples", "rate_hz")},
-        "time_s": format_range(row["start_s"], row["end_s"]),
-        "range": format_range(row["lowest"], row["highest"]),
+        "time_s": None if start is None else f"{_write_time(start)} to {_write_time(row['end_s'])}",
+        "range": None if low is None else f"{low:.6g} to {row['highest']:.6g}",
         **({"note": row["note"]} if noted else {}),
     }
+
+
+def _write_time(seconds: float) -> str:
+    """Return a logger's time to the millisecond [s]; one that counts from 1970 has ten digits before the point."""
+    return f"{round(seconds, 3) + 0.0:.3f}".rstrip("0").rstrip(".")  # -0.0004 is 0, and not -0
 
 
 def shorten_brake_protocol(result: dict[str, Any]) -> dict[str, Any]:

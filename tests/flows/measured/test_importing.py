@@ -243,3 +243,16 @@ def test_the_terminal_tells_what_was_assumed_in_one_line() -> None:
     brief = shorten_import({"campaign": "a", "assumed_tolerances_1sigma": told})
     assert brief["assumed_tolerances_1sigma"] == "pressure_gain 0.3, run.friction 0.1"
     assert shorten_import({"assumed_tolerances_1sigma": {}})["assumed_tolerances_1sigma"] == "none"
+
+
+def test_the_terminal_tells_the_times_of_a_clock_that_counts_from_1970() -> None:
+    start = 1554115465.662651
+    brief = shorten_import(
+        {"assumed_tolerances_1sigma": {}, "runs": [{"run": "run-01", "start_s": start, "duration_s": 5.0}]}
+    )
+    assert brief["runs"] == [{"run": "run-01", "start_s": "1554115465.663", "duration_s": 5.0}]
+    row = {"signal": "v", "unit": "", "samples": 2, "rate_hz": 1.0, "lowest": 0.0, "highest": 1.0, "note": ""}
+    listed = {"signals": {"bus.json": [row | {"start_s": start, "end_s": start + 906.25}]}}
+    assert shorten_import(listed)["bus.json"][0]["time_s"] == "1554115465.663 to 1554116371.913"
+    from_zero = {"signals": {"a.csv": [row | {"start_s": -0.0004, "end_s": 10.0}]}}
+    assert shorten_import(from_zero)["a.csv"][0]["time_s"] == "0 to 10"
