@@ -32,6 +32,7 @@ from tasks.campaign.resting_pressure import find_gauge_zero, measure_resting_lev
 from tasks.campaign.run_validation import COLUMN_UNITS, motion_problem, run_problems
 from tasks.campaign.slow_channels import collect_samples, fill_between_samples
 from tasks.errors import InputError
+from tasks.surface.weather import DRY
 
 NEEDED = ("brake_pressure", "speed")
 """Channels without which a campaign says nothing; another of `BRAKE_SIGNALS` may stand in for the first."""
@@ -138,7 +139,8 @@ def read_campaign(folder: str | Path) -> Campaign:
             first, _ = find_motion(run.speed)
             runs.append(run.begin_at(first) if first else run)
     if header.brake_stands_for is None:
-        problems += gain_problems(readable, interval)
+        slippery = [row["run"] for row in rows if row["weather"] != DRY]
+        problems += gain_problems(readable, interval, slippery=slippery)
     if problems:
         raise InputError(cap_problems([f"{shorten(folder.name)}: {problem}" for problem in problems]))
     taught = {name: columns for name, columns in readable.items() if name not in judged}

@@ -29,6 +29,7 @@ from tasks.campaign.signals import Signal
 from tasks.campaign.slow_channels import measure_slow_rates
 from tasks.campaign.wheel_validation import describe_km_h
 from tasks.errors import InputError
+from tasks.surface.weather import DRY
 
 COMPUTED = (
     "channel longitudinal_acceleration is the rate of the speed, not an accelerometer of its own: it is left out, as"
@@ -96,7 +97,8 @@ def import_measurements(
     interval = 1.0 / channel_map.sample_rate_hz
     readable = {run.name: found.readable for run, found in made}
     if not _has_stand_in(channel_map):
-        problems += gain_problems(readable, interval)
+        slippery = [run.name for run, _ in made if run.conditions.weather != DRY]
+        problems += gain_problems(readable, interval, slippery=slippery)
     problems += [
         f"{run.name} ({run.file.name}): {problem}"
         for run, found in made

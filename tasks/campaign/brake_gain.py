@@ -4,7 +4,7 @@ One run alone does not tell it: in a gentle stop an engine, or a motor that blen
 most of the deceleration, and at the limit of friction the pressure gives no more.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,14 +45,21 @@ class Braking:
     torque: NDArray[np.float64]
 
 
-def gain_problems(runs: Mapping[str, Mapping[str, NDArray[np.float64]]], interval: float) -> list[str]:
+def gain_problems(
+    runs: Mapping[str, Mapping[str, NDArray[np.float64]]], interval: float, *, slippery: Collection[str] = ()
+) -> list[str]:
     """Return the problem of a pressure whose unit or scale is wrong; none where the runs do not tell it.
+
+    On a dry road no pressure that a gauge shows is too high for what the tyres give. On a slippery one it is: a driver
+    who stands on the pedal puts 15 MPa into the master cylinder and slows by 2 m/s^2 on snow. Such runs do not tell
+    that the pressure is too large.
 
     Parameters
     ----------
     runs : channels of each run by name, each float64 [N], in campaign units; a pressure must be one, and not another
         signal in its place
     interval : of their clock [s]
+    slippery : names of the runs on a road that is not dry
     """
     braking = [
         _collect_braking(run, columns, interval)
@@ -63,13 +70,15 @@ def gain_problems(runs: Mapping[str, Mapping[str, NDArray[np.float64]]], interva
     if not braking:
         return []
     low, high = DECELERATION_PER_PRESSURE
-    least, most = _bound_gain(braking)
-    if most < low or least > high:
+    gripping = [part for part in braking if part.run not in slippery]
+    if gripping and _bound_gain(gripping)[1] < low:
+        return [_describe_gain(gripping)]
+    if _bound_gain(braking)[0] > high:
         return [_describe_gain(braking)]
     # one recording of its own scale; its slope says less than that of all runs
     alone = [(part, _compute_gain(part, 0.0), _compute_gain(part, WITHOUT_BRAKE)) for part in braking]
     wrong = [
-        [part for part, most, _ in alone if most < low],
+        [part for part, most, _ in alone if most < low and part in gripping],
         [part for part, _, least in alone if least > high],
     ]
     return [_describe_gain(parts) for parts in wrong if parts]

@@ -74,6 +74,25 @@ def test_one_recording_of_its_own_scale_is_named(factor: float) -> None:
     assert "over the braking of s3, which" in problem
 
 
+@pytest.mark.parametrize("dry", [PLAIN, []])
+def test_anti_lock_stops_on_a_slippery_road_are_no_fault_of_the_gauge(
+    dry: list[dict[str, np.ndarray]],
+) -> None:
+    snow = [make_stop(15.0, most=2.0), make_stop(14.0, most=3.5)]
+    runs = make_runs(*dry, *snow)
+    slippery = list(runs)[len(dry) :]
+    assert gain_problems(runs, INTERVAL, slippery=slippery) == []
+    (problem,) = gain_problems(runs, INTERVAL)
+    assert f"over the braking of {', '.join(slippery)}, which" in problem
+
+
+@pytest.mark.parametrize(("scale", "named"), [(12.0, "s1, s2, s3, which"), (0.1, "s1, s2, s3, s4, which")])
+def test_a_stop_on_a_slippery_road_hides_no_wrong_scale(scale: float, named: str) -> None:
+    runs = make_runs(*PLAIN, make_stop(1.0, most=1.6), scale=scale)
+    (problem,) = gain_problems(runs, INTERVAL, slippery=["s4"])
+    assert named in problem
+
+
 def test_a_measured_motor_is_no_fault_of_the_gauge_even_at_one_pressure() -> None:
     alike = [make_stop(0.1, motor=1.0)] * 3
     for stop in alike:

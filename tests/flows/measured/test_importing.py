@@ -256,3 +256,18 @@ def test_the_terminal_tells_the_times_of_a_clock_that_counts_from_1970() -> None
     assert shorten_import(listed)["bus.json"][0]["time_s"] == "1554115465.663 to 1554116371.913"
     from_zero = {"signals": {"a.csv": [row | {"start_s": -0.0004, "end_s": 10.0}]}}
     assert shorten_import(from_zero)["a.csv"][0]["time_s"] == "0 to 10"
+
+
+def test_anti_lock_stops_on_a_wet_road_are_imported_and_read(tmp_path: Path) -> None:
+    for number in range(2):
+        columns = braking_columns(4.0 + number)
+        columns["brake_pressure"] *= 7.0
+        write_csv(tmp_path / f"stop-{number}.csv", log_signal(columns))
+    runs = [
+        {"name": f"r{i}", "file": f"stop-{i}.csv", "part": "held_out" if i else "train"} for i in range(2)
+    ]
+    with pytest.raises(InputError, match=r"gives 0\.2\d* m/s\^2 per MPa over the braking of r0, r1, which"):
+        import_measurements(str(tmp_path), map=write_map(tmp_path, runs=runs), out=str(tmp_path / "dry"))
+    wet = write_map(tmp_path, runs=runs, conditions={"weather": "rain", "precipitation_mm_h": 25.0})
+    import_measurements(str(tmp_path), map=wet, out=str(tmp_path / "wet"))
+    assert [run.weather for run in read_campaign(tmp_path / "wet").runs] == ["rain", "rain"]
