@@ -21,6 +21,7 @@ from flows.store.telemetry import write_parquet
 from manifests.canonical import sha256_of_file
 from tasks.campaign.assembly import Assembled, assemble_run
 from tasks.campaign.brake_gain import gain_problems
+from tasks.campaign.brake_switch import describe_brake_switch
 from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME
 from tasks.campaign.held_inputs import describe_held_inputs
 from tasks.campaign.resting_pressure import describe_rest, measure_resting_levels
@@ -111,6 +112,7 @@ def import_measurements(
         raise InputError(problems)
     warnings = _list_warnings(channel_map, readable)
     warnings += describe_held_inputs(list(recordings.values()), channel_map.rules)
+    warnings += describe_brake_switch(list(recordings.values()), channel_map.rules)
     if any(found.computed for _, found in made):
         channel_map, made = _leave_out_acceleration(channel_map, made)
         warnings.append(COMPUTED)
