@@ -44,7 +44,7 @@ def tell_what_was_used(
     grip = (
         ""
         if any(saturates_tyres(stop.model, rules) for stop in train)
-        else "; no run passed the limit of the model's tyres"
+        else "; no run slowed down harder than the model's tyres allow"
     )
     stands_for = BRAKE_SIGNALS.get(campaign.brake_signal, 1.0)
     return [

@@ -10,7 +10,9 @@ from catalogs.effects import load_effects
 from catalogs.joint_numbers import load_joint_numbers
 from tasks.identification.decision.answer import NamedEffect, Parameter
 from tasks.identification.inference.forward import prepare_run
-from tasks.identification.joint.words import tell_lumped_resistance, tell_rivals
+from tasks.identification.joint.stops import make_stop
+from tasks.identification.joint.words import tell_lumped_resistance, tell_rivals, tell_what_was_used
+from tests.identification.joint.test_calibration import make_campaign
 from tests.identification.synthetic import SURFACE, VEHICLE, plain_run
 
 
@@ -83,3 +85,17 @@ def test_a_resistance_without_a_coast_down_is_told_to_be_the_sum_of_all():
     assert told.startswith("drag_area stands for air, tyres and engine together") and "coast down" in told
     assert tell_lumped_resistance([numbers["lag"]], models[:1], rules) == []
     assert tell_lumped_resistance([numbers["drag_area"]], models, rules) == []
+
+
+@pytest.mark.parametrize("deceleration, told", [(5.0, True), (12.0, False)])
+def test_a_full_stop_that_the_road_slows_less_than_the_model_is_told_for_what_it_is(
+    deceleration: float, told: bool
+) -> None:
+    rules = load_decision_rules().joint
+    run = plain_run(30.0, 15.0)
+    slowed = run.response.copy()
+    slowed[100:, 0] -= deceleration * 0.01 * np.arange(300) * (slowed[100:, 0] > 0.0)
+    campaign = make_campaign((replace(run, response=np.maximum(slowed, 0.0)),))
+    stops = [make_stop(run, VEHICLE, SURFACE, campaign.channels, rules) for run in campaign.train]
+    text = "; ".join(tell_what_was_used(campaign, stops, (1, 1), rules))
+    assert ("no run slowed down harder than the model's tyres allow" in text) is told
