@@ -82,7 +82,8 @@ def cut_segments(
     first, last = float(applied.time[0]), float(applied.time[-1])
     segments: list[Segment] = []
     long = [episode for episode in episodes if episode.duration >= cut.minimum]
-    for episode, following in zip(long, [*long[1:], None], strict=True):
+    # without any application the list of those that follow is not empty
+    for episode, following in zip(long, [*long[1:], None], strict=False):
         start = max(episode.onset_time - cut.before, segments[-1].end if segments else first)
         end = min(episode.end_time + cut.after, last)
         if following is not None and end > following.onset_time:

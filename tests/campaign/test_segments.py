@@ -39,6 +39,13 @@ def test_every_brake_signal_cuts_by_the_pressure_that_it_stands_for(channel: str
     assert find_brake_rule([SPEED]) is None
 
 
+@pytest.mark.parametrize("applied", [(), ((10.0, 10.2),)])
+def test_a_drive_without_a_brake_application_has_no_segments(
+    applied: tuple[tuple[float, float], ...],
+) -> None:
+    assert cut_drive(*applied) == []
+
+
 def test_a_segment_begins_where_the_one_before_it_ends() -> None:
     first, second, third = cut_drive((10.0, 12.0), (13.0, 14.0), (14.6, 16.0))
     assert (first.start, first.end) == pytest.approx((8.0, 12.5))
