@@ -29,6 +29,8 @@ SMOOTHING = 0.2
 """Width of the mean over which two channels are compared [s]."""
 DIVE_PER_DECELERATION = (0.02, 2.0)
 """Pitch that a road car's body gives per deceleration; the paper's vehicle has 0.4 [deg per m/s^2]."""
+HALF_GRAVITY = 4.9
+"""Mean from which an acceleration holds gravity: no road is so steep, and no offset so large [m/s^2]."""
 LARGEST_ACCELERATION, LARGEST_CORRECTION = 20.0, 0.5
 """Rate [m/s^2] and correction [m/s] by which speed changes at once at most, besides ten usual steps of its sensor."""
 
@@ -167,14 +169,11 @@ def plausibility_problems(
     if "speed" in smooth:
         rate = np.gradient(smooth["speed"], interval)
         if "longitudinal_acceleration" in smooth:
+            felt = smooth["longitudinal_acceleration"]
+            unit = units["longitudinal_acceleration"]
             problems += _pair_problems(
-                "longitudinal_acceleration",
-                smooth["longitudinal_acceleration"],
-                "the rate of speed",
-                rate,
-                0.8,
-                units["longitudinal_acceleration"],
-            )
+                "longitudinal_acceleration", felt, "the rate of speed", rate, 0.8, unit
+            ) or _axis_problems(felt, rate)
         if "pitch" in smooth:
             problems += _pitch_problems(smooth, rate, interval)
     if "pitch" in smooth and "pitch_rate" in smooth:
@@ -184,7 +183,7 @@ def plausibility_problems(
         )
     if "vertical_acceleration" in smooth:
         mean = float(np.mean(smooth["vertical_acceleration"]))
-        if abs(mean) > 4.9:
+        if abs(mean) > HALF_GRAVITY:
             problems.append(
                 f"channel vertical_acceleration must exclude gravity; its mean is {mean:.2f} m/s^2:"
                 f" take it out, by an offset of {-mean:.2f}"
@@ -232,6 +231,17 @@ def _pair_problems(
     hint = f"; taken as {mapped_unit}, it looks like {guess}" if guess else ""
     return [
         f"channel {name} is {slope:.3g} times {other_name}: the unit or scale of one of them is wrong{hint}"
+    ]
+
+
+def _axis_problems(felt: NDArray[np.float64], rate: NDArray[np.float64]) -> list[str]:
+    """Return the problem of a forward acceleration that holds gravity, as that of an axis which points down does."""
+    apart = float(np.mean(felt - rate))
+    if abs(apart) <= HALF_GRAVITY:
+        return []
+    return [
+        f"channel longitudinal_acceleration must follow the rate of speed; it is {apart:.2f} m/s^2 off on average,"
+        " which no road's slope explains: map the axis that points forward, or correct its offset"
     ]
 
 

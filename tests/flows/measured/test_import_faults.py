@@ -56,6 +56,7 @@ def _held(x: np.ndarray) -> np.ndarray:
         ("v_kmh", lambda x: x / 3.6, "wheel_speed_front give a rolling radius"),
         ("v_kmh", lambda x: x * 10, "channel speed reaches"),
         ("ax_g", lambda x: x * 9.81, "taken as g, it looks like m/s^2"),
+        ("ax_g", lambda x: 1.0 + 0.01 * np.sin(np.arange(len(x))), "m/s^2 off on average, which no road"),
         ("ax_g", lambda x: -x, "longitudinal_acceleration runs against the rate of speed"),
         ("p_bar", lambda x: x * 100, "channel brake_pressure reaches"),
         ("p_bar", lambda x: x / 10, "brake_pressure gives 15"),
