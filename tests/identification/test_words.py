@@ -6,10 +6,12 @@ from types import SimpleNamespace
 import pytest
 
 from catalogs.decision_rules import load_decision_rules
+from catalogs.effects import load_effects
 from tasks.identification.decision.answer import ChannelError, NamedEffect
 from tasks.identification.decision.attribution import Candidate
 from tasks.identification.decision.verdict import find_pair_to_confirm
 from tasks.identification.decision.words import say_confirmation, say_rejection, tell_verdict
+from tasks.vehicle.tyres.burckhardt import compute_burckhardt_friction, scale_burckhardt
 
 RULES = load_decision_rules()
 FORM = NamedEffect(
@@ -140,3 +142,15 @@ def test_an_instruments_error_is_told_by_its_own_channel_and_not_by_the_speed() 
     assert "the error of the longitudinal acceleration from 0.46 (re-tuned 0.44) to 0.073 m/s^2" in told
     assert "speed from" not in told and "stopping" not in told
     assert "of the speed from" in tell_verdict((replace(tilt, variable="speed"),), (), (), error, {})
+
+
+def test_a_lower_slip_stiffness_is_told_as_a_softer_tyre_that_reaches_its_peak_at_a_higher_slip() -> None:
+    effect = next(e for e in load_effects() if e.name == "retuned_slip_stiffness")
+    curve = (1.2801, 23.99, 0.52)
+    stiff, soft = (scale_burckhardt(curve, 1.0, 1.0 + change) for change in (0.0, -0.33))
+    assert compute_burckhardt_friction(0.01, 4000.0, soft) < compute_burckhardt_friction(0.01, 4000.0, stiff)
+    assert soft.target_slip > stiff.target_slip
+    assert (
+        effect.say({"slip_stiffness": -0.33})
+        == "the tyres' force rises with small slip at a rate 33 % below the vehicle file's"
+    )
