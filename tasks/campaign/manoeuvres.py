@@ -22,8 +22,9 @@ def manoeuvre_errors(
 ) -> NDArray[np.float64] | None:
     """Return model minus measured stopping distance and peak pitch, for several models of one run.
 
-    The distance counts from the first brake pressure to the lowest speed that the measurement and every model reach,
-    so that all distances end at one speed although the record ends at walking pace.
+    The distance counts from the first brake pressure to the lowest speed that the measurement and every model reach
+    by the last one, so that all distances end at one speed although the record ends at walking pace. Once the brake is
+    released a car hardly slows: a few cm/s then decide where, metres later, it reaches a speed.
 
     Parameters
     ----------
@@ -40,7 +41,8 @@ def manoeuvre_errors(
     if not pressed.size:
         return None
     both = np.concatenate((measured[None], predictions))[:, pressed[0] :]
-    lowest = np.minimum.accumulate(both[:, :, CHANNELS.index("speed")], axis=1)
+    braked = both[:, : pressed[-1] - pressed[0] + 1, CHANNELS.index("speed")]
+    lowest = np.minimum.accumulate(braked, axis=1)
     reached = float(np.max(lowest[:, -1]))
     if float(np.min(lowest[:, 0])) - reached < FELL:
         return None

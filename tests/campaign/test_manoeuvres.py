@@ -38,6 +38,18 @@ def test_a_run_that_coasts_has_no_stopping_distance() -> None:
     assert manoeuvre_errors(coasting, coasting[None], PRESSURE, 0.01) is None
 
 
+def test_the_distance_of_a_car_that_rolls_on_after_its_brake_ends_with_the_brake() -> None:
+    measured, softer = make_braked(5.0, 1.0), make_braked(4.9, 1.0)
+    released = T > 3.0
+    for y in (measured, softer):
+        speed = y[:, CHANNELS.index("speed")]
+        speed[released] = speed[~released][-1] - 0.05 * (T[released] - 3.0)
+    errors = manoeuvre_errors(measured, softer[None], np.where(released, 0.0, PRESSURE), 0.01)
+    assert errors is not None
+    reached = 20.0 - 4.9 * 2.0
+    assert errors[0, 0] == pytest.approx((20.0**2 - reached**2) / 2.0 * (1 / 4.9 - 1 / 5.0), abs=1e-3)
+
+
 def test_a_model_that_is_the_measurement_is_not_wrong() -> None:
     measured = make_braked(5.0, 1.0)
     errors = manoeuvre_errors(measured, measured[None], PRESSURE, 0.01)
