@@ -34,7 +34,8 @@ def tell_miss(verdict: Verdict, campaign: Campaign, limit: float) -> Verdict:
     limit : error over noise from which a run is missed [1]
     """
     ratio = compare_with_noise(campaign, verdict.error)
-    if ratio <= limit or verdict.disagreement:
+    # a disagreement says that nothing could be named, and not that what is named is not all
+    if ratio <= limit or (verdict.disagreement and not verdict.effects):
         return verdict
     missed = (
         f"the speed of the held-out runs is missed by {verdict.error['speed'].after:.3g} m/s, {ratio:.0f} times its"

@@ -9,7 +9,7 @@ import pytest
 from catalogs.decision_rules import load_decision_rules
 from catalogs.joint_numbers import load_joint_numbers
 from tasks.campaign.campaign import CHANNELS, Campaign, Run
-from tasks.identification.decision.missed import compare_with_noise
+from tasks.identification.decision.missed import compare_with_noise, tell_miss
 from tasks.identification.joint import verdict
 from tasks.identification.joint.calibration import needs_joint_fit
 from tasks.identification.joint.elimination import (
@@ -121,7 +121,13 @@ def test_a_stop_that_is_missed_beside_a_name_is_told():
     late, windy = campaign_of({"lag": 0.2}), campaign_of({"lag": 0.2, "drag_area": 3.0})
     trace = judge(replace(late, runs=(*late.runs[:-1], windy.runs[-1])))
     assert trace.verdict.effects and trace.verdict.disagreement == ""
-    assert trace.verdict.reasons[-1].endswith("what is named is not all that the model lacks")
+    said = "what is named is not all that the model lacks"
+    assert trace.verdict.reasons[-1].endswith(said)
+    # why single effects could not be told does not say that these stops are missed
+    foreign = replace(trace.verdict, reasons=("the runs disagree",), disagreement="the runs disagree")
+    assert tell_miss(foreign, late, RULES.joint.foreign_misfit).reasons[-1].endswith(said)
+    nothing = replace(foreign, effects=())
+    assert tell_miss(nothing, late, RULES.joint.foreign_misfit) is nothing
 
 
 def test_a_gain_that_predicts_unseen_stops_is_told_and_grown_although_nothing_is_named():
