@@ -6,6 +6,7 @@ import pytest
 
 from catalogs.decision_rules import load_decision_rules
 from tasks.identification.decision.rivals import _is_as_wrong, is_close
+from tasks.identification.decision.superseded import is_named
 
 RULES = load_decision_rules()
 
@@ -46,3 +47,9 @@ def test_a_number_that_looks_like_the_named_one_needs_no_score_to_be_its_rival(
     number = candidate(-3.7, gain)
     number.fitted = SimpleNamespace(at_bound=at_bound)
     assert _is_as_wrong(number) is rival
+
+
+def test_a_form_is_no_rival_of_itself_where_the_effect_that_it_was_held_against_was_taken_back():
+    form, effect = (SimpleNamespace(hypothesis=SimpleNamespace(name=n)) for n in ("form", "load_sensitivity"))
+    assert is_named(form, [SimpleNamespace(own=form)])
+    assert not is_named(form, [SimpleNamespace(own=effect)])

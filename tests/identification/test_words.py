@@ -144,6 +144,19 @@ def test_an_instruments_error_is_told_by_its_own_channel_and_not_by_the_speed() 
     assert "of the speed from" in tell_verdict((replace(tilt, variable="speed"),), (), (), error, {})
 
 
+def test_a_form_of_another_shape_is_not_told_as_the_same_words_again() -> None:
+    speed = ChannelError(
+        frozen=0.42, retuned=0.41, after=0.07, ci_low=0.0, ci_high=1.0, change_low=-1.0, change_high=0.0, wins=2,
+        worst_run="a", unit="m/s",
+    )  # fmt: skip
+    drag = replace(FORM, name="drag_form", port="longitudinal_force")
+    told = tell_verdict((FORM,), (replace(FORM, name="other_shape"),), (), {"speed": speed}, {})
+    assert told.count("itch moment depends on speed") == 1
+    assert "cannot tell apart" not in told
+    both = tell_verdict((FORM,), (replace(FORM, name="other_shape"), drag), (), {"speed": speed}, {})
+    assert "or the longitudinal force depends on speed" in both and both.count("itch moment depends") == 1
+
+
 def test_a_lower_slip_stiffness_is_told_as_a_softer_tyre_that_reaches_its_peak_at_a_higher_slip() -> None:
     effect = next(e for e in load_effects() if e.name == "retuned_slip_stiffness")
     curve = (1.2801, 23.99, 0.52)

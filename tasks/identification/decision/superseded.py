@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from tasks.identification.decision.attribution import (
+    Candidate,
     assess_fit,
     refine_candidates,
     refit_without_part,
@@ -33,6 +34,17 @@ def drop_superseded(found: SearchState, compared: Sequence[RivalComparison]) -> 
     if not weak:
         return None
     return leave_out(found, min(weak)[1])
+
+
+def is_named(form: Candidate, compared: Sequence[RivalComparison]) -> bool:
+    """Return whether a form is among what is named, where the effect that it was held against may be taken back.
+
+    Parameters
+    ----------
+    form : that could not be told from the first name of the search
+    compared : each named effect beyond all others
+    """
+    return any(c.own.hypothesis.name == form.hypothesis.name for c in compared)
 
 
 def leave_out(found: SearchState, index: int) -> SearchState:

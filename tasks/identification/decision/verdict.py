@@ -37,7 +37,7 @@ from tasks.identification.decision.missed import tell_miss
 from tasks.identification.decision.rivals import RivalComparison, compare_with_rivals
 from tasks.identification.decision.screening import can_show, find_detectable_sizes
 from tasks.identification.decision.search import SearchState
-from tasks.identification.decision.superseded import drop_superseded
+from tasks.identification.decision.superseded import drop_superseded, is_named
 from tasks.identification.decision.words import say_confirmation, say_rejection
 from tasks.identification.inference.fit import Fit
 from tasks.identification.inference.hypothesis import compose_parameters, moves_speed
@@ -116,6 +116,7 @@ def find_missing_effects(
     while again := drop_superseded(found, compared):
         found = again
         compared = compare_with_rivals(found.evidence, found.base, found.rounds)
+    near_form = None if near_form is None or is_named(near_form, compared) else near_form
     if (agreed := settle_disputes(found, reasons)) is not found:
         found, near_form = agreed, None
         compared = compare_with_rivals(found.evidence, found.base, found.rounds)

@@ -66,8 +66,9 @@ def tell_verdict(
         )
     told = [say_effect(effect, library) for effect in effects]
     text = join_phrases(told)
-    if rivals:
-        others = [say_effect(rival, library) for rival in rivals]
+    # a form of another shape at the same port reads the same
+    others = [said for rival in rivals if (said := say_effect(rival, library)) not in told]
+    if others:
         choice = others[0] if len(others) == 1 else f"one of {len(others)} other explanations holds"
         text += f", or {choice}, which these runs cannot tell apart"
     figures = {"speed": error["speed"], **manoeuvres}
