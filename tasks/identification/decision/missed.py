@@ -38,7 +38,7 @@ def tell_miss(verdict: Verdict, campaign: Campaign, limit: float) -> Verdict:
     if ratio <= limit or (verdict.disagreement and not verdict.effects):
         return verdict
     missed = (
-        f"the speed of the held-out runs is missed by {verdict.error['speed'].after:.3g} m/s, {ratio:.0f} times its"
+        f"the speed of the held-out runs is missed by {verdict.error['speed'].after:.3g} m/s, {ratio:.3g} times its"
         f" noise (at most {limit:g})"
     )
     if not verdict.effects:

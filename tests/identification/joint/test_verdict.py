@@ -130,6 +130,14 @@ def test_a_stop_that_is_missed_beside_a_name_is_told():
     assert tell_miss(nothing, late, RULES.joint.foreign_misfit) is nothing
 
 
+def test_a_stop_that_is_just_missed_is_not_told_by_the_limit_itself():
+    campaign, told = campaign_of({}), slow_brakes().verdict
+    speed = told.error["speed"]
+    noise = speed.after / compare_with_noise(campaign, told.error)
+    missed = replace(told, error={**told.error, "speed": replace(speed, after=5.3 * noise)})
+    assert "5.3 times its noise (at most 5)" in tell_miss(missed, campaign, 5.0).reasons[-1]
+
+
 def test_a_gain_that_predicts_unseen_stops_is_told_and_grown_although_nothing_is_named():
     trace = judge(campaign_of({"pressure_gain": 0.3}))
     assert trace.verdict.verdict == "NOTHING" and trace.verdict.disagreement == ""
