@@ -167,3 +167,13 @@ def test_a_lower_slip_stiffness_is_told_as_a_softer_tyre_that_reaches_its_peak_a
         effect.say({"slip_stiffness": -0.33})
         == "the tyres' force rises with small slip at a rate 33 % below the vehicle file's"
     )
+
+
+def test_anti_dive_is_told_as_a_share_of_the_load_transfer_and_not_of_the_brake_force() -> None:
+    # the link carries anti_dive x brake force x h/L, some fifth of the share of the brake force itself
+    said = {e.name: e.say({e.parameters[0].name: 0.46}) for e in load_effects() if e.name.startswith("anti_")}
+    assert said == {
+        f"anti_{name}": f"the {axle} suspension's links take 46 % of the load transfer of the {axle} brakes off the"
+        " springs"
+        for name, axle in (("dive", "front"), ("lift", "rear"))
+    }
