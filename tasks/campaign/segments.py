@@ -82,8 +82,7 @@ def cut_segments(
     first, last = float(applied.time[0]), float(applied.time[-1])
     segments: list[Segment] = []
     long = [episode for episode in episodes if episode.duration >= cut.minimum]
-    # without any application the list of those that follow is not empty
-    for episode, following in zip(long, [*long[1:], None], strict=False):
+    for episode, following in zip(long, [*long, None][1:], strict=True):
         start = max(episode.onset_time - cut.before, segments[-1].end if segments else first)
         end = min(episode.end_time + cut.after, last)
         if following is not None and end > following.onset_time:
