@@ -34,7 +34,7 @@ def plan_runs(
 ) -> tuple[list[PlannedRun], list[str]]:
     """The runs that a map asks for: as it lists them, one per brake application, or one per file.
 
-    Brake applications that are no runs are told beside them, one sentence each.
+    Brake applications that are no runs, and recordings without one, are told beside them, one sentence each.
 
     Parameters
     ----------
@@ -138,7 +138,14 @@ def _cut_recordings(
     runs: list[PlannedRun] = []
     left_out: list[str] = []
     for file, signals in recordings.items():
-        for part in cut_segments(signals, channel_map.rules, rule, cut):
+        parts = cut_segments(signals, channel_map.rules, rule, cut)
+        if not parts:
+            left_out.append(
+                f"{shorten(file.relative_to(root))}: no run, for the brake is never applied above"
+                f" {segment.above_mpa:g} MPa for {segment.minimum_s:g} s: cut it by runs in place of segment where it"
+                " is to be used, as a coast-down is"
+            )
+        for part in parts:
             if part.fault:
                 place = f"{shorten(file.relative_to(root))} from {part.start:.3f} to {part.end:.3f} s"
                 left_out.append(f"{place}: {part.fault}")

@@ -176,6 +176,24 @@ def test_a_segment_that_is_no_run_is_listed_and_the_others_come_in(tmp_path: Pat
     ]  # fmt: skip
 
 
+def test_a_recording_that_never_brakes_is_listed_beside_the_segments(tmp_path: Path) -> None:
+    log = log_signal(braking_columns())
+    (tmp_path / "logs").mkdir()
+    write_csv(tmp_path / "logs" / "stop.csv", log)
+    write_csv(tmp_path / "logs" / "coast.csv", log | {"p_bar": 0.0 * log["p_bar"]})
+    segment = {
+        "above_mpa": 0.12, "merge_gap_s": 0.08, "minimum_s": 0.5, "before_s": 1.0, "after_s": 0.8, "held_out_every": 3,
+    }  # fmt: skip
+    report = import_measurements(
+        str(tmp_path / "logs"), map=write_map(tmp_path, segment=segment), out=str(tmp_path / "campaign")
+    )
+    assert {run["file"] for run in report["runs"]} == {"stop.csv"}
+    assert report["left_out"] == [
+        "coast.csv: no run, for the brake is never applied above 0.12 MPa for 0.5 s: cut it by runs in place of segment"
+        " where it is to be used, as a coast-down is"
+    ]
+
+
 def test_the_same_recording_gives_the_same_bytes(tmp_path: Path) -> None:
     source = write_csv(tmp_path / "log.csv", log_signal(braking_columns()))
     for name in ("a", "b"):
