@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tasks.campaign.campaign import CHANNELS, Campaign
-from tasks.campaign.channels import BRAKE_SIGNALS
+from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME
 from tasks.identification.decision.answer import NamedEffect
 from tasks.identification.inference.forward import RunModel
 from tasks.identification.joint.numbers import JointNumber, coasts_down, saturates_tyres
@@ -49,7 +49,10 @@ def tell_what_was_used(
     stands_for = BRAKE_SIGNALS.get(campaign.brake_signal, 1.0)
     return [
         *(
-            [f"a {inputs[0]} of 1 is taken for {stands_for:g} MPa, and the gain is fitted"]
+            [
+                f"a {inputs[0]} of {_tell_one(campaign.brake_signal)} is taken for {stands_for:g} MPa, and the gain is"
+                " fitted"
+            ]
             if stands_for != 1.0
             else []
         ),
@@ -59,6 +62,12 @@ def tell_what_was_used(
         f"{agreeing[0]} of {agreeing[1]} starts reach this fit",
         "the held-out runs decide which numbers stay, so their error is not that of a blind test",
     ]
+
+
+def _tell_one(brake_signal: str) -> str:
+    """Return one of the unit of a signal that stands for the pressure: "1 N"; of a share "1" alone."""
+    unit = CHANNELS_BY_NAME[brake_signal].unit
+    return "1" if unit == "1" else f"1 {unit}"
 
 
 def tell_rivals(

@@ -8,12 +8,13 @@ import pytest
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from catalogs.joint_numbers import load_joint_numbers
+from tasks.campaign.campaign import Campaign
 from tasks.identification.decision.answer import NamedEffect, Parameter
 from tasks.identification.inference.forward import prepare_run
 from tasks.identification.joint.stops import make_stop
 from tasks.identification.joint.words import tell_lumped_resistance, tell_rivals, tell_what_was_used
 from tests.identification.joint.test_calibration import make_campaign
-from tests.identification.synthetic import SURFACE, VEHICLE, plain_run
+from tests.identification.synthetic import SURFACE, TOLERANCES, VEHICLE, plain_run
 
 
 def named_effect(effect: str, number: str, value: float) -> NamedEffect:
@@ -99,3 +100,32 @@ def test_a_full_stop_that_the_road_slows_less_than_the_model_is_told_for_what_it
     stops = [make_stop(run, VEHICLE, SURFACE, campaign.channels, rules) for run in campaign.train]
     text = "; ".join(tell_what_was_used(campaign, stops, (1, 1), rules))
     assert ("no run slowed down harder than the model's tyres allow" in text) is told
+
+
+@pytest.mark.parametrize(
+    ("signal", "said"),
+    [
+        ("pedal_force", "a pedal force of 1 N is taken for 0.02 MPa"),
+        ("brake_torque", "a brake torque of 1 N m is taken for 0.001 MPa"),
+        ("brake_command", "a brake command of 1 is taken for 10 MPa"),
+    ],
+)
+def test_what_stands_for_the_pressure_is_told_with_its_unit(signal: str, said: str) -> None:
+    rules, run = load_decision_rules().joint, plain_run(20.0, 2.0)
+    campaign = Campaign(
+        name="known", vehicle="paper-reference", runs=(run,), channels=("speed",), content_hash="", split_hash="",
+        tolerances=TOLERANCES, brake_signal=signal,
+    )  # fmt: skip
+    stop = make_stop(run, VEHICLE, SURFACE, campaign.channels, rules)
+    assert tell_what_was_used(campaign, [stop], (1, 1), rules)[0] == f"{said}, and the gain is fitted"
+
+
+def test_a_signal_that_a_map_turns_into_a_pressure_is_told_by_its_unit_alone() -> None:
+    rules, run = load_decision_rules().joint, plain_run(20.0, 2.0)
+    campaign = Campaign(
+        name="known", vehicle="paper-reference", runs=(run,), channels=("speed",), content_hash="", split_hash="",
+        tolerances=TOLERANCES, brake_signal="a signal in N m",
+    )  # fmt: skip
+    stop = make_stop(run, VEHICLE, SURFACE, campaign.channels, rules)
+    told = tell_what_was_used(campaign, [stop], (1, 1), rules)
+    assert told[0] == "inputs that were measured: a signal in N m; compared: speed"
