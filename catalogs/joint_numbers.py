@@ -22,12 +22,13 @@ class JointNumberEntry(CatalogueEntry):
     lower: Limit
     upper: Limit
     unit: Text
-    group: Literal["gain", "friction", "radius", "delay", "curve", "resistance", "sensor"]
+    group: Literal["gain", "friction", "radius", "delay", "curve", "resistance", "sensor", "mass"]
     removable: bool
     needs: Annotated[tuple[Text, ...], Field(min_length=1)]
     source: Text
     of_pressure: bool = False
     free_with: tuple[Text, ...] = ()
+    stands_in: bool = False
 
 
 def _check(entries: dict[str, JointNumberEntry]) -> dict[str, JointNumberEntry]:
@@ -72,7 +73,7 @@ def load_joint_numbers(path: str | Path = JOINT_NUMBERS) -> tuple[JointNumber, .
         JointNumber(
             name=name, sigma=entry.sigma, lower=entry.lower, upper=entry.upper, group=entry.group,
             removable=entry.removable, needs=entry.needs, effect=effects[name], of_pressure=entry.of_pressure,
-            free_with=entry.free_with,
+            free_with=entry.free_with, stands_in=entry.stands_in,
         )
         for name, entry in entries.items()
     )  # fmt: skip

@@ -4,6 +4,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from synthetic import NOISE, TOLERANCES, measured, plain_run
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from tasks.campaign.campaign import CHANNELS, SESSION, Tolerances
+from tasks.identification.decision import search
 from tasks.identification.decision.rivals import compare_with_rivals
 from tasks.identification.decision.search import SearchState, find_retune, search_library
 from tasks.identification.decision.session_numbers import (
@@ -25,6 +27,7 @@ from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.derivatives import differentiate_run
 from tasks.identification.inference.disturbance import Disturbance
 from tasks.identification.inference.fit import fit_hypotheses
+from tasks.identification.inference.hypothesis import Hypothesis
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.table import EFFECT_TABLE, build_parameter_vector
 
@@ -65,6 +68,19 @@ def find_wrong_number(evidence: Evidence) -> tuple[SearchState, list[str]]:
     null = fit_hypotheses(evidence.train, (), evidence.session_sigma, iterations=6)
     reasons: list[str] = []
     return find_retune(SearchState(evidence=evidence, base=null), reasons), reasons
+
+
+def test_a_number_that_would_have_to_leave_its_bounds_is_not_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A wheel radius 3 % off was named as 8.1 %, with an interval that ended at 8 %."""
+    assert find_gain(0.1, NOISE)[0].rounds
+
+    def free_within_half(*given: Any) -> Hypothesis:
+        freed = free_session_number(*given)
+        assert freed is not None
+        return replace(freed, upper=np.array([0.05]))
+
+    monkeypatch.setattr(search, "free_session_number", free_within_half)
+    assert not find_gain(0.1, NOISE)[0].rounds
 
 
 def test_speed_alone_shows_gain_over_mass_and_the_body_tells_the_two_apart() -> None:

@@ -30,6 +30,11 @@ class Parameter:
     upper: float
     unit: str
 
+    @property
+    def is_unknown(self) -> bool:
+        """Return whether the interval is all that lies between the bounds."""
+        return self.ci_low <= self.lower and self.ci_high >= self.upper
+
 
 @dataclass(frozen=True, kw_only=True)
 class NamedEffect:

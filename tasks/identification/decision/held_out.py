@@ -114,6 +114,17 @@ def is_predicted_better(error: Mapping[str, ChannelError]) -> bool:
     return error["speed"].change_high < 0.0
 
 
+def compare_with_retuned(error: Mapping[str, ChannelError]) -> float:
+    """Return the mean logarithm of the error over that of the re-tuned model; above 0 re-tuning predicts better [1].
+
+    Parameters
+    ----------
+    error : by channel
+    """
+    ratios = [e.after / e.retuned for e in error.values() if e.after > 0.0 and e.retuned > 0.0]
+    return float(np.mean(np.log(ratios))) if ratios else 0.0
+
+
 def find_worse_channels(
     error: Mapping[str, ChannelError], limit: float, *, speed_decides: bool = True
 ) -> list[str]:

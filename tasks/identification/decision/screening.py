@@ -18,7 +18,8 @@ def can_show(effect: Effect, vehicle: Vehicle, channels: Sequence[str]) -> bool:
     An effect of several parameters that the vehicle has already cannot be found as a change of it. One that depends on
     slip needs a wheel speed: without one it is a lag of the car's force, and any other lag of a car with other
     equations passes for it. Of eight logs of the double-track car without an effect, speed and acceleration alone
-    named three relaxation lengths.
+    named three relaxation lengths. A moment that pitches the body needs a channel of the body: the loads that it moves
+    from axle to axle explain a part of whatever the wheels of another car do.
 
     Parameters
     ----------
@@ -28,7 +29,9 @@ def can_show(effect: Effect, vehicle: Vehicle, channels: Sequence[str]) -> bool:
     """
     has_already = len(effect.parameters) > 1 and any(vehicle.effects.get(p.name) for p in effect.parameters)
     sees_slip = any(name.startswith("wheel_speed") for name in channels)
-    return not has_already and (effect.variable != "slip" or sees_slip)
+    sees_pitch = any(name in channels for name in ("pitch", "pitch_rate", "vertical_acceleration"))
+    pitches = effect.port == "pitch_moment" or effect.parameters[0].name == "pitch_gain"
+    return not has_already and (effect.variable != "slip" or sees_slip) and (not pitches or sees_pitch)
 
 
 def screen_library(

@@ -250,7 +250,8 @@ def find_retune(start: SearchState, reasons: list[str]) -> SearchState:
         found = judge_hypothesis(evidence, null, held_out, hypothesis)
         gained = sum_misfit_falls(held_out, compute_misfit_by_run(evidence.held_out, found.fitted))
         judged.append(replace(found, held_out_gain=gained / found.inflation))
-    accepted = [c for c in judged if c.held_out_gain > evidence.rules.held_out_gain and c.gain > 0.0]
+    least = evidence.rules.held_out_gain
+    accepted = [c for c in judged if c.held_out_gain > least and c.gain > 0.0 and not c.fitted.at_bound]
     if not accepted:
         return start
     best = max(accepted, key=lambda c: c.gain)

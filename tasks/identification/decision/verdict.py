@@ -9,7 +9,6 @@ import numpy as np
 from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
 from tasks.identification.decision.alternatives import find_pairs, find_pulled_numbers
 from tasks.identification.decision.answer import (
-    ChannelError,
     NamedEffect,
     Verdict,
     VerdictName,
@@ -21,12 +20,7 @@ from tasks.identification.decision.correlation import correlate_residual_with_pr
 from tasks.identification.decision.discovery import search_library_and_forms
 from tasks.identification.decision.disputes import settle_disputes
 from tasks.identification.decision.experiment import plan_next_experiment
-from tasks.identification.decision.held_out import (
-    compute_held_out_errors,
-    find_worse_channels,
-    is_noticed,
-    is_predicted_better,
-)
+from tasks.identification.decision.held_out import compute_held_out_errors, is_predicted_better
 from tasks.identification.decision.intervals import (
     compute_curvature_interval,
     compute_profile_interval,
@@ -34,13 +28,14 @@ from tasks.identification.decision.intervals import (
 )
 from tasks.identification.decision.log_faults import tell_log_faults
 from tasks.identification.decision.missed import tell_miss
+from tasks.identification.decision.objection import object_to_last
 from tasks.identification.decision.rivals import RivalComparison, compare_with_rivals
 from tasks.identification.decision.screening import can_show, find_detectable_sizes
 from tasks.identification.decision.search import SearchState
 from tasks.identification.decision.superseded import drop_superseded, is_named
 from tasks.identification.decision.words import say_confirmation, say_rejection
 from tasks.identification.inference.fit import Fit
-from tasks.identification.inference.hypothesis import compose_parameters, moves_speed
+from tasks.identification.inference.hypothesis import compose_parameters
 from tasks.identification.inference.linearisation import prepare_evidence
 from tasks.identification.rules import DecisionRules
 from tasks.surface.state import SurfaceParameters
@@ -124,7 +119,7 @@ def find_missing_effects(
     error, manoeuvres = compute_held_out_errors(start.evidence, start.base, found.base)
     tried = list(found.tried)
     least = rules.joint.noticed_share if hardly_known else None
-    while compared and (objection := _object_to_last(found, start, error, least)):
+    while compared and (objection := object_to_last(found, start, error, least)):
         reasons.append(objection)
         last, near_form = found.rounds[-1], None
         tried = [last.accepted, *tried]
@@ -231,39 +226,6 @@ def find_pair_to_confirm(tried: Sequence[Candidate], null: Fit) -> tuple[Fit, Fi
     """
     best = max((c for c in tried if c.is_open), key=lambda c: c.score, default=None)
     return None if best is None else (best.fitted, null)
-
-
-def _object_to_last(
-    found: SearchState, start: SearchState, error: Mapping[str, ChannelError], least: float | None
-) -> str | None:
-    """Return why held-out runs contradict what was named last; None if they do not.
-
-    The marginal likelihood can buy a fit with disturbances; prediction of unseen runs cannot be bought.
-
-    Parameters
-    ----------
-    found, start : what is named, and the model as it stands
-    error : of what is named, by channel
-    least : share of the error of some channel that a name must leave at most; None takes that of forms, for forms
-    """
-    rules, last = found.evidence.rules, found.rounds[-1]
-    named = [r.accepted.hypothesis for r in found.rounds]
-    moved = any(moves_speed(h.effect_class, h.variable) for h in named)
-    worse = find_worse_channels(error, rules.worse_limit, speed_decides=moved)
-    if worse:
-        return (
-            f"{', '.join(h.name for h in named)} would fit, but predicts"
-            f" {', '.join(worse)} of the held-out runs worse than the frozen model: not named"
-        )
-    if least is not None or last.accepted.hypothesis.effect_class == "form":
-        share = rules.noticed_share if least is None else least
-        without, _ = compute_held_out_errors(start.evidence, start.base, last.base)
-        if not is_noticed(error, without, share):
-            return (
-                f"{last.accepted.hypothesis.name} would fit, but makes no difference of"
-                f" {1.0 - share:.0%} to the error of any channel of the held-out runs: not named"
-            )
-    return None
 
 
 def _to_tell_apart(

@@ -13,6 +13,8 @@ from tasks.identification.joint.numbers import JointNumber
 from tasks.identification.joint.stops import Stop
 from tasks.identification.rules import JointRules
 
+GRIPS = (0.0, 0.2, 0.5)
+"""Friction from which fits start, where runs saturate the tyres [1]."""
 FORESEEN_SHARE = 0.05
 """Share of what a substitute must make good, from which on it is fitted [1]; a fit of a late brake makes good ten times
 what its derivatives foresee where no delay is free."""
@@ -134,13 +136,39 @@ def eliminate_uncertain_numbers(stops: Sequence[Stop], fitted: JointFit, rules: 
     """
     unstable = {n.name for n in fitted.numbers if n.removable} - _stable_names(fitted, rules)
     if unstable:
-        fitted = refit_numbers(stops, fitted, tuple(n for n in fitted.numbers if n.name not in unstable))
+        left = tuple(n for n in fitted.numbers if n.name not in unstable)
+        # without much of what moved the car, tyres that grip less may hide a brake's curve: the best of several starts
+        grips = [{}, *({"friction": grip} for grip in GRIPS)] if "friction" in fitted.by_name else [{}]
+        fitted = min((refit_numbers(stops, fitted, left, grip) for grip in grips), key=lambda fit: fit.cost)
     while True:
         sure = count_standard_errors(fitted, rules)
         weak = [(float(here), n.name) for n, here in zip(fitted.numbers, sure, strict=True) if n.removable]
         if not weak or min(weak)[0] >= certain_from(fitted, rules):
             return fitted
         fitted = refit_numbers(stops, fitted, tuple(n for n in fitted.numbers if n.name != min(weak)[1]))
+
+
+def drop_at_bounds(
+    stops: Sequence[Stop], fitted: JointFit, rules: JointRules, reasons: list[str]
+) -> JointFit:
+    """Return the fit without the numbers that would have to be larger than any car's, and say so.
+
+    Parameters
+    ----------
+    stops : training runs
+    fitted : after elimination
+    rules : of the joint fit
+    reasons : is added to
+    """
+    ended = [n for n in fitted.numbers if n.removable and n.is_at_bound(fitted.by_name[n.name])]
+    if not ended:
+        return fitted
+    reasons += [
+        f"the fit ends where {number.say(fitted.by_name[number.name])}, as far as it may go: not named"
+        for number in ended
+    ]
+    left = refit_numbers(stops, fitted, tuple(n for n in fitted.numbers if n not in ended))
+    return drop_at_bounds(stops, eliminate_uncertain_numbers(stops, left, rules), rules, reasons)
 
 
 def _stable_names(fitted: JointFit, rules: JointRules) -> set[str]:

@@ -1,6 +1,7 @@
 """Runs that no fit has seen: predicted from what precedes the brake, to judge numbers and to report errors."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +9,8 @@ from numpy.typing import NDArray
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
 from tasks.campaign.manoeuvres import MANOEUVRE_UNITS, manoeuvre_errors
 from tasks.identification.decision.answer import ChannelError
-from tasks.identification.decision.held_out import summarise_errors
+from tasks.identification.decision.held_out import is_noticed, summarise_errors
+from tasks.identification.decision.words import join_phrases
 from tasks.identification.joint.elimination import (
     Substitute,
     certain_numbers,
@@ -54,6 +56,31 @@ def drop_what_predicts_worse(
     return drop_what_predicts_worse(
         train, held_out, eliminate_uncertain_numbers(train, without, rules), rules, reasons
     )
+
+
+def makes_difference(
+    fitted: JointFit, error: Mapping[str, ChannelError], rules: JointRules, reasons: list[str]
+) -> bool:
+    """Whether what is named lowers the error of some channel of the held-out runs beside re-tuning; else say so.
+
+    The equations of another car differ a little everywhere, and some number takes up a part of that.
+
+    Parameters
+    ----------
+    fitted : with what is named
+    error : of the held-out runs, by channel
+    rules : of the joint fit
+    reasons : is added to
+    """
+    named = [n.say(fitted.by_name[n.name]) for n in fitted.numbers if n.removable]
+    retuned = {name: replace(e, after=e.retuned) for name, e in error.items()}
+    if not named or is_noticed(error, retuned, rules.noticed_share):
+        return True
+    reasons.append(
+        f"the training runs suggest that {join_phrases(named)}, but beside re-tuning that makes no difference of"
+        f" {1.0 - rules.noticed_share:.0%} to the error of any channel of the held-out runs: not named"
+    )
+    return False
 
 
 def drop_contradicted_rivals(

@@ -9,9 +9,12 @@ from tasks.campaign.campaign import CHANNELS, Campaign
 from tasks.identification.inference.forward import RunModel
 from tasks.identification.rules import JointRules
 from tasks.vehicle.effects.library import Effect
+from tasks.vehicle.parameters import compute_surface_response
 
 CALIBRATED = ("gain", "friction", "radius")
 """Groups of numbers that re-tuning moves."""
+AT_BOUND = 0.005
+"""Share of its range within which a number lies at an end of it [1]."""
 SMOOTHED = 0.3
 """Time over which a deceleration is averaged before its peak is taken [s]."""
 
@@ -31,7 +34,7 @@ class JointNumber:
     effect : of the library, whose first number it is
     of_pressure : sigma is a share of the largest brake pressure of the training runs
     free_with : channels without any of which it is never free, but may explain the runs in the place of another number
-    stands_in : none of those was measured
+    stands_in : it is never free, or none of those was measured
     """
 
     name: str
@@ -45,6 +48,16 @@ class JointNumber:
     of_pressure: bool = False
     free_with: tuple[str, ...] = ()
     stands_in: bool = False
+
+    def is_at_bound(self, value: float) -> bool:
+        """Whether a value lies where the fit had to stop, other than at the vehicle file's.
+
+        Parameters
+        ----------
+        value : of a fit [unit of the table]
+        """
+        near = AT_BOUND * (self.upper - self.lower)
+        return any(end != 0.0 and abs(value - end) < near for end in (self.lower, self.upper))
 
     def say(self, value: float) -> str:
         """Return the finding in plain words.
@@ -75,6 +88,8 @@ def choose_numbers(
             continue
         if number.name == "engine_torque" and any(run.drive_torque is not None for run in campaign.runs):
             continue  # an input, and no unknown
+        if number.name == "fade" and len({run.disc_rise for run in campaign.train}) < 2:
+            continue  # discs of one temperature show no fade
         if number.group == "curve" and stops < rules.fewest_curve_stops:
             continue  # one stop gives a gain and a delay, and no curve
         if number.name == "friction" and not any(saturates_tyres(model, rules) for model in models):
@@ -85,7 +100,7 @@ def choose_numbers(
                 number, sigma=number.sigma * max(largest, rules.least_pressure_range), of_pressure=False
             )
         alone = bool(number.free_with) and not any(name in campaign.channels for name in number.free_with)
-        chosen.append(replace(number, stands_in=alone))
+        chosen.append(replace(number, stands_in=number.stands_in or alone))
     return tuple(chosen)
 
 
@@ -147,8 +162,8 @@ def saturates_tyres(model: RunModel, rules: JointRules) -> bool:
     model : the run
     rules : of the joint fit
     """
-    limit = model.surface_friction * model.vehicle.gravity
-    return peak_deceleration(model) > rules.saturation_ratio * limit
+    tyre = compute_surface_response(model.vehicle, model.run.weather, model.surface_friction).tyre
+    return peak_deceleration(model) > rules.saturation_ratio * tyre.peak * model.vehicle.gravity
 
 
 def peak_deceleration(model: RunModel) -> float:

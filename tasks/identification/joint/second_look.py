@@ -5,7 +5,11 @@ from dataclasses import replace
 
 from tasks.campaign.campaign import Campaign
 from tasks.identification.decision.disputes import ForeignCarError, moves_body_alone
-from tasks.identification.decision.held_out import compute_held_out_errors, find_worse_channels
+from tasks.identification.decision.held_out import (
+    compare_with_retuned,
+    compute_held_out_errors,
+    find_worse_channels,
+)
 from tasks.identification.decision.screening import compute_inflation
 from tasks.identification.decision.verdict import Trace
 from tasks.identification.decision.words import join_phrases
@@ -76,8 +80,8 @@ def _look_along_road(
     """Return the verdict by speed and accelerometer, with errors of all channels; None if it names nothing that holds.
 
     A name must not act on the body alone, because the channels that show that were not asked, and must not predict
-    the held-out runs worse than the vehicle file does, with all channels counted. A brake gain that is wrong and
-    nothing else is left to the first look or the joint fit.
+    the held-out runs worse than the vehicle file or the re-tuned model does, with all channels counted. A brake gain
+    that is wrong and nothing else is left to the first look or the joint fit.
     """
     kept = tuple(name for name in ALONG_ROAD if name in campaign.channels)
     if kept == campaign.channels:
@@ -95,7 +99,7 @@ def _look_along_road(
     )
     error, manoeuvres = compute_held_out_errors(whole, null, found)
     moved = any(moves_speed(part.effect_class, part.variable) for part in found.parts)
-    if find_worse_channels(error, worse_limit, speed_decides=moved):
+    if find_worse_channels(error, worse_limit, speed_decides=moved) or compare_with_retuned(error) > 0.0:
         return None
     alone = join_phrases(name.replace("_", " ") for name in kept)
     reason = (

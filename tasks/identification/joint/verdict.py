@@ -15,15 +15,17 @@ from tasks.identification.decision.answer import (
     is_within_tolerance,
     make_estimate,
 )
-from tasks.identification.decision.held_out import is_predicted_better
+from tasks.identification.decision.held_out import find_worse_channels, is_predicted_better
 from tasks.identification.decision.log_faults import tell_log_faults
 from tasks.identification.decision.missed import tell_miss
 from tasks.identification.inference.disturbance import Disturbance
 from tasks.identification.joint.calibration import fit_first_numbers, is_gain_unknown
 from tasks.identification.joint.elimination import (
+    GRIPS,
     Substitute,
     certain_numbers,
     compute_interval_quantile,
+    drop_at_bounds,
     eliminate_uncertain_numbers,
     find_substitutes,
     refit_numbers,
@@ -33,6 +35,7 @@ from tasks.identification.joint.fit import JointFit, fit_jointly, misfit_scales,
 from tasks.identification.joint.held_out import (
     drop_contradicted_rivals,
     drop_what_predicts_worse,
+    makes_difference,
     predict_held_out,
     summarise_held_out,
 )
@@ -44,8 +47,8 @@ from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.table import PARAMETERS, build_parameter_vector
 from tasks.vehicle.parameters import Vehicle
 
-GRIPS = (0.0, 0.2, 0.5)
-"""Friction from which the last fits start, where runs saturate the tyres [1]."""
+BENDS_RESISTANCE = "pad_speed"
+"""Pad friction that depends on speed: with it a constant resistance may stand for air drag, and air drag for it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,18 +110,28 @@ def judge_jointly(
     progress("elimination")
     settled, agreeing = _settle(train, eliminate_uncertain_numbers(train, everything, joint), starts, joint)
     # at a better fit a number may be no longer certain
-    fitted = eliminate_uncertain_numbers(train, settled, joint)
-    progress("held-out error")
     reasons = [disagreement] if disagreement else []
+    fitted = drop_at_bounds(train, eliminate_uncertain_numbers(train, settled, joint), joint, reasons)
+    progress("held-out error")
     fitted = drop_what_predicts_worse(train, held_out, fitted, joint, reasons)
     retuned = refit_numbers(train, fitted, tuple(n for n in fitted.numbers if n.group in CALIBRATED))
     predicted = predict_held_out(held_out, retuned, fitted)
     error, manoeuvres = summarise_held_out(held_out, predicted, rules)
+    if not makes_difference(fitted, error, joint, reasons):
+        fitted = retuned
+        predicted = predict_held_out(held_out, retuned, fitted)
+        error, manoeuvres = summarise_held_out(held_out, predicted, rules)
     progress("rivals")
     tolerances = _tolerances(campaign)
     named = _name_effects(fitted, joint)
     calibrated = tuple(e for e in named if is_within_tolerance(e, tolerances, joint.wrong_number_tolerances))
     effects = [e for e in named if e not in calibrated]
+    if effects and (worse := find_worse_channels(error, rules.worse_limit, speed_decides=False)):
+        reasons.append(
+            f"the vehicle's file predicts {', '.join(worse)} of the held-out runs better than what was fitted: nothing"
+            " is named"
+        )
+        effects, calibrated, fitted = [], (), retuned
     # a number that the file claims to know may stand for what the model lacks
     claimed = [name for name, tolerance in tolerances.items() if tolerance < joint.unknown_gain_tolerance]
     doubted = {e.parameters[0].name for e in effects} & set(claimed)
@@ -169,14 +182,21 @@ def judge_jointly(
 def _fit_everything(
     train: Sequence[Stop], starts: Sequence[Mapping[str, float]], sets: Sequence[tuple[JointNumber, ...]]
 ) -> JointFit:
-    """Return the best fit of a set of numbers: each from the best of several starts of the few that matter most."""
+    """Return the fit of every number of the set that explains most: from the best of several starts of the first few.
+
+    Sets are compared without `BENDS_RESISTANCE`, which makes a resistance of one shape look like that of another.
+    """
     best = fit_first_numbers(train, {n.name: n for numbers in sets for n in numbers}.values(), starts)
     scales = misfit_scales(best, train)
-    fits = [
-        fit_jointly(train, numbers, [best.by_name], scales=scales, offsets=best.offsets)[0]
-        for numbers in sets
-    ]
-    return min(fits, key=lambda fitted: fitted.cost)
+
+    def fit(numbers: Sequence[JointNumber], start: JointFit) -> JointFit:
+        return fit_jointly(train, tuple(numbers), [start.by_name], scales=scales, offsets=start.offsets)[0]
+
+    if len(sets) == 1:
+        return fit(sets[0], best)
+    plain = [fit([n for n in numbers if n.name != BENDS_RESISTANCE], best) for numbers in sets]
+    place = min(range(len(sets)), key=lambda i: plain[i].cost)
+    return fit(sets[place], plain[place])
 
 
 def _settle(
@@ -194,7 +214,8 @@ def _settle(
 def _name_effects(fitted: JointFit, rules: JointRules) -> list[NamedEffect]:
     """Return what is named, new physics first."""
     # what every car needs anew is told whatever its size: the prediction rests on it
-    named = [n for n, _ in certain_numbers(fitted, rules)] + [n for n in fitted.numbers if not n.removable]
+    named = [n for n, _ in certain_numbers(fitted, rules)]
+    named += [n for n in fitted.numbers if not n.removable and not n.is_at_bound(fitted.by_name[n.name])]
     order = {"effect": 0, "sensor": 1, "retune": 2}
     return sorted((_named_effect(fitted, n, rules) for n in named), key=lambda e: order[e.effect_class])
 
@@ -209,8 +230,10 @@ def _name_rivals(
         number = next(n for n in other.fitted.numbers if n.name == other.name)
         rivals.append((effect_of[other.of], _named_effect(other.fitted, number, rules)))
     friction = next((n for n in fitted.numbers if n.group == "friction"), None)
-    if friction is not None:  # tyres at their limit bend the brake's curve too
-        grip = _named_effect(fitted, friction, rules)
+    grip = None if friction is None else _named_effect(fitted, friction, rules)
+    if (
+        grip is not None and not grip.parameters[0].is_unknown
+    ):  # tyres at their limit bend the brake's curve too
         curve = {n.effect.name for n in fitted.numbers if n.group == "curve"}
         rivals += [(effect.name, grip) for effect in effects if effect.name in curve]
     return rivals

@@ -12,6 +12,7 @@ from tasks.identification.joint import elimination
 from tasks.identification.joint.elimination import (
     certain_from,
     certain_numbers,
+    drop_at_bounds,
     find_substitutes,
     standard_errors,
 )
@@ -91,3 +92,23 @@ def test_a_gain_that_the_file_claims_to_know_may_stand_for_a_resistance(monkeypa
     assert find_substitutes([], named, list(NUMBERS.values()), 0.85) == []
     (found,) = find_substitutes([], named, list(NUMBERS.values()), 0.85, {"pressure_gain"})
     assert (found.of, found.name) == ("pressure_gain", "rolling_coefficient")
+
+
+def test_a_number_that_a_fit_takes_as_far_as_it_may_go_is_not_named(monkeypatch):
+    """An accelerometer 20 % wrong, the most that is allowed, stood for the slopes of a town."""
+    scale = NUMBERS["acceleration_scale"]
+    both = fit_of([np.zeros(100)])
+    both = replace(both, numbers=(LAG, scale), values=np.array([0.1, scale.upper]))
+
+    def refit(_stops, fitted, numbers, _start=None):
+        return replace(fitted, numbers=numbers, values=np.array([0.12]))
+
+    monkeypatch.setattr(elimination, "refit_numbers", refit)
+    monkeypatch.setattr(elimination, "eliminate_uncertain_numbers", lambda _stops, fitted, _rules: fitted)
+    reasons: list[str] = []
+    left = drop_at_bounds([], both, RULES, reasons)
+    assert left.by_name == {"lag": 0.12}
+    assert reasons == [
+        "the fit ends where the accelerometer reads 20 % above the truth, as far as it may go: not named"
+    ]
+    assert drop_at_bounds([], left, RULES, reasons) is left

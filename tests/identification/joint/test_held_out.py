@@ -5,8 +5,10 @@ from types import SimpleNamespace
 import pytest
 
 from catalogs.decision_rules import load_decision_rules
+from catalogs.joint_numbers import load_joint_numbers
+from tasks.identification.decision.answer import ChannelError
 from tasks.identification.joint import held_out
-from tasks.identification.joint.held_out import drop_contradicted_rivals
+from tasks.identification.joint.held_out import drop_contradicted_rivals, makes_difference
 
 RULES = load_decision_rules().joint
 
@@ -18,3 +20,19 @@ def test_a_rival_that_predicts_held_out_runs_much_worse_is_none(monkeypatch, err
     rival = SimpleNamespace(fitted=error)
     assert RULES.better_prediction_share == 0.75
     assert drop_contradicted_rivals([], 0.10, [rival], RULES) == ((rival,) if is_kept else ())
+
+
+@pytest.mark.parametrize(
+    ("after", "number", "is_named"), [(0.84, "lag", True), (0.86, "lag", False), (1.0, "friction", True)]
+)
+def test_a_number_is_named_for_what_it_does_beside_retuning(after: float, number: str, is_named: bool):
+    """Pad friction by speed was named on a car that lacked nothing, for 9 % of the error that re-tuning leaves."""
+    error = ChannelError(
+        frozen=2.0, retuned=1.0, after=after, ci_low=0.0, ci_high=2.0, change_low=-1.0, change_high=1.0, wins=1,
+        worst_run="run", unit="m/s",
+    )  # fmt: skip
+    numbers = [n for n in load_joint_numbers() if n.name == number]
+    fitted, reasons = SimpleNamespace(numbers=numbers, by_name={number: 0.05}), list[str]()
+    assert RULES.noticed_share == 0.85
+    assert makes_difference(fitted, {"speed": error}, RULES, reasons) is is_named
+    assert is_named or "a lag of 0.05 s, but beside re-tuning that makes no difference of 15%" in reasons[0]

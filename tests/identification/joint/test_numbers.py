@@ -14,9 +14,11 @@ from tasks.identification.joint.numbers import choose_numbers, coasts_down, free
 from tasks.identification.joint.stops import make_stop
 from tasks.identification.rules import JointRules
 from tasks.vehicle.effects.table import build_parameter_vector
+from tasks.vehicle.parameters import compute_surface_response
 from tests.identification.synthetic import SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
 RULES = load_decision_rules().joint
+(LAG,) = (number for number in load_joint_numbers() if number.name == "lag")
 
 
 @cache
@@ -48,9 +50,38 @@ def test_the_curve_of_the_brake_needs_enough_runs_that_brake_hard_enough():
 
 
 def test_friction_is_free_only_where_a_run_passes_the_limit_of_the_models_tyres():
-    hardest = max(peak_deceleration(m) / (m.surface_friction * m.vehicle.gravity) for m in stops())
-    assert "friction" in chosen_priors(stops(), replace(RULES, saturation_ratio=0.99 * hardest))
-    assert "friction" not in chosen_priors(stops(), replace(RULES, saturation_ratio=hardest))
+    """Slicks twice as good as the asphalt were at their limit from half of it, and grip was found 31 % too low."""
+    table = VEHICLE.find_tyre_family("dry")
+    sticky = replace(table, efficiency=tuple(2.0 * e for e in table.efficiency))
+    slicks = replace(VEHICLE, families={**VEHICLE.families, "dry": sticky})
+    hardest = max(map(peak_deceleration, stops())) / VEHICLE.gravity
+    for vehicle, grip in ((VEHICLE, 1.0), (slicks, 2.0)):
+        runs = [replace(model, vehicle=vehicle) for model in stops()]
+        (model, *_) = runs
+        peak = compute_surface_response(vehicle, "dry", model.surface_friction).tyre.peak
+        assert peak == pytest.approx(
+            grip * compute_surface_response(VEHICLE, "dry", model.surface_friction).tyre.peak
+        )
+        ratio = hardest / peak
+        assert "friction" in chosen_priors(runs, replace(RULES, saturation_ratio=0.99 * ratio))
+        assert "friction" not in chosen_priors(runs, replace(RULES, saturation_ratio=ratio))
+
+
+def test_fade_is_free_where_discs_begin_at_different_temperatures():
+    assert "fade" not in chosen_priors(stops(), RULES)
+    hot = replace(stops()[0], run=replace(stops()[0].run, disc_rise=250.0))
+    assert "fade" in chosen_priors([hot, *stops()[1:]], RULES)
+
+
+def test_a_mass_may_explain_the_runs_in_place_of_another_number_and_is_never_free():
+    (mass,) = (n for n in load_joint_numbers() if n.name == "mass")
+    assert "mass" in chosen_priors(stops(), RULES)
+    assert all(mass not in numbers for numbers in free_numbers([LAG, mass], stops(), RULES))
+
+
+def test_a_number_is_at_a_bound_where_the_fit_had_to_stop_and_not_at_the_files_value():
+    assert LAG.lower == 0.0 and not LAG.is_at_bound(0.0)
+    assert LAG.is_at_bound(LAG.upper) and not LAG.is_at_bound(0.9 * LAG.upper)
 
 
 def test_a_prior_is_a_share_of_the_largest_pressure_or_of_the_least_range_of_a_campaign():

@@ -9,6 +9,7 @@ import pytest
 from catalogs.decision_rules import load_decision_rules
 from catalogs.joint_numbers import load_joint_numbers
 from tasks.campaign.campaign import CHANNELS, Campaign, Run
+from tasks.identification.decision.answer import NamedEffect
 from tasks.identification.decision.missed import compare_with_noise, tell_miss
 from tasks.identification.joint import verdict
 from tasks.identification.joint.calibration import needs_joint_fit
@@ -180,6 +181,33 @@ def test_a_gain_that_the_file_claims_to_know_is_doubted_where_a_resistance_expla
     told = judge(known).verdict
     assert (told.verdict, [effect.name for effect in told.effects]) == (kind, ["retuned_pressure_gain"])
     assert [(of, rival.name) for of, rival in told.rivals] == [("retuned_pressure_gain", n) for n in rivals]
+
+
+def test_nothing_is_named_that_predicts_unseen_stops_worse_than_the_file(monkeypatch):
+    """Grip 31 % below the file's was named, and the held-out stop missed by 0.8 m/s, which the file misses by 0.2."""
+    campaign = campaign_of({"lag": 0.09})
+    assert judge(campaign).verdict.effects
+    monkeypatch.setattr(verdict, "find_worse_channels", lambda _error, _limit, speed_decides: ["speed"])
+    trace = judge(campaign)
+    assert trace.verdict.verdict == "NOTHING" and not trace.calibrated
+    assert any("file predicts speed of the held-out runs better" in r for r in trace.verdict.reasons)
+
+
+def test_tyres_of_which_nothing_is_known_are_no_rival_of_a_curve():
+    """Beside a dead band the tyres were said to grip 0.36 % less, in an interval of all that is allowed."""
+    numbers = {n.name: n for n in load_joint_numbers()}
+    free = (numbers["friction"], numbers["push_out"])
+    curve = NamedEffect(
+        name="push_out_pressure", effect_class="effect", port="", variable="", parameters=(), score=0.0, gain=0.0,
+        inflation=1.0, held_out_gain=0.0, cross_validated_gain=0.0, win_share=1.0,
+    )  # fmt: skip
+    for information, rivals in ((1e-6, []), (1e6, ["retuned_friction_level"])):
+        fitted = replace(
+            slow_brakes().fitted, numbers=free, values=np.array([0.1, 0.3]), information=information * np.eye(2),
+            residuals=(np.zeros(10),) * 2, slopes=(np.zeros((10, 2)),) * 2,
+        )  # fmt: skip
+        found = verdict._name_rivals(fitted, [], [curve], RULES.joint)
+        assert [rival.name for _, rival in found] == rivals
 
 
 def test_runs_that_never_coast_say_which_resistance_stands_for_all():

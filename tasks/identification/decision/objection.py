@@ -1,0 +1,53 @@
+"""What held-out runs say against a name: prediction of unseen runs cannot be bought."""
+
+from collections.abc import Mapping
+
+from tasks.campaign.campaign import SESSION
+from tasks.identification.decision.answer import ChannelError
+from tasks.identification.decision.held_out import (
+    compute_held_out_errors,
+    find_worse_channels,
+    is_noticed,
+)
+from tasks.identification.decision.search import SearchState
+from tasks.identification.inference.hypothesis import moves_speed
+
+
+def object_to_last(
+    found: SearchState, start: SearchState, error: Mapping[str, ChannelError], least: float | None
+) -> str | None:
+    """Return why held-out runs contradict what was named last; None if they do not.
+
+    The marginal likelihood can buy a fit with disturbances; prediction of unseen runs cannot be bought.
+
+    Parameters
+    ----------
+    found, start : what is named, and the model as it stands
+    error : of what is named, by channel
+    least : share of the error of some channel that a name must leave at most; None takes that of forms, for forms
+    """
+    rules, last = found.evidence.rules, found.rounds[-1]
+    named = [r.accepted.hypothesis for r in found.rounds]
+    moved = any(moves_speed(h.effect_class, h.variable) for h in named)
+    if not any(set(h.names) <= set(SESSION) for h in named) and not any(
+        e.after < e.retuned for e in error.values()
+    ):
+        return (
+            f"{', '.join(h.name for h in named)} would fit, but predicts no channel of the held-out runs better than"
+            " the re-tuned model does: not named"
+        )
+    worse = find_worse_channels(error, rules.worse_limit, speed_decides=moved)
+    if worse:
+        return (
+            f"{', '.join(h.name for h in named)} would fit, but predicts"
+            f" {', '.join(worse)} of the held-out runs worse than the frozen model: not named"
+        )
+    if least is not None or last.accepted.hypothesis.effect_class == "form":
+        share = rules.noticed_share if least is None else least
+        without, _ = compute_held_out_errors(start.evidence, start.base, last.base)
+        if not is_noticed(error, without, share):
+            return (
+                f"{last.accepted.hypothesis.name} would fit, but makes no difference of"
+                f" {1.0 - share:.0%} to the error of any channel of the held-out runs: not named"
+            )
+    return None
