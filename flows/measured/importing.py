@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import yaml
-from numpy.typing import NDArray
 
 from catalogs.channel_maps import ChannelMap, FaultyMap, load_channel_map
 from catalogs.channel_maps.conditions import Conditions
 from catalogs.recordings import read_signals, recording_files, recording_root, stored_files
+from flows.measured.import_warnings import has_stand_in, list_warnings
 from flows.measured.run_plan import PlannedRun, find_run_problems, plan_runs
 from flows.measured.signal_listing import list_recorded_signals
 from flows.store.layout import write_atomically, write_json
@@ -21,22 +21,12 @@ from flows.store.telemetry import write_parquet
 from manifests.canonical import sha256_of_file
 from tasks.campaign.assembly import Assembled, assemble_run
 from tasks.campaign.brake_gain import gain_problems
-from tasks.campaign.brake_switch import describe_brake_switch
 from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME
-from tasks.campaign.held_inputs import describe_held_inputs
-from tasks.campaign.resting_pressure import describe_rest, measure_resting_levels
 from tasks.campaign.run_validation import motion_problem
 from tasks.campaign.signals import Signal
 from tasks.campaign.slow_channels import measure_slow_rates
-from tasks.campaign.wheel_validation import describe_km_h
 from tasks.errors import InputError
 from tasks.surface.weather import DRY
-
-COMPUTED = (
-    "channel longitudinal_acceleration is the rate of the speed, not an accelerometer of its own: it is left out, as"
-    " under not_measured"
-)
-"""Warning of an accelerometer that is none."""
 
 
 def import_measurements(
@@ -97,7 +87,7 @@ def import_measurements(
     ]
     interval = 1.0 / channel_map.sample_rate_hz
     readable = {run.name: found.readable for run, found in made}
-    if not _has_stand_in(channel_map):
+    if not has_stand_in(channel_map):
         slippery = [run.name for run, _ in made if run.conditions.weather != DRY]
         problems += gain_problems(readable, interval, slippery=slippery)
     problems += [
@@ -110,12 +100,10 @@ def import_measurements(
     ]
     if problems:
         raise InputError(problems)
-    warnings = _list_warnings(channel_map, readable)
-    warnings += describe_held_inputs(list(recordings.values()), channel_map.rules)
-    warnings += describe_brake_switch(list(recordings.values()), channel_map.rules)
-    if any(found.computed for _, found in made):
+    computed = any(found.computed for _, found in made)
+    warnings = list_warnings(channel_map, readable, list(recordings.values()), computed=computed)
+    if computed:
         channel_map, made = _leave_out_acceleration(channel_map, made)
-        warnings.append(COMPUTED)
     sources = {
         file.relative_to(root).as_posix(): sha256_of_file(file)
         for recording in recordings
@@ -187,16 +175,6 @@ def write_campaign(
     return report
 
 
-def _list_warnings(channel_map: ChannelMap, readable: dict[str, dict[str, NDArray[np.float64]]]) -> list[str]:
-    """Return what may be wrong in all runs together, one sentence each."""
-    interval = 1.0 / channel_map.sample_rate_hz
-    warnings = describe_km_h(readable, interval, {rule.channel: rule.unit for rule in channel_map.rules})
-    if not _has_stand_in(channel_map):
-        rest = describe_rest(measure_resting_levels(readable, interval))
-        warnings += [] if rest is None else [rest]
-    return warnings
-
-
 def _leave_out_acceleration(
     channel_map: ChannelMap, made: list[tuple[PlannedRun, Assembled]]
 ) -> tuple[ChannelMap, list[tuple[PlannedRun, Assembled]]]:
@@ -210,12 +188,6 @@ def _leave_out_acceleration(
         (run, replace(found, columns={c: x for c, x in found.columns.items() if c != name}))
         for run, found in made
     ]
-
-
-def _has_stand_in(channel_map: ChannelMap) -> bool:
-    """Return whether another quantity is mapped to the brake pressure, whose scale nobody knows."""
-    entry = channel_map.channels.get("brake_pressure")
-    return entry is not None and entry.gain is not None
 
 
 def _brake_facts(channel_map: ChannelMap) -> dict[str, str]:
