@@ -11,6 +11,7 @@ from tasks.campaign.held_inputs import describe_held_inputs
 from tasks.campaign.resting_pressure import describe_rest, measure_resting_levels
 from tasks.campaign.signals import Signal
 from tasks.campaign.turning import describe_turning
+from tasks.campaign.unmapped_slope import describe_slopes
 from tasks.campaign.wheel_validation import describe_km_h
 
 COMPUTED = (
@@ -44,7 +45,7 @@ def list_warnings(
     warnings += describe_turning(readable, interval)
     warnings += describe_held_inputs(recordings, channel_map.rules)
     warnings += describe_brake_switch(recordings, channel_map.rules)
-    return [*warnings, COMPUTED] if computed else warnings
+    return warnings + ([COMPUTED] if computed else describe_slopes(readable, interval))
 
 
 def has_stand_in(channel_map: ChannelMap) -> bool:
