@@ -15,6 +15,7 @@ from catalogs.channel_maps.conditions import Conditions
 from catalogs.recordings import read_signals, recording_files, recording_root, stored_files
 from flows.measured.import_warnings import has_stand_in, list_warnings
 from flows.measured.run_plan import PlannedRun, find_run_problems, plan_runs
+from flows.measured.shared_problems import PlacedProblem, join_shared_problems, place_in_file
 from flows.measured.signal_listing import list_recorded_signals
 from flows.store.layout import write_atomically, write_json
 from flows.store.telemetry import write_parquet
@@ -82,22 +83,23 @@ def import_measurements(
         )
         for run in planned
     ]
-    problems = [
-        f"{run.name} ({run.file.name}): {problem}" for run, found in made for problem in found.problems
-    ]
+    problems = join_shared_problems(
+        [_place_problem(run, problem) for run, found in made for problem in found.problems], len(made), "runs"
+    )
     interval = 1.0 / channel_map.sample_rate_hz
     readable = {run.name: found.readable for run, found in made}
     if not has_stand_in(channel_map):
         slippery = [run.name for run, _ in made if run.conditions.weather != DRY]
         problems += gain_problems(readable, interval, slippery=slippery)
-    problems += [
-        f"{run.name} ({run.file.name}): {problem}"
+    still = [
+        _place_problem(run, problem)
         for run, found in made
         if "speed" in found.readable
         and (
             problem := motion_problem(found.readable["speed"], interval, run.conditions.hazard_length_m > 0.0)
         )
     ]
+    problems += join_shared_problems(still, len(made), "runs")
     if problems:
         raise InputError(problems)
     computed = any(found.computed for _, found in made)
@@ -223,12 +225,16 @@ def _signal_problems(source: Path, channel_map: ChannelMap | None) -> list[str]:
 
 def _read_all(files: tuple[Path, ...], channel_map: ChannelMap) -> dict[Path, dict[str, Signal]]:
     recordings: dict[Path, dict[str, Signal]] = {}
-    problems: list[str] = []
+    problems: list[PlacedProblem] = []
     for file in files:
         try:
             recordings[file] = read_signals(file, channel_map)
         except InputError as error:
-            problems += error.problems
+            problems += [place_in_file(file, problem) for problem in error.problems]
     if problems:
-        raise InputError(problems)
+        raise InputError(join_shared_problems(problems, len(files), "files", exact=True))
     return recordings
+
+
+def _place_problem(run: PlannedRun, problem: str) -> PlacedProblem:
+    return PlacedProblem(name=run.name, place=f"{run.name} ({run.file.name})", sentence=problem)
