@@ -13,6 +13,7 @@ from tasks.campaign.channel_validation import (
     signal_problems,
 )
 from tasks.campaign.channels import ALIASES, UNITS
+from tasks.campaign.dead_sources import find_dead_sources
 from tasks.campaign.derived_acceleration import is_rate_of_speed
 from tasks.campaign.held_inputs import take_samples
 from tasks.campaign.run_validation import LEAST_SAMPLES
@@ -76,6 +77,7 @@ def assemble_run(
                 found.append((rule.channel, f"is in {stated} by its file, in {rule.unit} by the map"))
             found += [(rule.channel, problem) for problem in signal_problems(signal)]
         parts[rule.channel] = [convert_to_channel(signal, rule) for signal in logged]
+        found += [(rule.channel, problem) for problem in find_dead_sources(rule, parts[rule.channel])]
     if not any(problem == DIGITS_OF_DAY for _, problem in found):
         found += _find_frozen_channels(parts)
     problems = _write_sentences(found)

@@ -68,3 +68,18 @@ def test_an_import_warns_of_a_brake_switch_that_is_mapped_as_a_command(tmp_path:
     )
     (warning,) = report["warnings"]
     assert "brake_command has the values 0 and 1 alone" in warning
+
+
+def test_a_dead_pressure_of_a_list_is_named(tmp_path: Path) -> None:
+    content = yaml.safe_load(MAP)
+    content["channels"]["brake_pressure"]["source"] = ["p_bar", "p_rear"]
+    columns = log_signal(braking_columns())
+    columns["p_rear"] = 0.0 * columns["p_bar"]
+    pd.DataFrame(columns).to_csv(tmp_path / "log.csv", index=False)
+    (tmp_path / "map.yaml").write_text(yaml.safe_dump(content))
+    with pytest.raises(
+        InputError, match="channel brake_pressure: its signal p_rear is dead: it stays at 0 MPa"
+    ):
+        import_measurements(
+            str(tmp_path / "log.csv"), map=str(tmp_path / "map.yaml"), out=str(tmp_path / "campaign")
+        )
