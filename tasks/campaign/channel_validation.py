@@ -9,6 +9,7 @@ from tasks.campaign.brake_validation import MOVING, brake_problems
 from tasks.campaign.channels import CHANNELS_BY_NAME, UNITS, guess_unit
 from tasks.campaign.signals import Signal
 from tasks.campaign.time_of_day import TIME_OF_DAY, looks_like_time_of_day
+from tasks.campaign.torque_validation import torque_problems
 from tasks.campaign.wheel_validation import radius_problems
 
 DIGITS_OF_DAY = (
@@ -166,6 +167,7 @@ def plausibility_problems(
     smooth = {name: smooth_channel(values, interval) for name, values in columns.items()}
     problems += radius_problems(smooth, interval)
     problems += brake_problems(columns, smooth, interval, stands_in=stands_in)
+    problems += torque_problems(smooth, interval, stands_in=stands_in)
     if "speed" in smooth:
         rate = np.gradient(smooth["speed"], interval)
         if "longitudinal_acceleration" in smooth:
