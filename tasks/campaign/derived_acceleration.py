@@ -15,6 +15,8 @@ LIKE_ROUNDING = 1.2
 """Deviation from the rate of speed over that which rounding of both explains, up to which they are one signal [1]."""
 FINE = 0.05
 """Deviation by rounding up to which an accelerometer of its own is seen: slope and pitch add more [m/s^2]."""
+EXACT = 0.6
+"""Deviation over `FINE` up to which an acceleration is the rate of a coarser speed as logged, rounded itself [1]."""
 ON_GRID = 0.01
 """Share of its resolution by which a rounded value misses a multiple of it at most [1]."""
 CHANGING = 10.0
@@ -56,7 +58,13 @@ def _is_equal_to_rounding(
     usable: NDArray[np.bool_],
     span: float,
 ) -> bool:
-    """Return whether an acceleration is a rate of speed that was taken over ``span`` [s], float64 [N] [m/s^2]."""
+    """Return whether an acceleration is a rate of speed that was taken over ``span`` [s], float64 [N] [m/s^2].
+
+    It may be the rate of a finer speed than the logged one, where the rounding of the logged one is small. An
+    accelerometer beside a speed of coarser rounding deviates by that rounding at least, and the rate of the logged
+    speed itself by its own rounding alone. The rate of a finer speed is not told there: an inertial navigation system
+    integrates its speed, so that its acceleration deviates by the rounding of the speed too.
+    """
     if np.count_nonzero(usable) < FEWEST_SAMPLES:
         return False
     logged = np.interp(time[usable], acceleration.time, acceleration.values)
@@ -67,9 +75,10 @@ def _is_equal_to_rounding(
         )
     )
     rounding = max(rounding, ROUNDING_STEP * float(np.max(np.abs(rate[usable]))))
+    allowed = LIKE_ROUNDING * rounding if rounding < FINE else EXACT * FINE
     deviation = float(np.sqrt(np.mean((logged - rate[usable]) ** 2)))
-    enough = float(np.std(rate[usable])) > CHANGING * rounding
-    return rounding < FINE and enough and deviation <= LIKE_ROUNDING * rounding
+    enough = float(np.std(rate[usable])) > CHANGING * min(rounding, FINE)
+    return enough and deviation <= allowed
 
 
 def _find_resolution(values: NDArray[np.float64]) -> float:

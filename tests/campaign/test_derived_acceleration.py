@@ -71,3 +71,34 @@ def test_a_cruise_and_a_standing_car_tell_nothing() -> None:
     assert not is_rate_of_speed(Signal(time=TIME, values=np.zeros(len(TIME))), flat)
     standing = Signal(time=TIME, values=SPEED - SPEED.max())
     assert not is_rate_of_speed(Signal(time=TIME, values=take_centred(SPEED)), standing)
+
+
+def log_fast(seed: int) -> tuple[Values, Values, Values]:
+    """Time, motion and speed of a receiver of 100 Hz that logs hundredths of km/h, as VBOX does."""
+    time = np.arange(600) / 100.0
+    motion = -5.0 * np.clip((time - 2.0) / 0.4, 0.0, 1.0) - 0.2
+    speed = 40.0 + np.cumsum(motion) / 100.0 + 0.005 * np.random.default_rng(seed).standard_normal(600)
+    return time, motion, speed
+
+
+@pytest.mark.parametrize("resolution", [1e-9, 0.001 * 9.80665, 0.01 * 9.80665])
+@pytest.mark.parametrize("coarse", [RESOLUTION, 1.0 / 3.6])
+def test_a_difference_of_a_coarse_speed_is_no_accelerometer(resolution: float, coarse: float) -> None:
+    """Its rounding is 0.06 m/s^2 and more, and the difference is equal to the last digit."""
+    time, _, speed = log_fast(1)
+    speed = np.round(speed / coarse) * coarse
+    for rate in (np.gradient(speed, 0.01), np.diff(speed, prepend=speed[0]) / 0.01):
+        logged = np.round(rate / resolution) * resolution
+        assert is_rate_of_speed(Signal(time=time, values=logged), Signal(time=time, values=speed))
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_an_accelerometer_beside_a_coarse_rate_stays_one(seed: int, noise: float) -> None:
+    """Also one that an inertial navigation system integrates to that speed, free of slope and dive."""
+    time, motion, speed = log_fast(seed)
+    coarse = np.round(speed / RESOLUTION) * RESOLUTION
+    for felt in (motion, np.diff(speed, prepend=speed[0]) / 0.01):
+        felt = felt + noise * np.random.default_rng(seed + 10).standard_normal(600)
+        for logged in (felt, np.round(felt / 0.0981) * 0.0981):
+            assert not is_rate_of_speed(Signal(time=time, values=logged), Signal(time=time, values=coarse))
