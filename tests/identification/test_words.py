@@ -144,6 +144,21 @@ def test_an_instruments_error_is_told_by_its_own_channel_and_not_by_the_speed() 
     assert "of the speed from" in tell_verdict((replace(tilt, variable="speed"),), (), (), error, {})
 
 
+def test_a_name_that_the_speed_does_not_show_is_told_by_the_channel_that_does() -> None:
+    """A late brake took the error of the acceleration from 0.79 to 0.29, and was told by a speed that got worse."""
+    speed = ChannelError(
+        frozen=0.22, retuned=0.22, after=0.25, ci_low=0.0, ci_high=1.0, change_low=0.0, change_high=1.0, wins=1,
+        worst_run="run", unit="m/s",
+    )  # fmt: skip
+    felt = replace(speed, frozen=0.79, retuned=0.78, after=0.29, unit="m/s^2")
+    error = {"speed": speed, "longitudinal_acceleration": felt}
+    told = tell_verdict((FORM,), (), (), error, {})
+    assert "longitudinal acceleration from 0.79 (re-tuned 0.78) to 0.29 m/s^2 and of the speed" in told
+    assert "acceleration" not in tell_verdict(
+        (FORM,), (), (), {**error, "speed": replace(speed, after=0.1)}, {}
+    )
+
+
 def test_a_form_of_another_shape_is_not_told_as_the_same_words_again() -> None:
     speed = ChannelError(
         frozen=0.42, retuned=0.41, after=0.07, ci_low=0.0, ci_high=1.0, change_low=-1.0, change_high=0.0, wins=2,

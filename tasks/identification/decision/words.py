@@ -77,6 +77,10 @@ def tell_verdict(
         missed = [name for name, e in error.items() if e.frozen > 0.0]
         own = min(missed, key=lambda name: error[name].after / error[name].frozen)
         figures = {own: error[own]}
+    elif all(e.after >= e.retuned for e in figures.values()):
+        # what a name is worth stands in another channel
+        worth = min(error, key=lambda name: error[name].after / max(error[name].retuned, 1e-12))
+        figures = {worth: error[worth]} | figures
     moved = _say_errors(figures, retuned=True)
     how = "that takes" if len(told) == 1 else "together they take"
     return f"{text[0].upper()}{text[1:]}; {how} the error {moved}, on runs to which no number was fitted."
