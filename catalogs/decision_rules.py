@@ -69,6 +69,7 @@ class DecisionRulesEntry(CatalogueEntry):
     retune_widening: Level
     error_resamples: Count
     worse_limit: Level
+    retuned_limit: Level
     noticed_share: Share
     longest_lag: Annotated[Scalar, require_quantity("s", above=0)]
     interval_widening: Annotated[Scalar, require_quantity("1", minimum=1)]

@@ -92,6 +92,8 @@ class DecisionRules:
     retune_widening : factor on the session's tolerances when a model is re-tuned without any new effect [1]
     error_resamples : bootstrap resamples of the held-out errors [1]
     worse_limit : ratio of held-out errors from which a channel is worse than under the frozen model [1]
+    retuned_limit : error of the held-out runs, all channels, over that of the re-tuned model beyond which nothing is
+        named [1]
     noticed_share : share of a held-out error below which an effect makes a noticeable difference to it [1]
     longest_lag : longest lag at which residual and brake pressure are correlated [s]
     interval_widening : factor on the length of intervals for what the likelihood does not hold, such as the noise of
@@ -131,6 +133,7 @@ class DecisionRules:
     retune_widening: float
     error_resamples: int
     worse_limit: float
+    retuned_limit: float
     noticed_share: float
     longest_lag: float
     interval_widening: float

@@ -115,14 +115,14 @@ def is_predicted_better(error: Mapping[str, ChannelError]) -> bool:
 
 
 def compare_with_retuned(error: Mapping[str, ChannelError]) -> float:
-    """Return the mean logarithm of the error over that of the re-tuned model; above 0 re-tuning predicts better [1].
+    """Return the error over that of the re-tuned model, the geometric mean of the channels [1].
 
     Parameters
     ----------
     error : by channel
     """
     ratios = [e.after / e.retuned for e in error.values() if e.after > 0.0 and e.retuned > 0.0]
-    return float(np.mean(np.log(ratios))) if ratios else 0.0
+    return float(np.exp(np.mean(np.log(ratios)))) if ratios else 1.0
 
 
 def find_worse_channels(

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from tasks.campaign.campaign import SESSION
 from tasks.identification.decision.answer import ChannelError
 from tasks.identification.decision.held_out import (
+    compare_with_retuned,
     compute_held_out_errors,
     find_worse_channels,
     is_noticed,
@@ -18,7 +19,9 @@ def object_to_last(
 ) -> str | None:
     """Return why held-out runs contradict what was named last; None if they do not.
 
-    The marginal likelihood can buy a fit with disturbances; prediction of unseen runs cannot be bought.
+    The marginal likelihood can buy a fit with disturbances; prediction of unseen runs cannot be bought. A number that
+    re-tuning does not move must do better than the numbers that it moves: a tyre that is 1 % stiffer takes up the slip
+    that another anti-lock brake holds.
 
     Parameters
     ----------
@@ -29,12 +32,12 @@ def object_to_last(
     rules, last = found.evidence.rules, found.rounds[-1]
     named = [r.accepted.hypothesis for r in found.rounds]
     moved = any(moves_speed(h.effect_class, h.variable) for h in named)
-    if not any(set(h.names) <= set(SESSION) for h in named) and not any(
-        e.after < e.retuned for e in error.values()
-    ):
+    beside, hypothesis = compare_with_retuned(error), last.accepted.hypothesis
+    number = hypothesis.effect_class == "retune" and not set(hypothesis.names) <= set(SESSION)
+    if beside > rules.retuned_limit or (number and beside >= 1.0):
         return (
-            f"{', '.join(h.name for h in named)} would fit, but predicts no channel of the held-out runs better than"
-            " the re-tuned model does: not named"
+            f"{', '.join(h.name for h in named)} would fit, but re-tuning alone predicts the held-out runs better, with"
+            f" {1.0 / beside:.3g} of the error: not named"
         )
     worse = find_worse_channels(error, rules.worse_limit, speed_decides=moved)
     if worse:

@@ -63,7 +63,7 @@ def find_effects_in_two_looks(
     try:
         first = search(campaign)
     except ForeignCarError as error:
-        second = _look_along_road(campaign, search, rules.worse_limit, str(error))
+        second = _look_along_road(campaign, search, rules, str(error))
         if second is None:
             raise
         return second
@@ -71,17 +71,17 @@ def find_effects_in_two_looks(
     if first.verdict.effects or disagreement <= rules.disagreement:
         return first
     why = f"the runs disagree with the model by a factor of {disagreement:.1f} (noise alone gives 1)"
-    return _look_along_road(campaign, search, rules.worse_limit, why) or first
+    return _look_along_road(campaign, search, rules, why) or first
 
 
 def _look_along_road(
-    campaign: Campaign, search: Callable[[Campaign], Trace], worse_limit: float, why: str
+    campaign: Campaign, search: Callable[[Campaign], Trace], rules: DecisionRules, why: str
 ) -> Trace | None:
     """Return the verdict by speed and accelerometer, with errors of all channels; None if it names nothing that holds.
 
     A name must not act on the body alone, because the channels that show that were not asked, and must not predict
-    the held-out runs worse than the vehicle file or the re-tuned model does, with all channels counted. A brake gain
-    that is wrong and nothing else is left to the first look or the joint fit.
+    the held-out runs worse than the vehicle file, or much worse than the re-tuned model, with all channels counted. A
+    brake gain that is wrong and nothing else is left to the first look or the joint fit.
     """
     kept = tuple(name for name in ALONG_ROAD if name in campaign.channels)
     if kept == campaign.channels:
@@ -99,7 +99,10 @@ def _look_along_road(
     )
     error, manoeuvres = compute_held_out_errors(whole, null, found)
     moved = any(moves_speed(part.effect_class, part.variable) for part in found.parts)
-    if find_worse_channels(error, worse_limit, speed_decides=moved) or compare_with_retuned(error) > 0.0:
+    if (
+        find_worse_channels(error, rules.worse_limit, speed_decides=moved)
+        or compare_with_retuned(error) > rules.retuned_limit
+    ):
         return None
     alone = join_phrases(name.replace("_", " ") for name in kept)
     reason = (
