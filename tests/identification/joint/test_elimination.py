@@ -10,6 +10,7 @@ from catalogs.decision_rules import load_decision_rules
 from catalogs.joint_numbers import load_joint_numbers
 from tasks.identification.joint import elimination
 from tasks.identification.joint.elimination import (
+    FORESEEN_SHARE,
     certain_from,
     certain_numbers,
     drop_at_bounds,
@@ -76,6 +77,22 @@ def test_whatever_explains_nearly_as_much_is_a_rival_of_whichever_kind(monkeypat
     monkeypatch.setattr(elimination, "foresee_falls", foresee_much)
     found = find_substitutes([], named, list(NUMBERS.values()), 0.85)
     assert [(one.of, one.name) for one in found] == [("pressure_curve", "engine_torque")]
+
+
+@pytest.mark.parametrize(("share", "rivals"), [(1.01, ["engine_torque"]), (0.99, [])])
+def test_a_rival_is_fitted_where_its_derivatives_let_it_matter(monkeypatch, share: float, rivals: list[str]):
+    named = replace(fit_of([np.zeros(100)]), numbers=(NUMBERS["pressure_curve"],), cost=10.0)
+
+    def look_up_cost(_stops, fitted, numbers, _start=None):
+        left = {number.name for number in numbers}
+        return replace(fitted, numbers=numbers, cost=11.0 if "engine_torque" in left else 110.0)
+
+    def foresee(_stops, _fitted, others):
+        return np.full(len(others), share * FORESEEN_SHARE * 0.85 * (110.0 - 10.0))
+
+    monkeypatch.setattr(elimination, "refit_numbers", look_up_cost)
+    monkeypatch.setattr(elimination, "foresee_falls", foresee)
+    assert [one.name for one in find_substitutes([], named, list(NUMBERS.values()), 0.85)] == rivals
 
 
 def test_a_gain_that_the_file_claims_to_know_may_stand_for_a_resistance(monkeypatch):

@@ -193,6 +193,21 @@ def test_nothing_is_named_that_predicts_unseen_stops_worse_than_the_file(monkeyp
     assert any("file predicts speed of the held-out runs better" in r for r in trace.verdict.reasons)
 
 
+def test_what_makes_no_difference_beside_retuning_is_not_named(monkeypatch):
+    monkeypatch.setattr(verdict, "makes_difference", lambda *_: False)
+    trace = judge(campaign_of({"lag": 0.09}))
+    assert trace.verdict.verdict == "NOTHING"
+    assert trace.verdict.error["speed"].after == trace.verdict.error["speed"].retuned
+
+
+def test_a_lag_that_would_have_to_be_longer_than_any_is_not_named():
+    short = [replace(n, upper=0.05) if n.name == "lag" else n for n in load_joint_numbers()]
+    numbers = [n for n in short if n.name not in ("dead_time", "speed_delay")]
+    trace = judge_jointly(campaign_of({"lag": 0.09}), VEHICLE, SURFACE, numbers, RULES)
+    assert "lag" not in trace.fitted.by_name
+    assert any("lag of 0.05 s, as far as it may go: not named" in r for r in trace.verdict.reasons)
+
+
 def test_tyres_of_which_nothing_is_known_are_no_rival_of_a_curve():
     """Beside a dead band the tyres were said to grip 0.36 % less, in an interval of all that is allowed."""
     numbers = {n.name: n for n in load_joint_numbers()}
