@@ -1,4 +1,4 @@
-"""What may be wrong in recordings that can be imported, one sentence each."""
+"""Warnings of an import: one sentence for each fault that recordings may have and that does not stop them."""
 
 from collections.abc import Mapping, Sequence
 

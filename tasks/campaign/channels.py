@@ -5,10 +5,12 @@ from math import pi
 
 from tasks.errors import InputError
 
+GRAVITY = 9.80665
+"""Standard gravity [m/s^2]."""
 UNITS: dict[str, tuple[str, float]] = {
     "s": ("time", 1.0), "ms": ("time", 1e-3), "us": ("time", 1e-6), "ns": ("time", 1e-9),
     "m/s": ("speed", 1.0), "km/h": ("speed", 1 / 3.6), "mph": ("speed", 0.44704), "kn": ("speed", 1852 / 3600),
-    "m/s^2": ("acceleration", 1.0), "g": ("acceleration", 9.80665),
+    "m/s^2": ("acceleration", 1.0), "g": ("acceleration", GRAVITY),
     "rad": ("angle", 1.0), "deg": ("angle", pi / 180),
     "rad/s": ("angular speed", 1.0), "deg/s": ("angular speed", pi / 180), "rpm": ("angular speed", pi / 30),
     "MPa": ("pressure", 1e6), "bar": ("pressure", 1e5), "kPa": ("pressure", 1e3), "Pa": ("pressure", 1.0),

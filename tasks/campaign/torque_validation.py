@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.brake_validation import MOVING
-from tasks.campaign.channels import BRAKE_SIGNALS
+from tasks.campaign.channels import BRAKE_SIGNALS, GRAVITY
 
 RELEASED_PRESSURE = 0.1
 """Brake pressure, or what stands for it, up to which the brake is released [MPa]: it gives 0.2 m/s^2."""
@@ -21,8 +21,6 @@ AGAINST = -0.8
 """Correlation of a torque with the rate of speed below which its sign is turned over [1]."""
 MASS_TIMES_RADIUS = (50.0, 25000.0)
 """Torque per rate of speed of a vehicle, from a small car to a truck [kg m]; outside it something else moves it."""
-GRAVITY = 9.80665
-"""Standard gravity [m/s^2]."""
 
 
 def torque_problems(

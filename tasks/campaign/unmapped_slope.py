@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tasks.campaign.brake_validation import MOVING
 from tasks.campaign.channel_validation import smooth_channel
+from tasks.campaign.channels import GRAVITY
 
 LEAST_SPREAD = 0.2
 """Standard deviation over runs from which slopes are told [m/s^2]: 2 % of slope; an accelerometer drifts by 0.1."""
@@ -19,8 +20,6 @@ FEWEST_RUNS = 3
 """Runs of which a deviation is told [1]."""
 SHORTEST_RUN = 1.0
 """Time in motion that a run needs to tell its mean [s]."""
-GRAVITY = 9.80665
-"""Standard gravity [m/s^2]."""
 
 
 def describe_slopes(runs: Mapping[str, Mapping[str, NDArray[np.float64]]], interval: float) -> list[str]:

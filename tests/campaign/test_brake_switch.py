@@ -10,7 +10,7 @@ TIME = np.arange(400) / 100.0
 PRESSED = np.where(TIME > 2.0, 1.0, 0.0)
 
 
-def describe(*brakes: np.ndarray, channel: str = "brake_command", unit: str = "1") -> list[str]:
+def describe_switch(*brakes: np.ndarray, channel: str = "brake_command", unit: str = "1") -> list[str]:
     rule = ChannelRule(channel=channel, sources=("brake",), unit=unit)
     speed = ChannelRule(channel="speed", sources=("v",), unit="m/s")
     recordings = [
@@ -22,7 +22,7 @@ def describe(*brakes: np.ndarray, channel: str = "brake_command", unit: str = "1
 
 @pytest.mark.parametrize("on", [1.0, 100.0])
 def test_a_switch_is_told(on: float) -> None:
-    (told,) = describe(on * PRESSED, np.where(PRESSED > 0.0, on, np.nan))
+    (told,) = describe_switch(on * PRESSED, np.where(PRESSED > 0.0, on, np.nan))
     assert f"brake_command has the values 0 and {on:g} alone" in told
     assert "not how hard" in told
 
@@ -36,7 +36,7 @@ def test_a_switch_is_told(on: float) -> None:
     ],
 )
 def test_a_command_of_several_levels_is_no_switch(brakes: tuple[np.ndarray, ...]) -> None:
-    assert describe(*brakes) == []
+    assert describe_switch(*brakes) == []
 
 
 def test_a_map_without_brake_has_no_switch() -> None:

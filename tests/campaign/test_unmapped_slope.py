@@ -13,7 +13,7 @@ SLOPES = {"run-01": -0.042, "run-02": 0.0, "run-03": 0.022, "run-04": -0.02}
 Columns = dict[str, NDArray[np.float64]]
 
 
-def drive(
+def drive_on_slopes(
     slope: float, *, brake: float = 5.0, dive: float = 0.03, late: float = 0.0, seed: int = 1
 ) -> Columns:
     """A stop whose accelerometer reads gravity along the road and along the body's dive."""
@@ -25,7 +25,7 @@ def drive(
 
 
 def test_slopes_from_run_to_run_are_told_with_their_size() -> None:
-    runs = {name: drive(slope, seed=n) for n, (name, slope) in enumerate(SLOPES.items())}
+    runs = {name: drive_on_slopes(slope, seed=n) for n, (name, slope) in enumerate(SLOPES.items())}
     (told,) = describe_slopes(runs, INTERVAL)
     assert "by -0.41 (run-01) to 0.22 m/s^2 (run-03)" in told
     assert "slopes of -4.2 to 2.2 %" in told and "map road_slope" in told
@@ -34,7 +34,7 @@ def test_slopes_from_run_to_run_are_told_with_their_size() -> None:
 def test_what_braking_gives_does_not_count() -> None:
     """Runs that brake differently hard read another mean of the dive, and one that is late another of the rise."""
     runs = {
-        f"run-{n:02d}": drive(0.01, brake=brake, dive=0.1, late=0.1, seed=n)
+        f"run-{n:02d}": drive_on_slopes(0.01, brake=brake, dive=0.1, late=0.1, seed=n)
         for n, brake in enumerate((0.0, 1.0, 3.0, 5.0, 7.0))
     }
     assert list(measure_apart(runs, INTERVAL).values()) == pytest.approx([0.098] * 5, abs=0.04)
@@ -44,12 +44,15 @@ def test_what_braking_gives_does_not_count() -> None:
 @pytest.mark.parametrize(
     "runs",
     [
-        {name: drive(0.05) for name in SLOPES},  # one slope, or one offset
-        {name: drive(slope) for name, slope in list(SLOPES.items())[:2]},
-        {name: drive(0.3 * slope) for name, slope in SLOPES.items()},
-        {name: drive(slope) | {"road_slope": 57.3 * slope + 0.0 * TIME} for name, slope in SLOPES.items()},
-        {name: {"speed": drive(slope)["speed"]} for name, slope in SLOPES.items()},
-        {name: {c: x[:30] for c, x in drive(slope).items()} for name, slope in SLOPES.items()},
+        {name: drive_on_slopes(0.05) for name in SLOPES},  # one slope, or one offset
+        {name: drive_on_slopes(slope) for name, slope in list(SLOPES.items())[:2]},
+        {name: drive_on_slopes(0.3 * slope) for name, slope in SLOPES.items()},
+        {
+            name: drive_on_slopes(slope) | {"road_slope": 57.3 * slope + 0.0 * TIME}
+            for name, slope in SLOPES.items()
+        },
+        {name: {"speed": drive_on_slopes(slope)["speed"]} for name, slope in SLOPES.items()},
+        {name: {c: x[:30] for c, x in drive_on_slopes(slope).items()} for name, slope in SLOPES.items()},
     ],
 )
 def test_one_offset_small_slopes_and_mapped_ones_raise_no_alarm(runs: dict[str, Columns]) -> None:

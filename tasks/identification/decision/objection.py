@@ -1,4 +1,4 @@
-"""What held-out runs say against a name: prediction of unseen runs cannot be bought."""
+"""Objections of the held-out runs to a name that the training runs bought."""
 
 from collections.abc import Mapping
 

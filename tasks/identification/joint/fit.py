@@ -150,20 +150,20 @@ def _fit_from(
     x = np.clip(x, lower + 1e-6 * (upper - lower), upper - 1e-6 * (upper - lower))
     prior = np.concatenate(([1.0 / n.sigma for n in numbers], np.tile(1.0 / OFFSET_SIGMA, len(stops))))
 
-    def split(i: int, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def take_run(i: int, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         return x[:k], x[k + own * i : k + own * (i + 1)]
 
     def residual(x: NDArray[np.float64]) -> NDArray[np.float64]:
         runs = []
         for i, stop in enumerate(stops):
-            values, offset = split(i, x)
+            values, offset = take_run(i, x)
             runs.append(weigh_misfit(stop, name_values(numbers, values), offset, scales))
         return np.concatenate((*runs, prior * x))
 
     def jacobian(x: NDArray[np.float64]) -> NDArray[np.float64]:
         runs = []
         for i, stop in enumerate(stops):
-            _, columns = differentiate_run(stop, numbers, *split(i, x), scales)
+            _, columns = differentiate_run(stop, numbers, *take_run(i, x), scales)
             placed = np.zeros((len(columns), len(x)))
             placed[:, :k], placed[:, k + own * i : k + own * (i + 1)] = columns[:, :k], columns[:, k:]
             runs.append(placed)

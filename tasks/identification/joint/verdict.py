@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
 from tasks.identification.decision.answer import (
+    ChannelError,
     NamedEffect,
     Parameter,
     Verdict,
@@ -47,6 +48,10 @@ from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.table import PARAMETERS, build_parameter_vector
 from tasks.vehicle.parameters import Vehicle
 
+Predicted = tuple[NDArray[np.float64], ...]
+"""Readings of each held-out run by the frozen, the re-tuned and the grown model, float64 [3, N, 7]."""
+Errors = dict[str, ChannelError]
+"""Errors of the three models, by channel or figure."""
 BENDS_RESISTANCE = "pad_speed"
 """Pad friction that depends on speed: with it a constant resistance may stand for air drag, and air drag for it."""
 
@@ -115,12 +120,15 @@ def judge_jointly(
     progress("held-out error")
     fitted = drop_what_predicts_worse(train, held_out, fitted, joint, reasons)
     retuned = refit_numbers(train, fitted, tuple(n for n in fitted.numbers if n.group in CALIBRATED))
-    predicted = predict_held_out(held_out, retuned, fitted)
-    error, manoeuvres = summarise_held_out(held_out, predicted, rules)
+
+    def predict_with(grown: JointFit) -> tuple[Predicted, Errors, Errors]:
+        predicted = predict_held_out(held_out, retuned, grown)
+        return predicted, *summarise_held_out(held_out, predicted, rules)
+
+    predicted, error, manoeuvres = predict_with(fitted)
     if not makes_difference(fitted, error, joint, reasons):
         fitted = retuned
-        predicted = predict_held_out(held_out, retuned, fitted)
-        error, manoeuvres = summarise_held_out(held_out, predicted, rules)
+        predicted, error, manoeuvres = predict_with(fitted)
     progress("rivals")
     tolerances = _tolerances(campaign)
     named = _name_effects(fitted, joint)
@@ -132,6 +140,7 @@ def judge_jointly(
             " is named"
         )
         effects, calibrated, fitted = [], (), retuned
+        predicted, error, manoeuvres = predict_with(fitted)
     # a number that the file claims to know may stand for what the model lacks
     claimed = [name for name, tolerance in tolerances.items() if tolerance < joint.unknown_gain_tolerance]
     doubted = {e.parameters[0].name for e in effects} & set(claimed)
@@ -189,14 +198,14 @@ def _fit_everything(
     best = fit_first_numbers(train, {n.name: n for numbers in sets for n in numbers}.values(), starts)
     scales = misfit_scales(best, train)
 
-    def fit(numbers: Sequence[JointNumber], start: JointFit) -> JointFit:
+    def fit_set(numbers: Sequence[JointNumber], start: JointFit) -> JointFit:
         return fit_jointly(train, tuple(numbers), [start.by_name], scales=scales, offsets=start.offsets)[0]
 
     if len(sets) == 1:
-        return fit(sets[0], best)
-    plain = [fit([n for n in numbers if n.name != BENDS_RESISTANCE], best) for numbers in sets]
+        return fit_set(sets[0], best)
+    plain = [fit_set([n for n in numbers if n.name != BENDS_RESISTANCE], best) for numbers in sets]
     place = min(range(len(sets)), key=lambda i: plain[i].cost)
-    return fit(sets[place], plain[place])
+    return fit_set(sets[place], plain[place])
 
 
 def _settle(
@@ -231,9 +240,8 @@ def _name_rivals(
         rivals.append((effect_of[other.of], _named_effect(other.fitted, number, rules)))
     friction = next((n for n in fitted.numbers if n.group == "friction"), None)
     grip = None if friction is None else _named_effect(fitted, friction, rules)
-    if (
-        grip is not None and not grip.parameters[0].is_unknown
-    ):  # tyres at their limit bend the brake's curve too
+    # tyres at their limit bend the brake's curve too; tyres of which the runs say nothing are no explanation
+    if grip is not None and not grip.parameters[0].is_unknown:
         curve = {n.effect.name for n in fitted.numbers if n.group == "curve"}
         rivals += [(effect.name, grip) for effect in effects if effect.name in curve]
     return rivals

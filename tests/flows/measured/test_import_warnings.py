@@ -1,4 +1,4 @@
-"""What is no fault of a recording, and yet told by its import."""
+"""An import warns of what may be a fault of a recording, and imports it."""
 
 from pathlib import Path
 

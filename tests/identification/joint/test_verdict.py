@@ -189,6 +189,7 @@ def test_nothing_is_named_that_predicts_unseen_stops_worse_than_the_file(monkeyp
     assert judge(campaign).verdict.effects
     monkeypatch.setattr(verdict, "find_worse_channels", lambda _error, _limit, speed_decides: ["speed"])
     trace = judge(campaign)
+    assert trace.verdict.error["speed"].after == trace.verdict.error["speed"].retuned
     assert trace.verdict.verdict == "NOTHING" and not trace.calibrated
     assert any("file predicts speed of the held-out runs better" in r for r in trace.verdict.reasons)
 
