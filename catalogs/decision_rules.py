@@ -25,6 +25,7 @@ class JointRulesEntry(CatalogueEntry):
     braking_deceleration: Annotated[Scalar, require_quantity("m s-2", above=0)]
     fewest_curve_stops: Count
     saturation_ratio: Level
+    limited_time: Annotated[Scalar, require_quantity("s", above=0)]
     least_pressure_range: Annotated[Scalar, require_quantity("MPa", above=0)]
     delay_interval: Annotated[Scalar, require_quantity("s", above=0)]
     coasted_share: Share
@@ -62,6 +63,8 @@ class DecisionRulesEntry(CatalogueEntry):
     relinearised_candidates: Count
     relinearisation_change: Share
     retune_pull: Level
+    runaway_pull: Level
+    negligible_share: Level
     relinearisation_pull: Level
     disagreement: Level
     lone_form_share: Share

@@ -29,6 +29,7 @@ class JointNumberEntry(CatalogueEntry):
     of_pressure: bool = False
     free_with: tuple[Text, ...] = ()
     stands_in: bool = False
+    weather: Text | None = None
 
 
 def _check(entries: dict[str, JointNumberEntry]) -> dict[str, JointNumberEntry]:
@@ -43,7 +44,7 @@ def _check(entries: dict[str, JointNumberEntry]) -> dict[str, JointNumberEntry]:
         problems += [
             f"{name} needs {need}, which is no channel"
             for need in (*entry.needs, *entry.free_with)
-            if need not in CHANNELS
+            if need not in (*CHANNELS, "drive_torque")
         ]
     if problems:
         raise ValueError("; ".join(problems))
@@ -73,7 +74,7 @@ def load_joint_numbers(path: str | Path = JOINT_NUMBERS) -> tuple[JointNumber, .
         JointNumber(
             name=name, sigma=entry.sigma, lower=entry.lower, upper=entry.upper, group=entry.group,
             removable=entry.removable, needs=entry.needs, effect=effects[name], of_pressure=entry.of_pressure,
-            free_with=entry.free_with, stands_in=entry.stands_in,
+            free_with=entry.free_with, stands_in=entry.stands_in, weather=entry.weather,
         )
         for name, entry in entries.items()
     )  # fmt: skip

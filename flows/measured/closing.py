@@ -141,7 +141,7 @@ def tell_search(trace: Trace | JointTrace) -> dict[str, Any]:
     suggested = next((effect for effect in verdict.tried if effect.name == planned_for), None)
     sentence = tell_verdict(
         verdict.effects, rivals, library, verdict.error, verdict.manoeuvre_error, suggested,
-        bool(verdict.disagreement), _say_own_numbers(trace, library),
+        verdict.misses or bool(verdict.disagreement and not verdict.effects), _say_own_numbers(trace, library),
     )  # fmt: skip
     told = {
         "channels": [CHANNELS[c] for c in train[0].channels],

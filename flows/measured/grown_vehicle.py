@@ -13,7 +13,7 @@ from manifests.provenance import code_version
 from tasks.identification.decision.answer import NamedEffect, Parameter, Verdict
 from tasks.identification.decision.forms import make_form_in_range
 from tasks.vehicle.effects.forms import Form
-from tasks.vehicle.effects.grown import FAMILY, apply_effects
+from tasks.vehicle.effects.grown import FAMILY, apply_effects, find_family_tables
 from tasks.vehicle.effects.ports import PORT_UNITS, VARIABLE_UNITS
 from tasks.vehicle.effects.table import PARAMETERS, EffectParameter
 from tasks.vehicle.parameters import Vehicle
@@ -150,9 +150,10 @@ def _write(entry: dict[str, Any], grown: Vehicle, row: EffectParameter, field: s
         }  # fmt: skip
         return
     if field.startswith(FAMILY):
-        table = field.removeprefix(FAMILY)
         # tyre families of the weather catalogue are no part of the vehicle's file
-        for weather, tables in entry["families"].items():
+        kinds, table = find_family_tables(field, entry["families"])
+        for weather in kinds:
+            tables = entry["families"][weather]
             old = tables[table]
             tables[table] = {
                 **old, "value": list(getattr(grown.families[weather], table)), "source": f"{old['source']}; {source}",

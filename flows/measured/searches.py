@@ -30,8 +30,9 @@ def judge_campaign(
     rules, numbers = load_decision_rules(), load_joint_numbers()
     disagreement = ""
     if not needs_joint_fit(measured, rules.joint):
+        single = tuple(effect for effect in effects if effect.alone)
         try:
-            return find_effects_in_two_looks(measured, model, road, effects, numbers, rules)
+            return find_effects_in_two_looks(measured, model, road, single, numbers, rules)
         except ForeignCarError as error:
             disagreement = str(error)
     return judge_jointly(measured, model, road, numbers, rules, disagreement=disagreement)

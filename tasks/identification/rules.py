@@ -19,6 +19,7 @@ class JointRules:
     braking_deceleration : deceleration above which a run brakes hard enough to show something of the brake [m s-2]
     fewest_curve_stops : braking runs from which the shape of the brake's curve can be read [1]
     saturation_ratio : peak deceleration over that of the model's tyres above which they grip better than it says [1]
+    limited_time : time from which the file's wheels at their tyres' limit say that a run shows friction [s]
     least_pressure_range : brake pressure that a campaign is taken to reach at least, for its priors [MPa]
     delay_interval : interval between samples up to which a log tells a lag from a dead time [s]
     coasted_share : share of its speed that a run must lose for its resistances to be told apart [1]
@@ -42,6 +43,7 @@ class JointRules:
     braking_deceleration: float
     fewest_curve_stops: int
     saturation_ratio: float
+    limited_time: float
     least_pressure_range: float
     delay_interval: float
     coasted_share: float
@@ -84,6 +86,8 @@ class DecisionRules:
     relinearised_candidates : candidates of a round that are linearised anew, if their gain is large [1]
     relinearisation_change : relative change of parameters below which a second relinearisation is not needed [1]
     retune_pull : pull of a session nuisance, in prior sigmas, from which it is a wrong number of the vehicle [1]
+    negligible_share : change of a number that no session re-tunes, below which it is not wrong [1]
+    runaway_pull : pull from which a search of single effects that misses the stops has run away [1]
     relinearisation_pull : pull, in prior sigmas, from which the runs are linearised anew at the session [1]
     disagreement : inflation of a named effect from which a single form is compared with it; of the runs without any
         name, from which speed and accelerometer are asked alone [1]
@@ -126,6 +130,8 @@ class DecisionRules:
     relinearised_candidates: int
     relinearisation_change: float
     retune_pull: float
+    runaway_pull: float
+    negligible_share: float
     relinearisation_pull: float
     disagreement: float
     lone_form_share: float

@@ -30,11 +30,6 @@ class Parameter:
     upper: float
     unit: str
 
-    @property
-    def is_unknown(self) -> bool:
-        """Return whether the interval is all that lies between the bounds."""
-        return self.ci_low <= self.lower and self.ci_high >= self.upper
-
 
 @dataclass(frozen=True, kw_only=True)
 class NamedEffect:
@@ -113,6 +108,7 @@ class Verdict:
     reasons : sentences that explain the verdict
     disagreement : why single effects could not be told, or by how much nothing that is named explains the runs; else
         empty
+    misses : the speed of held-out runs is missed by more than its noise
     """
 
     verdict: VerdictName
@@ -135,6 +131,7 @@ class Verdict:
     forked: tuple[str, ...]
     reasons: tuple[str, ...]
     disagreement: str = ""
+    misses: bool = False
 
 
 def make_estimate(effect: Effect, parameter: Parameter, error: float) -> NamedEffect:

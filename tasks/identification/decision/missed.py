@@ -42,8 +42,9 @@ def tell_miss(verdict: Verdict, campaign: Campaign, limit: float) -> Verdict:
         f" noise (at most {limit:g})"
     )
     if not verdict.effects:
-        return replace(verdict, disagreement=missed, reasons=(missed, *verdict.reasons))
+        return replace(verdict, misses=True, disagreement=missed, reasons=(missed, *verdict.reasons))
     return replace(
         verdict,
+        misses=True,
         reasons=(*verdict.reasons, f"{missed}: what is named is not all that the model lacks"),
     )

@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from tasks.campaign.campaign import SESSION
 from tasks.identification.decision.answer import ChannelError
 from tasks.identification.decision.held_out import (
@@ -20,8 +22,8 @@ def object_to_last(
     """Return why held-out runs contradict what was named last; None if they do not.
 
     The marginal likelihood can buy a fit with disturbances; prediction of unseen runs cannot be bought. A number that
-    re-tuning does not move must do better than the numbers that it moves: a tyre that is 1 % stiffer takes up the slip
-    that another anti-lock brake holds.
+    re-tuning does not move must do better than the numbers that it moves, and be off by more than nobody knows it to: a
+    tyre that is 1 % stiffer takes up the slip that another anti-lock brake holds.
 
     Parameters
     ----------
@@ -38,6 +40,12 @@ def object_to_last(
         return (
             f"{', '.join(h.name for h in named)} would fit, but re-tuning alone predicts the held-out runs better, with"
             f" {1.0 / beside:.3g} of the error: not named"
+        )
+    off = float(np.max(np.abs(found.base.values[-len(hypothesis.names) :])))
+    if number and off < rules.negligible_share:
+        return (
+            f"{hypothesis.name} would fit with {off:.2g}, which is less than such a number is known to"
+            f" ({rules.negligible_share:g}): not named"
         )
     worse = find_worse_channels(error, rules.worse_limit, speed_decides=moved)
     if worse:

@@ -206,7 +206,7 @@ def find_missing_effects(
         reasons=tuple(reasons),
     )
     verdict = tell_miss(verdict, campaign, rules.joint.foreign_misfit)
-    told = named or (is_predicted_better(error) and not verdict.disagreement)
+    told = named or is_predicted_better(error)
     return Trace(
         verdict=verdict,
         start=start,

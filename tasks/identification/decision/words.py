@@ -43,7 +43,7 @@ def tell_verdict(
     library : effects that may be named
     error, manoeuvres : on runs to which no number was fitted
     suggested : what the training runs show and the held-out runs neither confirm nor contradict, if nothing is named
-    misses : whether the runs disagree with the model by more than single effects can be told beside
+    misses : whether the runs disagree with the model, and with what is named, by more than their noise
     own : what the vehicle's own numbers that the runs move most say of the car
     """
     if not effects and suggested is not None:
@@ -51,12 +51,12 @@ def tell_verdict(
             "These runs prove nothing that the model lacks. The training runs suggest that"
             f" {say_effect(suggested, library)}; the held-out runs do not confirm it."
         )
-    if not effects and misses:
-        return (
-            "The model misses these runs by more than their noise, and nothing that can be named explains it."
-        )
     if not effects:
-        nothing = "These runs show nothing that the model lacks"
+        nothing = (
+            "The model misses these runs by more than their noise, and nothing that can be named explains it"
+            if misses
+            else "These runs show nothing that the model lacks"
+        )
         if not own or not is_predicted_better(error):
             return f"{nothing}."
         figures = {name: e for name, e in manoeuvres.items() if e.change_high < 0.0}
@@ -83,7 +83,9 @@ def tell_verdict(
         figures = {worth: error[worth]} | figures
     moved = _say_errors(figures, retuned=True)
     how = "that takes" if len(told) == 1 else "together they take"
-    return f"{text[0].upper()}{text[1:]}; {how} the error {moved}, on runs to which no number was fitted."
+    rest = " The speed is still missed by more than its noise: more is lacking than that." if misses else ""
+    done = f"{how} the error {moved}, on runs to which no number was fitted."
+    return f"{text[0].upper()}{text[1:]}; {done}{rest}"
 
 
 def _say_errors(figures: Mapping[str, ChannelError], *, retuned: bool = False) -> str:

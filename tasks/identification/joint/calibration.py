@@ -4,17 +4,16 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
+from tasks.campaign.campaign import CHANNELS, Campaign
 from tasks.identification.decision.disputes import ForeignCarError
 from tasks.identification.inference.noise import estimate_channel_noise
 from tasks.identification.joint.fit import JointFit, fit_jointly, measure_misfit, suggest_starts
-from tasks.identification.joint.numbers import JointNumber, choose_numbers
+from tasks.identification.joint.numbers import GAIN, JointNumber, choose_numbers, is_gain_unknown
 from tasks.identification.joint.stops import Stop, make_stop
 from tasks.identification.rules import JointRules
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.parameters import Vehicle
 
-GAIN = "pressure_gain"
 FIRST = ("lag", "drag_area", "speed_delay")
 """Numbers that are free beside those of every car while the best start is looked for."""
 HELD = 1e-5
@@ -29,25 +28,23 @@ def needs_joint_fit(campaign: Campaign, rules: JointRules) -> bool:
     campaign : measured runs with their tolerances
     rules : of the joint fit
     """
-    few = min(len(campaign.train), len(campaign.held_out)) < rules.fewest_runs
     # a throttle, and a brake signal that is no pressure
     return (
-        few
+        has_few_runs(campaign, rules)
         or campaign.brake_signal != "brake_pressure"
         or any(run.throttle is not None for run in campaign.runs)
     )
 
 
-def is_gain_unknown(campaign: Campaign, rules: JointRules) -> bool:
-    """Whether the brake's gain is to be found: the file hardly knows it, or the signal is no pressure.
+def has_few_runs(campaign: Campaign, rules: JointRules) -> bool:
+    """Whether there are too few training or held-out runs to look for one effect at a time.
 
     Parameters
     ----------
-    campaign : measured runs with their tolerances
+    campaign : measured runs with their split
     rules : of the joint fit
     """
-    tolerance = campaign.tolerances.session[SESSION.index(GAIN)]
-    return campaign.brake_signal != "brake_pressure" or tolerance >= rules.unknown_gain_tolerance
+    return min(len(campaign.train), len(campaign.held_out)) < rules.fewest_runs
 
 
 def fit_first_numbers(

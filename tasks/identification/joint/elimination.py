@@ -9,12 +9,14 @@ from scipy.special import stdtrit
 
 from tasks.identification.inference.noise import correlate_with_next
 from tasks.identification.joint.fit import JointFit, describe_fit, fit_jointly
-from tasks.identification.joint.numbers import JointNumber
+from tasks.identification.joint.numbers import FRICTION, JointNumber
 from tasks.identification.joint.stops import Stop
 from tasks.identification.rules import JointRules
 
 GRIPS = (0.0, 0.2, 0.5)
 """Friction from which fits start, where runs saturate the tyres [1]."""
+KNOWN_SHARE = 0.5
+"""Share of its prior's sigma up to which the runs must tell a friction for it to stay whatever its value [1]."""
 FORESEEN_SHARE = 0.05
 """Share of what a substitute must make good, from which on it is fitted [1]; a fit of a late brake makes good ten times
 what its derivatives foresee where no delay is free."""
@@ -126,7 +128,7 @@ def eliminate_uncertain_numbers(stops: Sequence[Stop], fitted: JointFit, rules: 
 
     What is named must not hang on one run: from `fewest_scatter_runs` runs on, a number goes that elimination about the
     same fit would take away without any one of them (stability selection, Meinshausen and Buehlmann 2010,
-    doi:10.1111/j.1467-9868.2010.00740.x).
+    doi:10.1111/j.1467-9868.2010.00740.x). A friction of which the runs say little more than its prior may go too.
 
     Parameters
     ----------
@@ -138,14 +140,32 @@ def eliminate_uncertain_numbers(stops: Sequence[Stop], fitted: JointFit, rules: 
     if unstable:
         left = tuple(n for n in fitted.numbers if n.name not in unstable)
         # without much of what moved the car, tyres that grip less may hide a brake's curve: the best of several starts
-        grips = [{}, *({"friction": grip} for grip in GRIPS)] if "friction" in fitted.by_name else [{}]
+        grips = [{}, *vary_grip(fitted)]
         fitted = min((refit_numbers(stops, fitted, left, grip) for grip in grips), key=lambda fit: fit.cost)
     while True:
-        sure = count_standard_errors(fitted, rules)
-        weak = [(float(here), n.name) for n, here in zip(fitted.numbers, sure, strict=True) if n.removable]
+        errors = standard_errors(fitted, rules)
+        sure = np.abs(fitted.values) / errors
+        may_go = [
+            n.removable or (n.group == FRICTION and e > KNOWN_SHARE * n.sigma)
+            for n, e in zip(fitted.numbers, errors, strict=True)
+        ]
+        weak = [
+            (float(here), n.name) for n, here, may in zip(fitted.numbers, sure, may_go, strict=True) if may
+        ]
         if not weak or min(weak)[0] >= certain_from(fitted, rules):
             return fitted
         fitted = refit_numbers(stops, fitted, tuple(n for n in fitted.numbers if n.name != min(weak)[1]))
+
+
+def vary_grip(fitted: JointFit) -> list[dict[str, float]]:
+    """Return frictions from which fits start: of every kind of weather alike.
+
+    Parameters
+    ----------
+    fitted : the fit
+    """
+    frictions = [n.name for n in fitted.numbers if n.group == FRICTION]
+    return [dict.fromkeys(frictions, grip) for grip in GRIPS] if frictions else []
 
 
 def drop_at_bounds(

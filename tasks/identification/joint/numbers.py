@@ -5,13 +5,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tasks.campaign.campaign import CHANNELS, Campaign
-from tasks.identification.inference.forward import RunModel
+from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
+from tasks.identification.inference.forward import RunModel, simulate_run
 from tasks.identification.rules import JointRules
 from tasks.vehicle.effects.library import Effect
+from tasks.vehicle.effects.table import EFFECT_TABLE
 from tasks.vehicle.parameters import compute_surface_response
 
-CALIBRATED = ("gain", "friction", "radius")
+GAIN = "pressure_gain"
+FRICTION = "friction"
+CALIBRATED = ("gain", FRICTION, "radius")
 """Groups of numbers that re-tuning moves."""
 AT_BOUND = 0.005
 """Share of its range within which a number lies at an end of it [1]."""
@@ -35,6 +38,7 @@ class JointNumber:
     of_pressure : sigma is a share of the largest brake pressure of the training runs
     free_with : channels without any of which it is never free, but may explain the runs in the place of another number
     stands_in : it is never free, or none of those was measured
+    weather : kind of weather on which alone it acts
     """
 
     name: str
@@ -48,6 +52,7 @@ class JointNumber:
     of_pressure: bool = False
     free_with: tuple[str, ...] = ()
     stands_in: bool = False
+    weather: str | None = None
 
     def is_at_bound(self, value: float) -> bool:
         """Whether a value lies where the fit had to stop, other than at the vehicle file's.
@@ -82,25 +87,32 @@ def choose_numbers(
     rules : of the joint fit
     """
     chosen = []
+    engine = any(run.drive_torque is not None for run in campaign.runs)
+    known = {*campaign.channels, *(["drive_torque"] if engine else [])}
+    trusted = not is_gain_unknown(campaign, rules)  # else the file's pressure says nothing of the limit
     stops = sum(shows_brake_curve(model, rules) for model in models)
     for number in numbers:
         if not any(need in campaign.channels for need in number.needs):
             continue
-        if number.name == "engine_torque" and any(run.drive_torque is not None for run in campaign.runs):
+        if number.name == "engine_torque" and engine:
             continue  # an input, and no unknown
         if number.name == "fade" and len({run.disc_rise for run in campaign.train}) < 2:
             continue  # discs of one temperature show no fade
         if number.group == "curve" and stops < rules.fewest_curve_stops:
             continue  # one stop gives a gain and a delay, and no curve
-        if number.name == "friction" and not any(saturates_tyres(model, rules) for model in models):
+        if number.group == FRICTION and not any(
+            saturates_tyres(model, rules) or (trusted and reaches_limit(model, rules))
+            for model in _find_runs_on(number, numbers, models)
+        ):
             continue
         if number.of_pressure:
             largest = max(float(model.run.pressure.max()) for model in models)
             number = replace(
                 number, sigma=number.sigma * max(largest, rules.least_pressure_range), of_pressure=False
             )
-        alone = bool(number.free_with) and not any(name in campaign.channels for name in number.free_with)
-        chosen.append(replace(number, stands_in=number.stands_in or alone))
+        chosen.append(
+            replace(number, stands_in=bool(number.free_with) and known.isdisjoint(number.free_with))
+        )
     return tuple(chosen)
 
 
@@ -143,6 +155,18 @@ def coasts_down(model: RunModel, rules: JointRules) -> bool:
     return not run.pressure.any() and not driven and lost
 
 
+def is_gain_unknown(campaign: Campaign, rules: JointRules) -> bool:
+    """Whether the brake's gain is to be found: the file hardly knows it, or the signal is no pressure.
+
+    Parameters
+    ----------
+    campaign : measured runs with their tolerances
+    rules : of the joint fit
+    """
+    tolerance = campaign.tolerances.session[SESSION.index(GAIN)]
+    return campaign.brake_signal != "brake_pressure" or tolerance >= rules.unknown_gain_tolerance
+
+
 def shows_brake_curve(model: RunModel, rules: JointRules) -> bool:
     """Whether a run brakes hard enough to show something of the brake's curve.
 
@@ -152,6 +176,32 @@ def shows_brake_curve(model: RunModel, rules: JointRules) -> bool:
     rules : of the joint fit
     """
     return peak_deceleration(model) > rules.braking_deceleration
+
+
+def _find_runs_on(
+    number: JointNumber, numbers: Sequence[JointNumber], models: Sequence[RunModel]
+) -> list[RunModel]:
+    """Return the runs that tell a friction: those of its weather, and of what no other number stands for.
+
+    Runs of one kind of weather alone tell the friction that is common to all.
+    """
+    kinds = {model.run.weather for model in models}
+    own = {n.weather for n in numbers if n.weather is not None} if len(kinds) > 1 else set()
+    if number.weather is None:
+        return [model for model in models if model.run.weather not in own]
+    return [model for model in models if number.weather in own and model.run.weather == number.weather]
+
+
+def reaches_limit(model: RunModel, rules: JointRules) -> bool:
+    """Whether the front wheels of the vehicle file come to the limit of their tyres for some time in a run.
+
+    Parameters
+    ----------
+    model : the run
+    rules : of the joint fit
+    """
+    scale = simulate_run(model, np.zeros(len(EFFECT_TABLE))).column("abs_scale_f")
+    return bool(np.sum(scale < 1.0) * model.run.interval > rules.limited_time)
 
 
 def saturates_tyres(model: RunModel, rules: JointRules) -> bool:

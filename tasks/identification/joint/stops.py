@@ -18,6 +18,7 @@ from tasks.identification.inference.forward import (
 )
 from tasks.identification.rules import JointRules
 from tasks.surface.state import SurfaceParameters
+from tasks.vehicle.effects.grown import FAMILY, find_family_tables
 from tasks.vehicle.effects.table import PARAMETER_INDEX, PARAMETERS, build_parameter_vector
 from tasks.vehicle.model.simulation import Simulation
 from tasks.vehicle.parameters import Vehicle
@@ -147,7 +148,14 @@ def is_only_read(stop: Stop, name: str) -> bool:
     """
     if name == "drive":
         return not stop.drive.any()
+    if name in PARAMETERS and all(_is_of_other_weather(field, stop) for field in PARAMETERS[name].fields):
+        return True
     return name == "acceleration_bias" or PARAMETER_INDEX.get(name) in READ_ALONE
+
+
+def _is_of_other_weather(field: str, stop: Stop) -> bool:
+    """Whether a field is of tyre families in whose weather a run was not driven."""
+    return field.startswith(FAMILY) and not find_family_tables(field, (stop.model.run.weather,))[0]
 
 
 def complete_numbers(numbers: Mapping[str, float]) -> dict[str, float]:

@@ -20,9 +20,8 @@ from tasks.identification.decision.held_out import find_worse_channels, is_predi
 from tasks.identification.decision.log_faults import tell_log_faults
 from tasks.identification.decision.missed import tell_miss
 from tasks.identification.inference.disturbance import Disturbance
-from tasks.identification.joint.calibration import fit_first_numbers, is_gain_unknown
+from tasks.identification.joint.calibration import fit_first_numbers
 from tasks.identification.joint.elimination import (
-    GRIPS,
     Substitute,
     certain_numbers,
     compute_interval_quantile,
@@ -31,6 +30,7 @@ from tasks.identification.joint.elimination import (
     find_substitutes,
     refit_numbers,
     standard_errors,
+    vary_grip,
 )
 from tasks.identification.joint.fit import JointFit, fit_jointly, misfit_scales, suggest_starts
 from tasks.identification.joint.held_out import (
@@ -40,7 +40,15 @@ from tasks.identification.joint.held_out import (
     predict_held_out,
     summarise_held_out,
 )
-from tasks.identification.joint.numbers import CALIBRATED, JointNumber, choose_numbers, free_numbers
+from tasks.identification.joint.numbers import (
+    CALIBRATED,
+    FRICTION,
+    GAIN,
+    JointNumber,
+    choose_numbers,
+    free_numbers,
+    is_gain_unknown,
+)
 from tasks.identification.joint.stops import FITTED, Stop, complete_numbers, make_stop
 from tasks.identification.joint.words import tell_lumped_resistance, tell_rivals, tell_what_was_used
 from tasks.identification.rules import DecisionRules, JointRules
@@ -130,7 +138,7 @@ def judge_jointly(
         fitted = retuned
         predicted, error, manoeuvres = predict_with(fitted)
     progress("rivals")
-    tolerances = _tolerances(campaign)
+    tolerances = _tolerances(campaign, shown)
     named = _name_effects(fitted, joint)
     calibrated = tuple(e for e in named if is_within_tolerance(e, tolerances, joint.wrong_number_tolerances))
     effects = [e for e in named if e not in calibrated]
@@ -177,7 +185,7 @@ def judge_jointly(
     verdict = tell_miss(verdict, campaign, joint.foreign_misfit)
     return JointTrace(
         verdict=verdict,
-        calibrated=calibrated if effects or (is_predicted_better(error) and not verdict.disagreement) else (),
+        calibrated=calibrated if effects or is_predicted_better(error) else (),
         fitted=fitted,
         errors=standard_errors(fitted, joint),
         train=train,
@@ -212,8 +220,7 @@ def _settle(
     train: Sequence[Stop], fitted: JointFit, starts: Sequence[Mapping[str, float]], rules: JointRules
 ) -> tuple[JointFit, tuple[int, int]]:
     """Return the best fit of the numbers left from several starts, and how many of these reach it."""
-    grips = GRIPS if "friction" in fitted.by_name else (0.0,)
-    begins = [fitted.by_name, *({**starts[0], "friction": grip} for grip in grips), *starts[1:]]
+    begins = [fitted.by_name, *({**starts[0], **grip} for grip in vary_grip(fitted)), *starts[1:]]
     fits = fit_jointly(train, fitted.numbers, begins, scales=fitted.scales)
     near = rules.same_fit_errors * standard_errors(fits[0], rules)
     same = sum(bool(np.all(np.abs(f.values - fits[0].values) < near)) for f in fits)
@@ -238,13 +245,10 @@ def _name_rivals(
     for other in substitutes:
         number = next(n for n in other.fitted.numbers if n.name == other.name)
         rivals.append((effect_of[other.of], _named_effect(other.fitted, number, rules)))
-    friction = next((n for n in fitted.numbers if n.group == "friction"), None)
-    grip = None if friction is None else _named_effect(fitted, friction, rules)
-    # tyres at their limit bend the brake's curve too; tyres of which the runs say nothing are no explanation
-    if grip is not None and not grip.parameters[0].is_unknown:
-        curve = {n.effect.name for n in fitted.numbers if n.group == "curve"}
-        rivals += [(effect.name, grip) for effect in effects if effect.name in curve]
-    return rivals
+    grips = [_named_effect(fitted, n, rules) for n in fitted.numbers if n.group == FRICTION]
+    curve = {n.effect.name for n in fitted.numbers if n.group == "curve"}
+    # tyres at their limit bend the brake's curve too
+    return rivals + [(effect.name, grip) for effect in effects if effect.name in curve for grip in grips]
 
 
 def _named_effect(fitted: JointFit, number: JointNumber, rules: JointRules) -> NamedEffect:
@@ -259,11 +263,13 @@ def _named_effect(fitted: JointFit, number: JointNumber, rules: JointRules) -> N
     return make_estimate(number.effect, estimate, error)
 
 
-def _tolerances(campaign: Campaign) -> dict[str, float]:
+def _tolerances(campaign: Campaign, shown: Sequence[JointNumber]) -> dict[str, float]:
     """Return the declared tolerance of each number that re-tuning moves."""
     session = dict(zip(SESSION, campaign.tolerances.session, strict=True))
-    names = ("pressure_gain", "wheel_radius")
-    return {name: session[name] for name in names} | {"friction": campaign.tolerances.friction}
+    frictions = [n.name for n in shown if n.group == FRICTION]
+    return {name: session[name] for name in (GAIN, "wheel_radius", "mass")} | dict.fromkeys(
+        frictions, campaign.tolerances.friction
+    )
 
 
 def _kind(effects: Sequence[NamedEffect], rivals: Sequence[tuple[str, NamedEffect]]) -> VerdictName:

@@ -8,6 +8,7 @@ from tasks.campaign.campaign import CHANNELS, Campaign
 from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME
 from tasks.identification.decision.answer import NamedEffect
 from tasks.identification.inference.forward import RunModel
+from tasks.identification.joint.calibration import has_few_runs
 from tasks.identification.joint.numbers import JointNumber, coasts_down, saturates_tyres
 from tasks.identification.joint.stops import Stop
 from tasks.identification.rules import JointRules
@@ -59,6 +60,14 @@ def tell_what_was_used(
         f"inputs that were measured: {', '.join(inputs)}; compared: {', '.join(seen)}",
         f"the training runs reach {speeds.min():.3g} to {speeds.max():.3g} m/s and {pressure:.3g} MPa{grip}: beyond"
         " that nothing is claimed",
+        *(
+            [
+                f"the whole library of effects is searched from {rules.fewest_runs} training and {rules.fewest_runs}"
+                f" held-out runs on; there are {len(campaign.train)} and {len(campaign.held_out)}"
+            ]
+            if has_few_runs(campaign, rules)
+            else []
+        ),
         f"{agreeing[0]} of {agreeing[1]} starts reach this fit",
         "the held-out runs decide which numbers stay, so their error is not that of a blind test",
     ]

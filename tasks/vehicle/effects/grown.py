@@ -1,6 +1,6 @@
 """A vehicle with effects: fits and grown vehicles change a vehicle by this one function."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from tasks.errors import InputError
@@ -8,6 +8,18 @@ from tasks.vehicle.effects.table import PARAMETERS
 from tasks.vehicle.parameters import Vehicle
 
 FAMILY = "families."
+
+
+def find_family_tables(field: str, families: Iterable[str]) -> tuple[list[str], str]:
+    """Return the tyre families whose table a field of the effects' table is, and that table's name.
+
+    Parameters
+    ----------
+    field : such as "families.efficiency", of all, or "families.rain.efficiency", of one
+    families : kinds of weather that there are
+    """
+    *kind, table = field.removeprefix(FAMILY).split(".")
+    return [weather for weather in families if not kind or weather in kind], table
 
 
 def apply_effects(vehicle: Vehicle, values: Mapping[str, float]) -> Vehicle:
@@ -35,9 +47,10 @@ def apply_effects(vehicle: Vehicle, values: Mapping[str, float]) -> Vehicle:
             if row.kind == "added":
                 effects[field] = effects.get(field, 0.0) + value
             elif field.startswith(FAMILY):
-                table = field.removeprefix(FAMILY)
                 for group in (families, shared):
-                    for weather, family in group.items():
+                    kinds, table = find_family_tables(field, group)
+                    for weather in kinds:
+                        family = group[weather]
                         scaled = tuple(v * (1.0 + value) for v in getattr(family, table))
                         group[weather] = replace(family, **{table: scaled})
             else:

@@ -42,7 +42,8 @@ class EffectParameter:
     port : port where it enters the equations of motion
     kind : added is a number of its own in the equations, scaled is a relative change of fields of the vehicle, shifted
         is added to them
-    fields : of ``EffectValues``, or of the vehicle (``families.`` stands for all its tyre families)
+    fields : of ``EffectValues``, or of the vehicle (``families.`` stands for all its tyre families,
+        ``families.rain.`` for that of one kind of weather)
     bounds : lowest and highest value that a fit may take [unit]
     step : for finite differences [unit]
     source : reference for the equation
@@ -110,6 +111,8 @@ EFFECT_TABLE = (
     _change_field("damping", "scaled", ("suspension_damping_f", "suspension_damping_r"), (-0.6, 1.0), 0.02),
     _change_field("stiffness", "scaled", ("suspension_stiffness_f", "suspension_stiffness_r"), (-0.4, 0.6), 0.01),
     _change_field("friction", "scaled", ("families.efficiency",), (-0.4, 0.4), 0.01),
+    _change_field("wet_friction", "scaled", ("families.rain.efficiency",), (-0.6, 0.6), 0.01),
+    _change_field("snow_friction", "scaled", ("families.snow.efficiency",), (-0.6, 0.6), 0.01),
     _change_field("slip_stiffness", "scaled", ("families.slip_stiffness",), (-0.6, 1.5), 0.03),
     _change_field("front_bias", "shifted", ("front_brake_share",), (-0.2, 0.2), 0.01),
     EffectParameter(

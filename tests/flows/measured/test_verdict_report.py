@@ -95,6 +95,16 @@ def test_where_nothing_is_named_the_verdict_says_whether_the_model_misses_the_ru
     assert MISSED in page and "more runs in the conditions of those that the model misses" in page
 
 
+def test_the_first_sentence_says_whether_stops_are_missed_beside_what_is_named(
+    judged: tuple[JointTrace, Campaign],
+) -> None:
+    """A gain 15 % off took the stops from 7 to 2.6 m, twelve times the noise, and read as if that were all."""
+    rest = "The speed is still missed by more than its noise: more is lacking than that."
+    for misses in (False, True):
+        trace = replace(judged[0], verdict=replace(judged[0].verdict, misses=misses))
+        assert tell_search(trace)["sentence"].endswith(rest) is misses
+
+
 def test_the_page_says_the_verdict_its_numbers_rivals_and_what_to_do_next(
     text: str, judged: tuple[JointTrace, Campaign]
 ) -> None:

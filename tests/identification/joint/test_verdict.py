@@ -16,8 +16,10 @@ from tasks.identification.joint.calibration import needs_joint_fit
 from tasks.identification.joint.elimination import (
     FORESEEN_SHARE,
     Substitute,
+    eliminate_uncertain_numbers,
     foresee_falls,
     refit_numbers,
+    standard_errors,
 )
 from tasks.identification.joint.held_out import drop_what_predicts_worse
 from tasks.identification.joint.verdict import JointTrace, judge_jointly
@@ -111,7 +113,7 @@ def test_no_claim_that_nothing_is_missing_stands_beside_a_stop_that_is_missed():
     calm, strong = campaign_of({}), campaign_of({"pressure_gain": 0.8})
     trace = judge(replace(calm, runs=(*calm.runs[:-1], strong.runs[-1])))
     why = trace.verdict.disagreement
-    assert trace.verdict.verdict == "NOTHING" and not trace.calibrated and trace.verdict.reasons[0] == why
+    assert trace.verdict.verdict == "NOTHING" and trace.verdict.misses and trace.verdict.reasons[0] == why
     missed = trace.verdict.error["speed"].after
     assert why.startswith(f"the speed of the held-out runs is missed by {missed:.3g} m/s, ")
     assert compare_with_noise(calm, trace.verdict.error) == pytest.approx(missed / 0.03, rel=0.2)
@@ -209,21 +211,30 @@ def test_a_lag_that_would_have_to_be_longer_than_any_is_not_named():
     assert any("lag of 0.05 s, as far as it may go: not named" in r for r in trace.verdict.reasons)
 
 
-def test_tyres_of_which_nothing_is_known_are_no_rival_of_a_curve():
+def test_a_friction_of_which_the_runs_say_little_more_than_its_prior_goes():
     """Beside a dead band the tyres were said to grip 0.36 % less, in an interval of all that is allowed."""
     numbers = {n.name: n for n in load_joint_numbers()}
-    free = (numbers["friction"], numbers["push_out"])
+    stops = slow_brakes().train
+    free = (numbers["pressure_gain"], numbers["friction"], numbers["lag"])
+    fitted = refit_numbers(stops, slow_brakes().fitted, free)
+    error = float(standard_errors(fitted, RULES.joint)[1])
+    for sigma, left in ((1.9 * error, {"pressure_gain", "lag"}), (2.1 * error, {n.name for n in free})):
+        wide = replace(fitted, numbers=(free[0], replace(free[1], sigma=sigma), free[2]))
+        assert {n.name for n in eliminate_uncertain_numbers(stops, wide, RULES.joint).numbers} == left
+
+
+def test_tyres_at_their_limit_are_a_rival_of_the_brakes_curve():
+    numbers = {n.name: n for n in load_joint_numbers()}
     curve = NamedEffect(
         name="push_out_pressure", effect_class="effect", port="", variable="", parameters=(), score=0.0, gain=0.0,
         inflation=1.0, held_out_gain=0.0, cross_validated_gain=0.0, win_share=1.0,
     )  # fmt: skip
-    for information, rivals in ((1e-6, []), (1e6, ["retuned_friction_level"])):
-        fitted = replace(
-            slow_brakes().fitted, numbers=free, values=np.array([0.1, 0.3]), information=information * np.eye(2),
-            residuals=(np.zeros(10),) * 2, slopes=(np.zeros((10, 2)),) * 2,
-        )  # fmt: skip
-        found = verdict._name_rivals(fitted, [], [curve], RULES.joint)
-        assert [rival.name for _, rival in found] == rivals
+    fitted = replace(
+        slow_brakes().fitted, numbers=(numbers["wet_friction"], numbers["push_out"]), values=np.array([0.1, 0.3]),
+        information=1e6 * np.eye(2), residuals=(np.zeros(10),) * 2, slopes=(np.zeros((10, 2)),) * 2,
+    )  # fmt: skip
+    found = verdict._name_rivals(fitted, [], [curve], RULES.joint)
+    assert [rival.name for _, rival in found] == ["retuned_wet_friction"]
 
 
 def test_runs_that_never_coast_say_which_resistance_stands_for_all():
