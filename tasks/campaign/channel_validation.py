@@ -72,7 +72,7 @@ def clock_problems(signal: Signal) -> list[str]:
         at = back[0]
         problems.append(
             f"has a clock that does not advance at {back.size} samples, first from {signal.time[at]:.3f} to"
-            f" {signal.time[at + 1]:.3f} s: cut the run there"
+            f" {signal.time[at + 1]:.3f} s: {_say_what_to_do(steps[back])}"
         )
     gaps = np.flatnonzero(steps > GAP_STEPS * max(usual, 1e-9)) if usual > 0 else np.array([], dtype=np.int64)
     if gaps.size:
@@ -82,6 +82,13 @@ def clock_problems(signal: Signal) -> list[str]:
             f" {signal.time[at + 1]:.3f} s where samples come every {usual:.3g} s: cut the run there"
         )
     return problems
+
+
+def _say_what_to_do(back: NDArray[np.float64]) -> str:
+    """Return what to do about steps of a clock that does not advance; float64 [N] [s]."""
+    if np.any(back < 0):
+        return "cut the run there"
+    return "give repeats: keep_first under time in the map if the logger stamps samples twice, else cut the run there"
 
 
 def frozen_problem(name: str, signal: Signal, speed: Signal | None) -> str | None:

@@ -7,12 +7,26 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from tasks.campaign.channel_validation import frozen_problem, plausibility_problems, signal_problems
+from tasks.campaign.channel_validation import (
+    clock_problems,
+    frozen_problem,
+    plausibility_problems,
+    signal_problems,
+)
 from tasks.campaign.channels import CHANNELS_BY_NAME
 from tasks.campaign.signals import Signal
 
 Columns = dict[str, np.ndarray]
 INTERVAL = 0.01
+
+
+@pytest.mark.parametrize(
+    ("step", "told"), [(0.0, "repeats: keep_first under time"), (-0.3, "cut the run there")]
+)
+def test_a_clock_that_repeats_a_stamp_is_told_the_key_for_it(step: float, told: str) -> None:
+    time = np.concatenate((INTERVAL * np.arange(50), INTERVAL * (49 + np.arange(50)) + step))
+    (problem,) = clock_problems(Signal(time=time, values=0.0 * time))
+    assert "does not advance" in problem and told in problem and ("keep_first" in problem) == (step == 0.0)
 
 
 def problems_of(columns: Columns) -> list[str]:
