@@ -137,6 +137,7 @@ def _cut_recordings(
     )
     runs: list[PlannedRun] = []
     left_out: list[str] = []
+    faulty = 0
     for file, signals in recordings.items():
         parts = cut_segments(signals, channel_map.rules, rule, cut)
         if not parts:
@@ -149,6 +150,7 @@ def _cut_recordings(
             if part.fault:
                 place = f"{shorten(file.relative_to(root))} from {part.start:.3f} to {part.end:.3f} s"
                 left_out.append(f"{place}: {part.fault}")
+                faulty += 1
                 continue
             number = len(runs) + 1
             runs.append(
@@ -162,10 +164,15 @@ def _cut_recordings(
                 )
             )
     if not runs:
-        raise InputError(
-            [
-                "the map's segment finds no brake application that is a run: lower above_mpa or minimum_s",
-                *cap_problems(left_out),
-            ]
-        )
+        raise InputError([_say_why_none(faulty), *cap_problems(left_out)])
     return runs, left_out
+
+
+def _say_why_none(faulty: int) -> str:
+    """Return why a map's segment makes no run, and what to do, by the number of brake applications that it finds."""
+    if not faulty:
+        return "the map's segment finds no brake application: lower above_mpa or minimum_s"
+    return (
+        f"the map's segment finds {faulty} brake application{'s' if faulty > 1 else ''}, and none is a run: put right"
+        " what each is left out for"
+    )

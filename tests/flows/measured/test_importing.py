@@ -194,6 +194,28 @@ def test_a_recording_that_never_brakes_is_listed_beside_the_segments(tmp_path: P
     ]
 
 
+@pytest.mark.parametrize(
+    ("above", "words"),
+    [
+        (0.12, "finds 1 brake application, and none is a run: put right what each is left out for"),
+        (20.0, "finds no brake application: lower above_mpa or minimum_s"),
+    ],
+)
+def test_a_segment_without_a_run_says_whether_the_brake_was_found(
+    tmp_path: Path, above: float, words: str
+) -> None:
+    log = log_signal(braking_columns())
+    log["t_ms"] += 5000.0 * (np.arange(len(log["t_ms"])) > np.argmax(log["p_bar"] > 1.2) + 20)
+    segment = {
+        "above_mpa": above, "merge_gap_s": 6.0, "minimum_s": 0.5, "before_s": 1.0, "after_s": 0.8, "held_out_every": 2,
+    }  # fmt: skip
+    source = write_csv(tmp_path / "log.csv", log)
+    with pytest.raises(InputError) as refused:
+        import_measurements(source, map=write_map(tmp_path, segment=segment), out=str(tmp_path / "campaign"))
+    assert words in refused.value.problems[0]
+    assert len(refused.value.problems) == 2
+
+
 def test_the_same_recording_gives_the_same_bytes(tmp_path: Path) -> None:
     source = write_csv(tmp_path / "log.csv", log_signal(braking_columns()))
     for name in ("a", "b"):
