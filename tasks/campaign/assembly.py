@@ -89,8 +89,8 @@ def assemble_run(
     clock = make_common_clock([signal for signals in usable.values() for signal in signals], rate)
     if len(clock) < LEAST_SAMPLES:
         problems.append(
-            f"has {len(clock)} samples at {rate:g} Hz that all channels share; a run needs {LEAST_SAMPLES}: widen its"
-            " window, or correct the unit of time"
+            f"has {len(clock)} samples at {rate:g} Hz that all channels share; a run needs {LEAST_SAMPLES}, which take"
+            f" {LEAST_SAMPLES / rate:.3g} s: widen its window, log faster, or correct the unit of time"
         )
         return Assembled(start=start, columns={}, readable={}, problems=tuple(problems))
     columns = {

@@ -82,8 +82,9 @@ def motion_problem(speed: NDArray[np.float64], interval: float, has_feature: boo
     first, end = find_motion(speed)
     if end - first < LEAST_SAMPLES:
         return (
-            f"channel speed must stay at or above {MASKED_SPEED:g} m/s for {LEAST_SAMPLES} samples; it does for"
-            f" {end - first}: the car stands or crawls, leave the run out"
+            f"channel speed must stay at or above {MASKED_SPEED:g} m/s for {LEAST_SAMPLES} samples, which take"
+            f" {LEAST_SAMPLES * interval:.3g} s at {1.0 / interval:.3g} Hz; it does for {end - first}: leave the run"
+            " out where the car stands or crawls; where it drives, log faster or take a longer run"
         )
     if first and has_feature:
         return (

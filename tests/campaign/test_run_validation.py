@@ -7,7 +7,7 @@ import pytest
 
 from catalogs.effects import load_effects
 from tasks.campaign.campaign import CHANNELS, Run
-from tasks.campaign.run_validation import run_problems
+from tasks.campaign.run_validation import motion_problem, run_problems
 from tasks.identification.inference.forward import predict_channels, prepare_run
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.table import EFFECT_TABLE
@@ -22,6 +22,13 @@ def columns_of(run: Run, theta: np.ndarray) -> dict[str, np.ndarray]:
     response = clean + NOISE * np.random.default_rng(3).standard_normal(clean.shape)
     columns = dict(zip(CHANNELS, response.T, strict=True))
     return {"time": run.interval * np.arange(len(response)), "brake_pressure": run.pressure, **columns}
+
+
+def test_a_stop_that_a_slow_log_leaves_with_few_samples_is_no_car_that_stands() -> None:
+    city_stop = np.concatenate((np.full(8, 14.0), np.linspace(14.0, 0.0, 8), np.zeros(4)))
+    problem = motion_problem(city_stop, 0.5, False)
+    assert problem is not None and "for 20 samples, which take 10 s at 2 Hz" in problem
+    assert "where it drives, log faster or take a longer run" in problem
 
 
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)

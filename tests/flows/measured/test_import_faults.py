@@ -95,6 +95,13 @@ def test_a_run_in_which_the_car_crawls_is_named(tmp_path: Path) -> None:
     )
 
 
+def test_a_log_too_slow_for_its_window_is_told_how_long_a_run_must_be(tmp_path: Path) -> None:
+    slow = {name: values[::100] for name, values in log_signal(braking_columns()).items()}
+    assert "a run needs 20, which take 20 s: widen its window, log faster" in problems_of(
+        tmp_path, slow, sample_rate_hz=1
+    )
+
+
 def test_all_problems_come_at_once(tmp_path: Path) -> None:
     log = log_signal(braking_columns())
     log["pitch_up"] = -log["pitch_up"]
