@@ -74,7 +74,7 @@ def assemble_run(
         for signal in logged:
             stated = ALIASES.get(signal.unit, signal.unit)
             if stated in UNITS and stated != rule.unit:
-                found.append((rule.channel, f"is in {stated} by its file, in {rule.unit} by the map"))
+                found.append((rule.channel, _describe_stated_unit(stated, rule.unit)))
             found += [(rule.channel, problem) for problem in signal_problems(signal)]
         parts[rule.channel] = [convert_to_channel(signal, rule) for signal in logged]
         found += [(rule.channel, problem) for problem in find_dead_sources(rule, parts[rule.channel])]
@@ -107,6 +107,16 @@ def assemble_run(
     }
     computed = _is_acceleration_computed(parts, rules)
     return Assembled(start=float(clock[0]), columns=cleared, readable=whole, problems=(), computed=computed)
+
+
+def _describe_stated_unit(stated: str, mapped: str) -> str:
+    """Return the problem of a unit of the map that is not the file's, and what to do where the file's is wrong."""
+    (dimension, size), (wanted, wanted_size) = UNITS[stated], UNITS[mapped]
+    wrong = f"; where the file is wrong, keep its unit and give scale: {wanted_size / size:.6g}"
+    return (
+        f"is in {stated} by its file, in {mapped} by the map: give the file's unit"
+        f"{wrong if dimension == wanted else ''}"
+    )
 
 
 def _write_sentences(found: list[tuple[str, str]]) -> list[str]:

@@ -96,7 +96,11 @@ def test_a_row_of_units_is_read_where_the_map_tells_of_it(tmp_path: Path, encodi
 
 def test_a_unit_below_the_names_must_be_the_maps(tmp_path: Path) -> None:
     read(tmp_path, AIM.encode(), "csv: {skip_rows: 2, units_row: true}\n")
-    with pytest.raises(InputError, match="channel speed: is in km/h by its file, in m/s by the map"):
+    told = (
+        "channel speed: is in km/h by its file, in m/s by the map: give the file's unit; where the file is wrong, keep"
+        " its unit and give scale: 3.6"
+    )
+    with pytest.raises(InputError, match=told):
         import_measurements(
             str(tmp_path / "log.csv"), map=str(tmp_path / "map.yaml"), out=str(tmp_path / "campaign")
         )
