@@ -124,7 +124,7 @@ def frozen_problem(name: str, signal: Signal, speed: Signal | None) -> str | Non
     at = long[np.argmax(dwells[long])]
     return (
         f"is frozen: it holds {signal.values[edges[at]]:.4g} for {dwells[at]:.2f} s from {signal.time[edges[at]]:.3f} s"
-        " while the car moves"
+        " while the car moves: cut the run there, or leave the channel out"
     )
 
 

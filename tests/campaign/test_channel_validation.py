@@ -116,3 +116,4 @@ def test_rounding_is_no_step_of_a_coarse_sensor() -> None:
     lost = Signal(time=time, values=np.where(driven < 80.0 / 3.6, rounded - 5.0, rounded))
     problem = frozen_problem("speed", lost, lost)
     assert problem is not None and "holds 22.22 for" in problem
+    assert problem.endswith("cut the run there, or leave the channel out")
