@@ -13,6 +13,7 @@ import typer
 import yaml
 from typer.exceptions import TyperException
 
+from catalogs.channel_maps.conditions import Conditions
 from catalogs.grids import load_grid
 from flows.cli import app
 from flows.registry import COMMANDS
@@ -123,6 +124,11 @@ def test_the_grid_in_a_document_is_sound(document, clips, tmp_path):
     block = list_blocks(SOURCE_ROOT / document, "yaml")[0]
     (tmp_path / "grid.yaml").write_text(block)
     assert len(load_grid(Path(tmp_path / "grid.yaml")).scenarios) == clips
+
+
+def test_the_page_of_imports_names_every_condition_of_a_run():
+    page = (DOCS / "how-to" / "import-measured-data.md").read_text()
+    assert [name for name in Conditions.model_fields if f"`{name}`" not in page] == []
 
 
 def test_every_page_stands_in_one_of_the_five_parts_and_in_the_navigation():
