@@ -139,7 +139,8 @@ def _find_smallest_step(values: NDArray[np.float64], changes: NDArray[np.int64])
     follows = np.diff(changes) == 1
     pairs = np.abs(values[changes[:-1] + 2 * follows] - values[changes[:-1]])[follows]
     alone = ~np.concatenate(([False], follows)) & ~np.concatenate((follows, [False]))
-    single = np.abs(values[changes + 1] - values[changes])[alone]
+    whole = (changes > 0) & (changes < len(values) - 2)  # a run may begin or end within a split step
+    single = np.abs(values[changes + 1] - values[changes])[alone & whole]
     return float(np.min(np.concatenate((pairs, single)), initial=np.inf))
 
 

@@ -102,6 +102,19 @@ def test_a_fault_in_a_braking_run_is_found(
     assert found >= share * len(braking), f"{fault}: {found} of {len(braking)}"
 
 
+def test_a_run_that_begins_within_a_split_step_shows_no_finer_sensor() -> None:
+    """A dongle's whole km/h at 5 Hz: 51, then 50 while the car cruises, then a stop; the clock cuts the first step."""
+    logged = (
+        np.concatenate(([51.0], np.full(28, 50.0), [49.0, 48.0, 46.0, 43.0], np.arange(40.0, 8.0, -4.0)))
+        / 3.6
+    )
+    time = 0.2 * np.arange(len(logged))
+    for share in (0.3, 0.5, 0.64):
+        clock = time[:-1] + 0.2 * share
+        signal = Signal(time=clock, values=np.interp(clock, time, logged))
+        assert frozen_problem("speed", signal, signal) is None
+
+
 def test_rounding_is_no_step_of_a_coarse_sensor() -> None:
     """Speed in whole km/h, held while the car cruises, with what a resampling leaves of it."""
     driven = (
