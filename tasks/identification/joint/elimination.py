@@ -143,18 +143,26 @@ def eliminate_uncertain_numbers(stops: Sequence[Stop], fitted: JointFit, rules: 
         grips = [{}, *vary_grip(fitted)]
         fitted = min((refit_numbers(stops, fitted, left, grip) for grip in grips), key=lambda fit: fit.cost)
     while True:
-        errors = standard_errors(fitted, rules)
-        sure = np.abs(fitted.values) / errors
-        may_go = [
-            n.removable or (n.group == FRICTION and e > KNOWN_SHARE * n.sigma)
-            for n, e in zip(fitted.numbers, errors, strict=True)
-        ]
-        weak = [
-            (float(here), n.name) for n, here, may in zip(fitted.numbers, sure, may_go, strict=True) if may
-        ]
+        sure = count_standard_errors(fitted, rules)
+        weak = [(float(here), n.name) for n, here in zip(fitted.numbers, sure, strict=True) if n.removable]
         if not weak or min(weak)[0] >= certain_from(fitted, rules):
-            return fitted
+            return _drop_unknown_frictions(stops, fitted, rules)
         fitted = refit_numbers(stops, fitted, tuple(n for n in fitted.numbers if n.name != min(weak)[1]))
+
+
+def _drop_unknown_frictions(stops: Sequence[Stop], fitted: JointFit, rules: JointRules) -> JointFit:
+    """Return the fit without the frictions that its runs neither tell nor need.
+
+    Tyres at their limit and the brake's curve stand in for each other, so that neither may be certain where one of them
+    is needed: a friction goes only if the runs are explained as well without it.
+    """
+    errors = standard_errors(fitted, rules)
+    for number, error in zip(fitted.numbers, errors, strict=True):
+        if number.group == FRICTION and error > KNOWN_SHARE * number.sigma:
+            without = refit_numbers(stops, fitted, tuple(n for n in fitted.numbers if n is not number))
+            if without.cost - fitted.cost < 0.5 * certain_from(fitted, rules) ** 2:
+                return _drop_unknown_frictions(stops, without, rules)
+    return fitted
 
 
 def vary_grip(fitted: JointFit) -> list[dict[str, float]]:

@@ -14,6 +14,8 @@ from tasks.vehicle.parameters import compute_surface_response
 
 GAIN = "pressure_gain"
 FRICTION = "friction"
+ENGINE = "engine_braking"
+"""How the names of an engine's drag begin, which is an input where its torque was measured."""
 CALIBRATED = ("gain", FRICTION, "radius")
 """Groups of numbers that re-tuning moves."""
 AT_BOUND = 0.005
@@ -94,7 +96,7 @@ def choose_numbers(
     for number in numbers:
         if not any(need in campaign.channels for need in number.needs):
             continue
-        if number.name == "engine_torque" and engine:
+        if number.effect.name.startswith(ENGINE) and engine:
             continue  # an input, and no unknown
         if number.name == "fade" and len({run.disc_rise for run in campaign.train}) < 2:
             continue  # discs of one temperature show no fade

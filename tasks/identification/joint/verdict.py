@@ -32,7 +32,13 @@ from tasks.identification.joint.elimination import (
     standard_errors,
     vary_grip,
 )
-from tasks.identification.joint.fit import JointFit, fit_jointly, misfit_scales, suggest_starts
+from tasks.identification.joint.fit import (
+    JointFit,
+    fit_jointly,
+    measure_misfit,
+    misfit_scales,
+    suggest_starts,
+)
 from tasks.identification.joint.held_out import (
     drop_contradicted_rivals,
     drop_what_predicts_worse,
@@ -182,7 +188,8 @@ def judge_jointly(
         reasons=tuple(reasons),
         disagreement=disagreement,
     )  # fmt: skip
-    verdict = tell_miss(verdict, campaign, joint.foreign_misfit)
+    follows = float(measure_misfit(fitted, train)[CHANNELS.index("speed")])
+    verdict = tell_miss(verdict, campaign, joint.foreign_misfit, follows)
     return JointTrace(
         verdict=verdict,
         calibrated=calibrated if effects or is_predicted_better(error) else (),

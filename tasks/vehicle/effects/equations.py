@@ -10,6 +10,8 @@ AIR_DENSITY = 1.2
 """Air at 20 degrees and sea level [kg/m^3]."""
 COULOMB_SPEED = 0.01
 """Suspension speed over which dry friction changes sign [m/s]."""
+LOWEST_GEAR = 12.0
+"""Wheel speed up to which a car stays in its lowest gear: some 4 m/s [rad/s]."""
 
 
 @register_jitable(cache=True, error_model="numpy", forceinline=True)
@@ -36,6 +38,9 @@ def compute_resistance(effects: EffectValues, speed: float, direction: float, sn
 def compute_engine_torque(effects: EffectValues, omega: float, radius: float) -> float:
     """Return the torque of the engine on the driven wheels, against their rotation [N m]: drag, less the idle creep.
 
+    Through its gears an engine turns about equally fast at any road speed, and drags with about the same power; below
+    the speed of the lowest gear its torque falls with its own speed.
+
     Parameters
     ----------
     effects : numbers of the vehicle's effects
@@ -43,6 +48,8 @@ def compute_engine_torque(effects: EffectValues, omega: float, radius: float) ->
     radius : radius of the wheels [m]
     """
     torque = effects.engine_torque + effects.engine_viscous * omega
+    if effects.engine_power != 0.0:
+        torque += 1e3 * effects.engine_power * omega / (omega * omega + LOWEST_GEAR * LOWEST_GEAR)
     rim_speed = radius * omega
     if effects.creep_force != 0.0 and rim_speed < effects.creep_speed:
         torque -= effects.creep_force * radius * (1.0 - rim_speed / effects.creep_speed)

@@ -130,6 +130,7 @@ EFFECT_TABLE = (
     # torques on the wheels
     _add_number("engine_torque", "engine braking", "N m", "brake_torque", (0.0, 400.0), 20.0, MITSCHKE),
     _add_number("engine_viscous", "engine braking", "N m s rad-1", "brake_torque", (0.0, 6.0), 0.4, MITSCHKE),
+    _add_number("engine_power", "engine braking", "kW", "brake_torque", (0.0, 60.0), 3.0, MITSCHKE),
     _add_number("creep_force", "idle creep", "N", "brake_torque", (0.0, 2500.0), 100.0, MITSCHKE),
     _add_number("creep_speed", "idle creep", "m s-1", "brake_torque", (1.5, 12.0), 0.5, MITSCHKE, 4.0),
     _add_number("pad_drag", "pad drag", "N m", "brake_torque", (0.0, 250.0), 15.0, LIMPERT),
