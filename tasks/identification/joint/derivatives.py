@@ -38,6 +38,7 @@ def differentiate_run(
     values: NDArray[np.float64],
     offsets: NDArray[np.float64],
     scales: NDArray[np.float64],
+    motion: Simulation | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return a run's weighted misfit, float64 [M], and its derivatives by numbers and own offsets, float64 [M, K + 3].
 
@@ -48,9 +49,11 @@ def differentiate_run(
     values : float64 [K] of these
     offsets : float64 [3] of the run
     scales : float64 [7] size of a misfit that counts one
+    motion : of the run with these numbers, where it is known
     """
     k = len(numbers)
-    motion = simulate_stop(stop, name_values(numbers, values), offsets)
+    if motion is None:
+        motion = simulate_stop(stop, name_values(numbers, values), offsets)
 
     def residual(x: NDArray[np.float64], motion: Simulation | None) -> NDArray[np.float64]:
         return weigh_misfit(stop, name_values(numbers, x[:k]), x[k:], scales, motion=motion)

@@ -14,6 +14,7 @@ from tasks.identification.joint.derivatives import (
     name_values,
     weigh_misfit,
 )
+from tasks.identification.joint.last_point import keep_last
 from tasks.identification.joint.numbers import JointNumber
 from tasks.identification.joint.stops import (
     FITTED,
@@ -22,8 +23,12 @@ from tasks.identification.joint.stops import (
     OFFSETS,
     Stop,
     predict_stop,
+    simulate_stop,
 )
+from tasks.vehicle.model.simulation import Simulation
 
+Derivatives = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""Weighted misfit of a run, float64 [M], and its derivatives, float64 [M, K + 3]."""
 SCALES = {"speed": 0.15, "longitudinal_acceleration": 0.6, "wheel_speed_front": 0.6, "wheel_speed_rear": 0.6}
 """Size of a misfit that counts one before the residuals say how large it is [the channel's unit]."""
 FACTORS = (1.0, 0.5, 2.0)
@@ -153,17 +158,31 @@ def _fit_from(
     def take_run(i: int, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         return x[:k], x[k + own * i : k + own * (i + 1)]
 
+    @keep_last
+    def move_runs(x: NDArray[np.float64]) -> list[Simulation]:
+        parts = (take_run(i, x) for i in range(len(stops)))
+        return [
+            simulate_stop(stop, name_values(numbers, values), offset)
+            for stop, (values, offset) in zip(stops, parts, strict=True)
+        ]
+
+    @keep_last
+    def differentiate_runs(x: NDArray[np.float64]) -> list[Derivatives]:
+        return [
+            differentiate_run(stop, numbers, *take_run(i, x), scales, motion)
+            for i, (stop, motion) in enumerate(zip(stops, move_runs(x), strict=True))
+        ]
+
     def residual(x: NDArray[np.float64]) -> NDArray[np.float64]:
         runs = []
-        for i, stop in enumerate(stops):
+        for i, (stop, motion) in enumerate(zip(stops, move_runs(x), strict=True)):
             values, offset = take_run(i, x)
-            runs.append(weigh_misfit(stop, name_values(numbers, values), offset, scales))
+            runs.append(weigh_misfit(stop, name_values(numbers, values), offset, scales, motion=motion))
         return np.concatenate((*runs, prior * x))
 
     def jacobian(x: NDArray[np.float64]) -> NDArray[np.float64]:
         runs = []
-        for i, stop in enumerate(stops):
-            _, columns = differentiate_run(stop, numbers, *take_run(i, x), scales)
+        for i, (_, columns) in enumerate(differentiate_runs(x)):
             placed = np.zeros((len(columns), len(x)))
             placed[:, :k], placed[:, k + own * i : k + own * (i + 1)] = columns[:, :k], columns[:, k:]
             runs.append(placed)
@@ -173,7 +192,14 @@ def _fit_from(
         residual, x, jac=jacobian, bounds=(lower, upper), loss="soft_l1", x_scale="jac", ftol=ENOUGH, xtol=ENOUGH,
         max_nfev=MOST_EVALUATIONS,
     )  # fmt: skip
-    return describe_fit(stops, numbers, found.x[:k], found.x[k:].reshape(-1, own), scales, float(found.cost))
+    return _describe_point(
+        differentiate_runs(found.x),
+        numbers,
+        found.x[:k],
+        found.x[k:].reshape(-1, own),
+        scales,
+        float(found.cost),
+    )
 
 
 def describe_fit(
@@ -195,11 +221,23 @@ def describe_fit(
     scales : float64 [7] size of a misfit that counts one
     cost : robust misfit with the priors, over 2
     """
-    k = len(numbers)
     runs = [
         differentiate_run(stop, numbers, values, own, scales)
         for stop, own in zip(stops, offsets, strict=True)
     ]
+    return _describe_point(runs, numbers, values, offsets, scales, cost)
+
+
+def _describe_point(
+    runs: Sequence[Derivatives],
+    numbers: tuple[JointNumber, ...],
+    values: NDArray[np.float64],
+    offsets: NDArray[np.float64],
+    scales: NDArray[np.float64],
+    cost: float,
+) -> JointFit:
+    """Return a point of the fit from the misfits and derivatives of its runs."""
+    k = len(numbers)
     slopes = tuple(_without_offsets(columns[:, :k], columns[:, k:]) for _, columns in runs)
     information = np.diag([1.0 / n.sigma**2 for n in numbers]) + sum(a.T @ a for a in slopes)
     return JointFit(
