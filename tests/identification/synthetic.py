@@ -22,10 +22,17 @@ TOLERANCES = Tolerances(
 
 
 def plain_run(
-    speed: float, peak: float, *, name: str = "run", direction: int = 1, disc_rise: float = 20.0
+    speed: float,
+    peak: float,
+    *,
+    name: str = "run",
+    direction: int = 1,
+    disc_rise: float = 20.0,
+    seconds: float = 3.0,
 ) -> Run:
-    t = np.arange(400) * 0.01
-    response = np.zeros((400, 7))
+    """A run at 100 Hz that brakes after a second; what shows late, or in little, needs more than two of braking."""
+    t = np.arange(round(100 * seconds)) * 0.01
+    response = np.zeros((len(t), 7))
     response[:, 0] = speed
     return Run(
         name=name, held_out=False, weather="dry", precipitation_mm_h=0.0, snow_accumulation_h=0.0,

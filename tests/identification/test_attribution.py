@@ -49,10 +49,12 @@ RUNS = (
 )
 
 
-def evidence_of(theta: np.ndarray, runs: tuple[tuple[float, float, int, float], ...] = RUNS) -> Evidence:
+def evidence_of(
+    theta: np.ndarray, runs: tuple[tuple[float, float, int, float], ...] = RUNS, seconds: float = 3.0
+) -> Evidence:
     derived = tuple(
         differentiate_run(
-            measured(plain_run(v, p, name=str(i), direction=d, disc_rise=t), theta, i),
+            measured(plain_run(v, p, name=str(i), direction=d, disc_rise=t, seconds=seconds), theta, i),
             np.zeros(7),
             NOISE,
             np.zeros(len(EFFECT_TABLE)),
@@ -104,7 +106,7 @@ def test_an_effect_that_no_held_out_run_excites_needs_two_training_runs_that_pre
 ) -> None:
     coasting = (15.0, 0.0, 1, 20.0)
     evidence = evidence_of(
-        build_parameter_vector({"anti_dive": 0.5}), (*RUNS[1 : 1 + stops], coasting, coasting)
+        build_parameter_vector({"anti_dive": 0.5}), (*RUNS[1 : 1 + stops], coasting, coasting), seconds=4.0
     )
     null = fit_hypotheses(evidence.train, (), evidence.session_sigma)
     best = cross_validate_candidate(evidence, null, refine_candidates(evidence, null, count=3)[0])
@@ -174,7 +176,7 @@ def test_an_error_of_an_instrument_is_differentiated_without_a_simulation(
 
 
 def test_every_library_effect_moves_some_instrument_and_zero_moves_none() -> None:
-    run = plain_run(15.0, 2.2)
+    run = plain_run(15.0, 2.2, seconds=4.0)
     plain = {}
     for weather, rate, hours in (("dry", 0.0, 0.0), ("rain", 10.0, 0.0), ("snow", 1.0, 1.0)):
         changed = type(run)(
@@ -214,7 +216,7 @@ def test_a_fit_of_an_effect_with_a_threshold_does_not_hang_on_where_the_threshol
     runs = tuple(
         differentiate_run(
             measured(
-                replace(plain_run(v, p, name=str(i)), weather="rain", precipitation_mm_h=10.0), theta, i
+                replace(plain_run(v, p, name=str(i), seconds=4.0), weather="rain", precipitation_mm_h=10.0), theta, i
             ),
             np.zeros(7), NOISE, np.zeros(len(EFFECT_TABLE)), (wet,), TOLERANCES, QUIET,
         )

@@ -80,7 +80,7 @@ def test_a_resistance_without_a_coast_down_is_told_to_be_the_sum_of_all():
     rules = load_decision_rules().joint
     numbers = {n.name: n for n in load_joint_numbers()}
     braking, coasting = plain_run(20.0, 2.0), plain_run(20.0, 0.0)
-    slowed = replace(coasting, response=coasting.response - np.linspace(0.0, 9.0, 400)[:, None])
+    slowed = replace(coasting, response=coasting.response - np.linspace(0.0, 9.0, 300)[:, None])
     models = [prepare_run(run, VEHICLE, SURFACE) for run in (braking, slowed)]
     (told,) = tell_lumped_resistance([numbers["lag"], numbers["drag_area"]], models[:1], rules)
     assert told.startswith("drag_area stands for air, tyres and engine together") and "coast down" in told
@@ -93,7 +93,7 @@ def test_a_full_stop_that_the_road_slows_less_than_the_model_is_told_for_what_it
     deceleration: float, told: bool
 ) -> None:
     rules = load_decision_rules().joint
-    run = plain_run(30.0, 15.0)
+    run = plain_run(30.0, 15.0, seconds=4.0)
     slowed = run.response.copy()
     slowed[100:, 0] -= deceleration * 0.01 * np.arange(300) * (slowed[100:, 0] > 0.0)
     campaign = make_campaign((replace(run, response=np.maximum(slowed, 0.0)),))
