@@ -1,5 +1,6 @@
 """A joint fit finds what a car has, whatever its file starts from, and names nothing that its runs do not show."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -22,6 +23,7 @@ from tasks.identification.joint.elimination import (
     standard_errors,
 )
 from tasks.identification.joint.held_out import drop_what_predicts_worse
+from tasks.identification.joint.numbers import JointNumber
 from tasks.identification.joint.verdict import JointTrace, judge_jointly
 from tasks.identification.rules import DecisionRules
 from tasks.vehicle.effects.table import build_parameter_vector
@@ -30,6 +32,13 @@ from tests.identification.synthetic import SURFACE, TOLERANCES, VEHICLE, measure
 
 SPEED_AND_ACCELERATION = ("speed", "longitudinal_acceleration")
 RULES = load_decision_rules()
+NUMBERS = load_joint_numbers()
+FEW = tuple(
+    n
+    for n in NUMBERS
+    if n.name in {"pressure_gain", "lag", "drag_area", "rolling_coefficient", "engine_torque", "mass"}
+)
+"""For what follows from a name, and not for how it is found: all sixteen take twice as long."""
 STOPS = ((29.0, 0.9), (17.0, 2.0), (22.0, 2.0))
 """Speed [m/s] and brake pressure [MPa] of the runs; the last is held out."""
 
@@ -64,8 +73,13 @@ def own_channels(run: Run, channels: tuple[str, ...], held_out: bool) -> Run:
     return replace(run, response=np.where(seen, run.response, 0.0), held_out=held_out)
 
 
-def judge(campaign: Campaign, vehicle: Vehicle = VEHICLE, rules: DecisionRules = RULES) -> JointTrace:
-    return judge_jointly(campaign, vehicle, SURFACE, load_joint_numbers(), rules)
+def judge(
+    campaign: Campaign,
+    vehicle: Vehicle = VEHICLE,
+    rules: DecisionRules = RULES,
+    numbers: Sequence[JointNumber] = NUMBERS,
+) -> JointTrace:
+    return judge_jointly(campaign, vehicle, SURFACE, numbers, rules)
 
 
 @cache
@@ -111,7 +125,7 @@ def test_why_single_effects_could_not_be_told_is_the_first_reason():
 
 def test_no_claim_that_nothing_is_missing_stands_beside_a_stop_that_is_missed():
     calm, strong = campaign_of({}), campaign_of({"pressure_gain": 0.8})
-    trace = judge(replace(calm, runs=(*calm.runs[:-1], strong.runs[-1])))
+    trace = judge(replace(calm, runs=(*calm.runs[:-1], strong.runs[-1])), numbers=FEW)
     why = trace.verdict.disagreement
     assert trace.verdict.verdict == "NOTHING" and trace.verdict.misses and trace.verdict.reasons[0] == why
     missed = trace.verdict.error["speed"].after
@@ -122,7 +136,7 @@ def test_no_claim_that_nothing_is_missing_stands_beside_a_stop_that_is_missed():
 def test_a_stop_that_is_missed_beside_a_name_is_told():
     assert not any("is missed by" in reason for reason in slow_brakes().verdict.reasons)
     late, windy = campaign_of({"lag": 0.2}), campaign_of({"lag": 0.2, "drag_area": 3.0})
-    trace = judge(replace(late, runs=(*late.runs[:-1], windy.runs[-1])))
+    trace = judge(replace(late, runs=(*late.runs[:-1], windy.runs[-1])), numbers=FEW)
     assert trace.verdict.effects and trace.verdict.disagreement == ""
     said = "what is named is not all that the model lacks"
     assert trace.verdict.reasons[-1].endswith(said)
@@ -180,7 +194,7 @@ def test_a_gain_that_the_file_claims_to_know_is_doubted_where_a_resistance_expla
     monkeypatch.setattr(verdict, "drop_contradicted_rivals", lambda _held_out, _fitted, found, _rules: found)
     campaign = campaign_of({"pressure_gain": 0.5})
     known = replace(campaign, tolerances=replace(TOLERANCES, session=(tolerance, *TOLERANCES.session[1:])))
-    told = judge(known).verdict
+    told = judge(known, numbers=FEW).verdict
     assert (told.verdict, [effect.name for effect in told.effects]) == (kind, ["retuned_pressure_gain"])
     assert [(of, rival.name) for of, rival in told.rivals] == [("retuned_pressure_gain", n) for n in rivals]
 
@@ -188,9 +202,9 @@ def test_a_gain_that_the_file_claims_to_know_is_doubted_where_a_resistance_expla
 def test_nothing_is_named_that_predicts_unseen_stops_worse_than_the_file(monkeypatch):
     """Grip 31 % below the file's was named, and the held-out stop missed by 0.8 m/s, which the file misses by 0.2."""
     campaign = campaign_of({"lag": 0.09})
-    assert judge(campaign).verdict.effects
+    assert judge(campaign, numbers=FEW).verdict.effects
     monkeypatch.setattr(verdict, "find_worse_channels", lambda _error, _limit, speed_decides: ["speed"])
-    trace = judge(campaign)
+    trace = judge(campaign, numbers=FEW)
     assert trace.verdict.error["speed"].after == trace.verdict.error["speed"].retuned
     assert trace.verdict.verdict == "NOTHING" and not trace.calibrated
     assert any("file predicts speed of the held-out runs better" in r for r in trace.verdict.reasons)
@@ -198,7 +212,7 @@ def test_nothing_is_named_that_predicts_unseen_stops_worse_than_the_file(monkeyp
 
 def test_what_makes_no_difference_beside_retuning_is_not_named(monkeypatch):
     monkeypatch.setattr(verdict, "makes_difference", lambda *_: False)
-    trace = judge(campaign_of({"lag": 0.09}))
+    trace = judge(campaign_of({"lag": 0.09}), numbers=FEW)
     assert trace.verdict.verdict == "NOTHING"
     assert trace.verdict.error["speed"].after == trace.verdict.error["speed"].retuned
 
@@ -272,9 +286,9 @@ def test_the_rules_say_from_which_held_out_error_a_number_is_not_named(share: st
 
 def test_what_the_training_runs_had_in_common_is_not_named_where_the_held_out_run_contradicts_it():
     windy, calm = campaign_of({"lag": 0.09, "drag_area": 3.0}), campaign_of({"lag": 0.09})
-    everywhere = judge(windy)
+    everywhere = judge(windy, numbers=FEW)
     assert {"brake_lag", "aerodynamic_drag"} <= named_intervals(everywhere).keys()
-    contradicted = judge(replace(windy, runs=(*windy.runs[:-1], calm.runs[-1])))
+    contradicted = judge(replace(windy, runs=(*windy.runs[:-1], calm.runs[-1])), numbers=FEW)
     assert "aerodynamic_drag" not in named_intervals(contradicted)
     assert any(
         "suggest that the air holds" in reason and "not named" in reason
@@ -284,13 +298,15 @@ def test_what_the_training_runs_had_in_common_is_not_named_where_the_held_out_ru
 
 def test_an_engine_that_was_measured_is_an_input_and_no_effect():
     campaign = campaign_of({"pressure_gain": 0.3}, engine=-500.0)
-    with_engine = judge(campaign)
+    with_engine = judge(campaign, numbers=FEW)
     assert not with_engine.verdict.effects and named_intervals(with_engine).keys() == {
         "retuned_pressure_gain"
     }
     assert with_engine.fitted.by_name["pressure_gain"] == pytest.approx(0.3, abs=0.03)
     assert any("engine torque" in reason for reason in with_engine.verdict.reasons)
-    blind = judge(replace(campaign, runs=tuple(replace(run, drive_torque=None) for run in campaign.runs)))
+    blind = judge(
+        replace(campaign, runs=tuple(replace(run, drive_torque=None) for run in campaign.runs)), numbers=FEW
+    )
     assert "engine_braking" in named_intervals(blind)
 
 
