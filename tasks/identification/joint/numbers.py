@@ -14,8 +14,6 @@ from tasks.vehicle.parameters import compute_surface_response
 
 GAIN = "pressure_gain"
 FRICTION = "friction"
-ENGINE = "engine_braking"
-"""How the names of an engine's drag begin, which is an input where its torque was measured."""
 CALIBRATED = ("gain", FRICTION, "radius")
 """Groups of numbers that re-tuning moves."""
 AT_BOUND = 0.005
@@ -96,8 +94,6 @@ def choose_numbers(
     for number in numbers:
         if not any(need in campaign.channels for need in number.needs):
             continue
-        if number.effect.name.startswith(ENGINE) and engine:
-            continue  # an input, and no unknown
         if number.name == "fade" and len({run.disc_rise for run in campaign.train}) < 2:
             continue  # discs of one temperature show no fade
         if number.group == "curve" and stops < rules.fewest_curve_stops:

@@ -160,6 +160,10 @@ def judge_jointly(
     doubted = {e.parameters[0].name for e in effects} & set(claimed)
     as_good = find_substitutes(train, fitted, shown, rules.rival_gain_share, doubted)
     substitutes = drop_contradicted_rivals(held_out, fitted, as_good, joint)
+    # what other physics explains as well is no number of the file alone
+    disputed = {substitute.of for substitute in substitutes}
+    effects += [e for e in calibrated if e.parameters[0].name in disputed]
+    calibrated = tuple(e for e in calibrated if e not in effects)
     rivals = _name_rivals(fitted, substitutes, effects, joint)
     kind = _kind(effects, rivals)
     reasons += tell_what_was_used(campaign, train, agreeing, joint)

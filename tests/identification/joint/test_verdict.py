@@ -251,6 +251,19 @@ def test_tyres_at_their_limit_are_a_rival_of_the_brakes_curve():
     assert [rival.name for _, rival in found] == ["retuned_wet_friction"]
 
 
+def test_a_number_within_its_tolerance_that_other_physics_explains_as_well_is_named_with_its_rival(
+    monkeypatch,
+):
+    """A mass 28 % above its file's, known to 10 %, stood beside a dead band that explained the stops as well."""
+    assert ("brake_lag", "brake_dead_time") in [
+        (of, rival.name) for of, rival in slow_brakes().verdict.rivals
+    ]
+    monkeypatch.setattr(verdict, "_tolerances", lambda *_: {"lag": 1.0, "pressure_gain": 0.2})
+    trace = judge(campaign_of({"lag": 0.09}))
+    assert trace.verdict.verdict == "SET" and [e.name for e in trace.verdict.effects] == ["brake_lag"]
+    assert "brake_lag" not in [e.name for e in trace.calibrated]
+
+
 def test_runs_that_never_coast_say_which_resistance_stands_for_all():
     """Air drag, the first in the list, stood for a motor's drag at 8 m/s, and the brake's curve was bent to fit."""
     for truth, lump in (({"engine_torque": 400.0}, "engine_torque"), ({"drag_area": 3.0}, "drag_area")):
