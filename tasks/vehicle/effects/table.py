@@ -121,7 +121,7 @@ EFFECT_TABLE = (
     ),
     _add_number("slope", "grade", "1", "road", (-0.08, 0.08), 0.001, PAPER),
     # forces along the road
-    _add_number("drag_area", "air drag", "m2", "longitudinal_force", (0.0, 3.0), 0.3, GILLESPIE),
+    _add_number("drag_area", "air drag", "m2", "longitudinal_force", (0.0, 10.0), 0.3, GILLESPIE),
     _add_number("wind_speed", "wind", "m s-1", "longitudinal_force", (-15.0, 15.0), 2.0, GILLESPIE),
     _add_number("rolling_coefficient", "rolling resistance", "1", "longitudinal_force", (0.0, 0.06), 0.004, GILLESPIE),
     _add_number("rolling_speed", "rolling resistance by speed", "s m-1", "longitudinal_force", (0.0, 0.003), 0.0002,
