@@ -72,7 +72,9 @@ def test_fade_lengthens_a_stop_and_leaves_coasting_as_it_is(coupled):
     assert np.array_equal(*still)
 
 
-def test_wind_creep_rubbing_pads_and_rolling_by_speed_change_coasting_by_their_force(coupled, vehicle):
+def test_wind_creep_an_engine_in_gear_rubbing_pads_and_rolling_by_speed_change_coasting_by_their_force(
+    coupled, vehicle
+):
     coast = command(0.0, onset=None)
     turning = (vehicle.wheel_inertia_f + vehicle.wheel_inertia_r) / vehicle.wheel_radius**2
     plain = coupled(brake=coast, duration=0.6)
@@ -82,6 +84,8 @@ def test_wind_creep_rubbing_pads_and_rolling_by_speed_change_coasting_by_their_f
         ({"pad_drag": 40.0}, 40.0 / vehicle.wheel_radius),
         ({"rolling_speed": 0.0006}, 0.0006 * v * weight),
         ({"creep_force": 500.0, "creep_speed": 40.0}, -500.0 * (1.0 - v / 40.0)),
+        # the same power through every gear: 4 kW at 60 km/h are 0.23 kN
+        ({"engine_power": 4.0}, 4e3 / v / (1.0 + (12.0 * vehicle.wheel_radius / v) ** 2)),
     ):
         got = (a - coupled(effects, brake=coast, duration=0.6)["longitudinal_acceleration"][500]) * (
             vehicle.mass + turning

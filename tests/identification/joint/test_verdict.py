@@ -266,7 +266,8 @@ def test_a_number_within_its_tolerance_that_other_physics_explains_as_well_is_na
 
 def test_runs_that_never_coast_say_which_resistance_stands_for_all():
     """Air drag, the first in the list, stood for a motor's drag at 8 m/s, and the brake's curve was bent to fit."""
-    for truth, lump in (({"engine_torque": 400.0}, "engine_torque"), ({"drag_area": 3.0}, "drag_area")):
+    truths = {"engine_torque": 400.0, "drag_area": 3.0, "engine_power": 40.0}
+    for truth, lump in (({name: value}, name) for name, value in truths.items()):
         fitted = judge(campaign_of(truth)).fitted
         assert [n.name for n in fitted.numbers if n.group == "resistance"] == [lump]
 
