@@ -27,7 +27,7 @@ from tasks.campaign.campaign import (
     Tolerances,
     find_motion,
 )
-from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME
+from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME, SpeedSource
 from tasks.campaign.resting_pressure import find_gauge_zero, measure_resting_levels
 from tasks.campaign.run_validation import COLUMN_UNITS, motion_problem, run_problems
 from tasks.campaign.slow_channels import collect_samples, fill_between_samples
@@ -68,6 +68,7 @@ class MeasuredHeader(CampaignHeader):
     not_measured: tuple[Text, ...] = ()
     brake_signal: Text | None = None
     brake_stands_for: Text | None = None
+    speed_from: SpeedSource = "ground"
 
     @field_validator("tolerances_1sigma")
     @classmethod
@@ -133,7 +134,9 @@ def read_campaign(folder: str | Path) -> Campaign:
             }
         if not found and signal in columns and "speed" in columns:
             columns["brake_pressure"] = BRAKE_SIGNALS[signal] * columns[signal]
-            run = _make_run(row, columns, row["run"] in judged, interval)
+            run = _make_run(
+                row, columns, interval, held_out=row["run"] in judged, of_wheels=header.speed_from == "wheels"
+            )
             if problem := motion_problem(run.speed, interval, run.hazard_length > 0.0):
                 problems.append(f"{run.name}: {problem}")
             first, _ = find_motion(run.speed)
@@ -238,7 +241,9 @@ def _find_brake_signal(header: MeasuredHeader) -> str:
     return header.brake_signal or "brake_pressure"
 
 
-def _make_run(row: dict[str, str], columns: dict[str, np.ndarray], held_out: bool, interval: float) -> Run:
+def _make_run(
+    row: dict[str, str], columns: dict[str, np.ndarray], interval: float, *, held_out: bool, of_wheels: bool
+) -> Run:
     pressure = columns["brake_pressure"]
     return Run(
         name=row["run"],
@@ -262,6 +267,7 @@ def _make_run(row: dict[str, str], columns: dict[str, np.ndarray], held_out: boo
         drive_torque=columns.get("engine_torque"),
         road_slope=np.radians(columns["road_slope"]) if "road_slope" in columns else None,
         throttle=columns.get("throttle"),
+        speed_of_wheels=of_wheels,
         sampled=collect_samples(columns),
     )
 

@@ -13,7 +13,7 @@ from catalogs.entries import find_entry
 from catalogs.names import LONGEST_NAME
 from catalogs.quantities import CatalogueEntry, Number, Text
 from catalogs.sentences import cap_problems, describe_rules, shorten, shorten_value
-from tasks.campaign.channels import CHANNELS_BY_NAME, MAIN_CHANNELS, UNITS
+from tasks.campaign.channels import CHANNELS_BY_NAME, MAIN_CHANNELS, UNITS, SpeedSource
 from tasks.campaign.signals import ChannelRule, Gain
 from tasks.campaign.time_of_day import TIME_OF_DAY
 from tasks.campaign.wheel_validation import describe_wheel_gain
@@ -146,6 +146,7 @@ class ChannelMap(CatalogueEntry):
     csv: CsvEntry = CsvEntry()
     channels: dict[str, ChannelEntry]
     not_measured: Annotated[tuple[str, ...], Field(validate_default=True)] = ()
+    speed_from: SpeedSource = "ground"
     conditions: Conditions = Conditions()
     runs: Annotated[tuple[RunEntry, ...], Field(validate_default=True)] = ()
     segment: SegmentEntry | None = None

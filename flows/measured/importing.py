@@ -150,6 +150,7 @@ def write_campaign(
         "notes": channel_map.notes,
         "not_measured": list(channel_map.not_measured),
         **_brake_facts(channel_map),
+        **({} if channel_map.speed_from == "ground" else {"speed_from": channel_map.speed_from}),
         "made_from": {"channel_map_sha256": map_hash, "files_sha256": sources},
     }
     text = yaml.safe_dump(header, sort_keys=False, allow_unicode=True)

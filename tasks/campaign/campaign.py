@@ -88,6 +88,7 @@ class Run:
     drive_torque : float64 [N] of the engine at the wheels, driving positive [N m]; None where it was not measured
     road_slope : float64 [N] of the road, uphill positive [rad]; None where it was not measured
     throttle : float64 [N] share of the full throttle [1]; None where it was not measured
+    speed_of_wheels : the speed was measured at the wheels, whose slip it has
     sampled : bool [N, 7] instants at which each channel has a sample; None where all have one at every instant
     """
 
@@ -107,6 +108,7 @@ class Run:
     drive_torque: NDArray[np.float64] | None = None
     road_slope: NDArray[np.float64] | None = None
     throttle: NDArray[np.float64] | None = None
+    speed_of_wheels: bool = False
     sampled: NDArray[np.bool_] | None = None
 
     @property

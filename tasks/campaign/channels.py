@@ -2,9 +2,12 @@
 
 from dataclasses import dataclass
 from math import pi
+from typing import Literal
 
 from tasks.errors import InputError
 
+SpeedSource = Literal["ground", "wheels"]
+"""What the channel ``speed`` is: over ground, or of the wheels, whose slip it has."""
 GRAVITY = 9.80665
 """Standard gravity [m/s^2]."""
 UNITS: dict[str, tuple[str, float]] = {

@@ -256,6 +256,9 @@ def compute_instrument_readings(
     up = simulated.column("heave_acceleration")
     tilt = e["mount_tilt"]
     ax = (felt - e["gravity_leak"] * g * np.sin(pitch) + tilt * (g + up)) * (1.0 + e["acceleration_scale"])
+    if model.run.speed_of_wheels:
+        radius = model.vehicle.wheel_radius * (1.0 + theta[PARAMETER_INDEX["wheel_radius"]])
+        speed = 0.5 * radius * (simulated.column("wheel_speed_f") + simulated.column("wheel_speed_r"))
     y = np.column_stack(
         (
             speed * (1.0 + e["speed_scale"]),

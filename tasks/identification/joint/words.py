@@ -42,6 +42,8 @@ def tell_what_was_used(
     speeds = np.concatenate([stop.model.measured[:, 0] for stop in train])
     pressure = max(float(stop.model.run.pressure.max()) for stop in train)
     seen = [CHANNELS[c].replace("_", " ") for c in train[0].channels]
+    if any(run.speed_of_wheels for run in runs):
+        seen[0] = "speed of the wheels"
     grip = (
         ""
         if any(saturates_tyres(stop.model, rules) for stop in train)

@@ -95,6 +95,19 @@ def test_the_campaign_is_the_one_that_closing_the_loop_reads(tmp_path: Path) -> 
     np.testing.assert_allclose(speed, braking_columns(14.0)["speed"][40 : 40 + len(speed)], atol=1e-9)
 
 
+@pytest.mark.parametrize("source", ["ground", "wheels"])
+def test_a_map_says_whether_the_speed_is_that_of_the_wheels(tmp_path: Path, source: str) -> None:
+    for name, seconds in (("train", 14.0), ("held_out", 13.0)):
+        write_csv(tmp_path / f"{name}.csv", log_signal(braking_columns(seconds)))
+    runs = [
+        {"name": f"r{i}", "file": f"{part}.csv", "from_s": 0.2, "to_s": 3.2, "part": part}
+        for i, part in enumerate(("train", "held_out"))
+    ]
+    path = write_map(tmp_path, runs=runs, speed_from=source)
+    import_measurements(str(tmp_path / "train.csv"), map=path, out=str(tmp_path / "campaign"))
+    assert {run.speed_of_wheels for run in read_campaign(tmp_path / "campaign").runs} == {source == "wheels"}
+
+
 def test_files_of_one_name_in_two_folders_are_told_apart(tmp_path: Path) -> None:
     for day, seconds in (("monday", 3.0), ("tuesday", 4.0)):
         (tmp_path / "logs" / day).mkdir(parents=True)

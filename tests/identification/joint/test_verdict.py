@@ -338,3 +338,18 @@ def test_a_joint_fit_is_for_few_runs():
     assert needs_joint_fit(campaign, RULES.joint)
     assert not needs_joint_fit(replace(campaign, runs=enough), RULES.joint)
     assert needs_joint_fit(replace(campaign, runs=enough), replace(RULES.joint, fewest_runs=5))
+
+
+def test_a_speed_of_the_wheels_is_compared_with_the_models_own_wheels():
+    """Under the brake wheels turn slower than the car drives: a lag of 0.25 s read 0.05 s on a truck."""
+    theta = build_parameter_vector({"lag": 0.09})
+    run = replace(plain_run(25.0, 3.0), speed_of_wheels=True)
+    read = measured(run, theta, 3)
+    over_ground = measured(replace(run, speed_of_wheels=False), theta, 3)
+    slip = (over_ground.measured - read.measured)[:, CHANNELS.index("speed")]
+    assert np.max(np.abs(slip[:100])) < 0.01  # the wheels roll until the brake
+    assert 0.1 < np.max(slip) < 2.0
+    campaign = campaign_of({"lag": 0.09})
+    runs = tuple(replace(run, speed_of_wheels=True) for run in campaign.runs)
+    told = judge(replace(campaign, runs=runs)).verdict.reasons
+    assert any("compared: speed of the wheels, longitudinal acceleration" in reason for reason in told)
