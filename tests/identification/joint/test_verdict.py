@@ -9,7 +9,7 @@ import pytest
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.joint_numbers import load_joint_numbers
-from tasks.campaign.campaign import CHANNELS, Campaign, Run
+from tasks.campaign.campaign import CHANNELS, SESSION, Campaign, Run
 from tasks.identification.decision.answer import NamedEffect
 from tasks.identification.decision.missed import compare_with_noise, tell_miss
 from tasks.identification.joint import verdict
@@ -133,6 +133,26 @@ def test_no_claim_that_nothing_is_missing_stands_beside_a_stop_that_is_missed():
     assert compare_with_noise(calm, trace.verdict.error) == pytest.approx(missed / 0.03, rel=0.2)
 
 
+def test_a_mass_and_frictions_are_wrong_by_the_tolerances_of_their_campaign():
+    numbers = {n.name: n for n in load_joint_numbers()}
+    campaign = campaign_of({})
+    found = verdict._tolerances(campaign, [numbers["wet_friction"], numbers["lag"]])
+    session = dict(zip(SESSION, campaign.tolerances.session, strict=True))
+    named = {name: session[name] for name in ("pressure_gain", "wheel_radius", "mass")}
+    assert found == named | {"wet_friction": campaign.tolerances.friction}
+
+
+def test_noise_is_no_larger_than_what_a_fit_leaves_on_its_training_runs(monkeypatch):
+    """At 5 Hz whole stops counted as noise: nothing was missed beside 0.9 m/s."""
+    campaign, error = campaign_of({}), slow_brakes().verdict.error
+    noise = error["speed"].after / compare_with_noise(campaign, error)
+    for follows, taken in ((0.5 * noise, 0.5 * noise), (2.0 * noise, noise)):
+        assert compare_with_noise(campaign, error, follows) == pytest.approx(error["speed"].after / taken)
+    assert not judge(campaign).verdict.disagreement
+    monkeypatch.setattr(verdict, "measure_misfit", lambda *_: np.full(len(CHANNELS), 0.1 * noise))
+    assert judge(campaign).verdict.disagreement.startswith("the speed of the held-out runs is missed by")
+
+
 def test_a_stop_that_is_missed_beside_a_name_is_told():
     assert not any("is missed by" in reason for reason in slow_brakes().verdict.reasons)
     late, windy = campaign_of({"lag": 0.2}), campaign_of({"lag": 0.2, "drag_area": 3.0})
@@ -235,6 +255,17 @@ def test_a_friction_of_which_the_runs_say_little_more_than_its_prior_goes():
     for sigma, left in ((1.9 * error, {"pressure_gain", "lag"}), (2.1 * error, {n.name for n in free})):
         wide = replace(fitted, numbers=(free[0], replace(free[1], sigma=sigma), free[2]))
         assert {n.name for n in eliminate_uncertain_numbers(stops, wide, RULES.joint).numbers} == left
+
+
+def test_a_friction_that_the_runs_need_stays_though_they_tell_it_badly():
+    """On a race car brakes and tyres stand in for each other: without either the stops were missed by 20 m."""
+    numbers = {n.name: n for n in load_joint_numbers()}
+    stops, begun = slow_brakes().train, slow_brakes().fitted
+    gain, lag = numbers["pressure_gain"], replace(numbers["lag"], group="friction", removable=False)
+    fitted = refit_numbers(stops, begun, (gain, lag))
+    badly = replace(lag, sigma=float(standard_errors(fitted, RULES.joint)[1]))
+    left = eliminate_uncertain_numbers(stops, replace(fitted, numbers=(gain, badly)), RULES.joint)
+    assert left.numbers == (gain, badly)
 
 
 def test_tyres_at_their_limit_are_a_rival_of_the_brakes_curve():
