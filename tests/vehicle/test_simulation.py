@@ -148,6 +148,13 @@ class TestEffectsOfAVehicle:
             peaks = [compute_surface_response(car, kind, 0.2).tyre.peak for car in (grown, vehicle)]
             assert peaks[0] == pytest.approx(0.8 * peaks[1])
 
+    @pytest.mark.parametrize(("name", "of"), [("wet_friction", "rain"), ("snow_friction", "snow")])
+    def test_the_friction_of_one_kind_of_weather_leaves_the_others(self, vehicle, name, of):
+        grown = apply_effects(vehicle, {name: -0.2})
+        for kind in ("dry", "rain", "snow", "ice"):
+            peaks = [compute_surface_response(car, kind, 0.2).tyre.peak for car in (grown, vehicle)]
+            assert peaks[0] == pytest.approx((0.8 if kind == of else 1.0) * peaks[1]), kind
+
     def test_a_grade_and_an_instrument_are_no_part_of_it(self, vehicle):
         with pytest.raises(InputError, match="speed_scale: no vehicle carries it"):
             apply_effects(vehicle, {"slope": 0.01, "speed_scale": 0.02})

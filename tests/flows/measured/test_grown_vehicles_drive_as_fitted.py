@@ -116,6 +116,16 @@ def test_every_effect_of_the_library_drives_in_a_dataset_as_it_was_fitted(effect
     assert largest_change(theta) > 0.5, "no manoeuvre shows it"
 
 
+def test_a_friction_of_one_kind_of_weather_has_its_source_in_that_tyre_family_alone(tmp_path):
+    (wet,) = (e for e in LIBRARY if e.name == "retuned_wet_friction")
+    path = grown_file(tmp_path / "grown.yaml", found_effect(wet, {"wet_friction": -0.2}), reached={})
+    families = yaml.safe_load(path.read_text())["families"]
+    told = {
+        kind: "retuned_wet_friction" in family["efficiency"]["source"] for kind, family in families.items()
+    }
+    assert told == {kind: kind == "rain" for kind in VEHICLE.families}
+
+
 def test_a_grade_belongs_to_the_road():
     (grade,) = (e for e in LIBRARY if e.name in OF_THE_ROAD)
     found = verdict_of(found_effect(grade, {"slope": 0.01}))
