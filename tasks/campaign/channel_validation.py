@@ -122,8 +122,10 @@ def frozen_problem(name: str, signal: Signal, speed: Signal | None) -> str | Non
     if not long.size:
         return None
     at = long[np.argmax(dwells[long])]
+    wheel = bool(locked[at]) and name.startswith("wheel_speed")
+    said = "stands still, as a locked wheel or a dead sensor does" if wheel else "is frozen"
     return (
-        f"is frozen: it holds {signal.values[edges[at]]:.4g} for {dwells[at]:.2f} s from {signal.time[edges[at]]:.3f} s"
+        f"{said}: it holds {signal.values[edges[at]]:.4g} for {dwells[at]:.2f} s from {signal.time[edges[at]]:.3f} s"
         " while the car moves: cut the run there, or leave the channel out"
     )
 

@@ -156,6 +156,15 @@ def test_an_acceleration_that_is_the_rate_of_the_speed_is_left_out_and_told(tmp_
     assert "longitudinal_acceleration" not in pd.read_parquet(tmp_path / "campaign" / "runs" / "log.parquet")
 
 
+def test_a_wheel_that_locks_is_not_called_frozen(tmp_path: Path) -> None:
+    log = log_signal(braking_columns())
+    row = np.arange(len(log["w_r"]))
+    log["w_r"] = np.where((row >= 150) & (row < 250), 0.0, log["w_r"])
+    told = problems_of(tmp_path, log)
+    assert "wheel_speed_rear: stands still, as a locked wheel or a dead sensor does: it holds 0 for 1.00 s" in told
+    assert "is frozen" not in told
+
+
 def test_a_standing_car_does_not_freeze_its_sensors(tmp_path: Path) -> None:
     columns = braking_columns()
     for name in columns:
