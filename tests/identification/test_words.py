@@ -78,6 +78,17 @@ def test_where_nothing_is_missing_the_verdict_says_what_the_vehicles_own_numbers
     assert told == "These runs show nothing that the model lacks."
 
 
+def test_an_error_that_reads_the_same_before_and_after_is_not_told_as_taken_from_one_to_the_other() -> None:
+    speed = ChannelError(
+        frozen=2.145, retuned=2.082, after=2.082, ci_low=1.0, ci_high=3.0, change_low=-0.1, change_high=-0.01, wins=3,
+        worst_run="run", unit="m/s",
+    )  # fmt: skip
+    stop = replace(speed, frozen=7.668, after=7.426, unit="m")
+    own = "most: braking pitches the body by a moment 37 % below the vehicle file's"
+    told = tell_verdict((), (), (), {"speed": speed}, {"stopping_distance": stop}, misses=True, own=own)
+    assert told == "The model misses these runs by more than their noise, and nothing that can be named explains it."
+
+
 def test_no_name_beside_runs_that_the_model_misses_is_no_claim_that_nothing_is_missing() -> None:
     told = tell_verdict((), (), (), {}, {}, misses=True)
     assert (

@@ -57,7 +57,7 @@ def tell_verdict(
             if misses
             else "These runs show nothing that the model lacks"
         )
-        if not own or not is_predicted_better(error):
+        if not own or not is_predicted_better(error) or not _is_told_apart(error["speed"]):
             return f"{nothing}."
         figures = {name: e for name, e in manoeuvres.items() if e.change_high < 0.0}
         return (
@@ -86,6 +86,11 @@ def tell_verdict(
     rest = " The speed is still missed by more than its noise: more is lacking than that." if misses else ""
     done = f"{how} the error {moved}, on runs to which no number was fitted."
     return f"{text[0].upper()}{text[1:]}; {done}{rest}"
+
+
+def _is_told_apart(error: ChannelError) -> bool:
+    """Whether a sentence says another number after than before."""
+    return say_number(error.frozen) != say_number(error.after)
 
 
 def _say_errors(figures: Mapping[str, ChannelError], *, retuned: bool = False) -> str:
