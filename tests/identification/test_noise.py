@@ -129,3 +129,26 @@ def test_unwhitening_undoes_whitening() -> None:
     x = np.random.default_rng(1).standard_normal((40, 7, 3))
     rho = np.array([0.6, 0.0, 0.9, 0.2, 0.8, 0.0, 0.5])
     assert unwhiten_channels(whiten_channels(x, rho, NOISE), rho, NOISE) == pytest.approx(x)
+
+
+@pytest.mark.parametrize(("quiet", "is_told"), [(1.5, True), (0.8, False)])
+def test_a_receiver_of_10_hz_has_the_noise_of_its_few_samples_before_the_brake(
+    quiet: float, is_told: bool
+) -> None:
+    """Fifteen samples were too few, the braking counted as noise of 0.65 m/s, and no stop was missed."""
+    rng = np.random.default_rng(5)
+    time = np.arange(50) * 0.1
+    runs = []
+    for k in range(8):
+        response = np.zeros((50, len(CHANNELS)))
+        response[:, 0] = 25.0 - 4.0 * np.maximum(time - quiet, 0.0) + 0.03 * rng.standard_normal(50)
+        pressure = np.where(time > quiet, 2.0, 0.0)
+        runs.append(
+            replace(plain_run(25.0, 2.0), name=f"r{k}", interval=0.1, response=response, pressure=pressure)
+        )
+    campaign = Campaign(
+        name="slow", vehicle="paper-reference", runs=tuple(runs), tolerances=TOLERANCES, content_hash="",
+        split_hash="", channels=("speed",),
+    )  # fmt: skip
+    sigma = estimate_channel_noise(campaign)[1][0]
+    assert bool(abs(sigma - 0.03) < 0.01) is is_told

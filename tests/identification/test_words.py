@@ -86,7 +86,10 @@ def test_an_error_that_reads_the_same_before_and_after_is_not_told_as_taken_from
     stop = replace(speed, frozen=7.668, after=7.426, unit="m")
     own = "most: braking pitches the body by a moment 37 % below the vehicle file's"
     told = tell_verdict((), (), (), {"speed": speed}, {"stopping_distance": stop}, misses=True, own=own)
-    assert told == "The model misses these runs by more than their noise, and nothing that can be named explains it."
+    assert (
+        told
+        == "The model misses these runs by more than their noise, and nothing that can be named explains it."
+    )
 
 
 def test_no_name_beside_runs_that_the_model_misses_is_no_claim_that_nothing_is_missing() -> None:

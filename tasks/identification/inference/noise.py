@@ -14,6 +14,8 @@ INTEGRALS = tuple(
     (CHANNELS.index(level), CHANNELS.index(rate))
     for level, rate in (("speed", "longitudinal_acceleration"), ("pitch", "pitch_rate"))
 )
+FEWEST_LAGS = 3
+"""Lags at which the quiet parts must tell a channel's variogram: it has three unknowns [1]."""
 QUIET_PRESSURE = 0.1
 """Pressure at which the quiet part of a run ends [MPa]."""
 BEFORE_BRAKE, ON_HAZARD = 0.05, 0.4
@@ -51,10 +53,10 @@ def estimate_channel_noise(campaign: Campaign) -> tuple[NDArray[np.float64], NDA
     rho, sigma = np.zeros(len(CHANNELS)), np.zeros(len(CHANNELS))
     k = np.array(LAGS, dtype=np.float64)
     for j in np.flatnonzero(campaign.is_measured):
-        best = np.inf
+        best, seen = np.inf, np.isfinite(variogram[:, j])
         for trial in np.arange(0.0, 0.95, 0.02):
-            basis = np.column_stack((1.0 - trial**k, k**2)) / variogram[:, j : j + 1]
-            (power, slow), *_ = np.linalg.lstsq(basis, np.ones(len(k)), rcond=None)
+            basis = (np.column_stack((1.0 - trial**k, k**2)) / variogram[:, j : j + 1])[seen]
+            (power, slow), *_ = np.linalg.lstsq(basis, np.ones(len(basis)), rcond=None)
             misfit = float(np.sum((basis @ (power, slow) - 1.0) ** 2))
             if misfit < best and power > 0 and slow > -0.05 * power:
                 best, rho[j], sigma[j] = misfit, trial, np.sqrt(power)
@@ -103,13 +105,17 @@ def _find_longest(stretches: list[Stretch]) -> NDArray[np.int64]:
 
 
 def _compute_variogram(stretches: list[Stretch]) -> NDArray[np.float64]:
-    """Return the semivariogram of every channel at `LAGS`, float64 [L, 7] [unit of the channel, squared]."""
-    quiet = np.zeros(len(CHANNELS), dtype=np.int64)
+    """Return the semivariogram of every channel at `LAGS`, float64 [L, 7] [unit of the channel, squared].
+
+    NaN at lags for which there are too few samples.
+    """
+    told = np.zeros((len(LAGS), len(CHANNELS)), dtype=bool)
     for stretch in stretches:
-        quiet[stretch.channels] = np.maximum(quiet[stretch.channels], stretch.quiet)
+        told[:, stretch.channels] |= (stretch.quiet > 3 * np.array(LAGS))[:, np.newaxis]
     sums, counts = np.zeros((len(LAGS), len(CHANNELS))), np.zeros((len(LAGS), len(CHANNELS)))
     for stretch in stretches:
-        long = quiet[stretch.channels] > 3 * LAGS[-1]
+        # a receiver of 10 Hz has a dozen samples before the brake: fewer lags of what is quiet, and no braking
+        long = np.count_nonzero(told[:, stretch.channels], axis=0) >= FEWEST_LAGS
         for taken, end in ((long, stretch.quiet), (~long, len(stretch.values))):
             channels, values = stretch.channels[taken], stretch.values[:end].compress(taken, axis=1)
             for i, lag in enumerate(LAGS):
@@ -117,7 +123,7 @@ def _compute_variogram(stretches: list[Stretch]) -> NDArray[np.float64]:
                     difference = values[lag:] - values[:-lag]
                     sums[i, channels] += 0.5 * np.sum((difference - difference.mean(0)) ** 2, axis=0)
                     counts[i, channels] += len(difference) - 1
-    return sums / counts
+    return np.divide(sums, counts, out=np.full_like(sums, np.nan), where=counts > 0)
 
 
 def _count_quiet_samples(run: Run) -> int:

@@ -9,7 +9,7 @@ from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
 from tasks.identification.inference.forward import RunModel, simulate_run
 from tasks.identification.rules import JointRules
 from tasks.vehicle.effects.library import Effect
-from tasks.vehicle.effects.table import EFFECT_TABLE
+from tasks.vehicle.effects.table import build_parameter_vector
 from tasks.vehicle.parameters import compute_surface_response
 
 GAIN = "pressure_gain"
@@ -89,7 +89,7 @@ def choose_numbers(
     chosen = []
     engine = any(run.drive_torque is not None for run in campaign.runs)
     known = {*campaign.channels, *(["drive_torque"] if engine else [])}
-    trusted = not is_gain_unknown(campaign, rules)  # else the file's pressure says nothing of the limit
+    weakest = weakest_gain(campaign)
     stops = sum(shows_brake_curve(model, rules) for model in models)
     for number in numbers:
         if not any(need in campaign.channels for need in number.needs):
@@ -99,7 +99,7 @@ def choose_numbers(
         if number.group == "curve" and stops < rules.fewest_curve_stops:
             continue  # one stop gives a gain and a delay, and no curve
         if number.group == FRICTION and not any(
-            saturates_tyres(model, rules) or (trusted and reaches_limit(model, rules))
+            saturates_tyres(model, rules) or (weakest is not None and reaches_limit(model, rules, weakest))
             for model in _find_runs_on(number, numbers, models)
         ):
             continue
@@ -190,15 +190,27 @@ def _find_runs_on(
     return [model for model in models if number.weather in own and model.run.weather == number.weather]
 
 
-def reaches_limit(model: RunModel, rules: JointRules) -> bool:
+def weakest_gain(campaign: Campaign) -> float | None:
+    """Return by how much the brakes may be weaker than the file's [1]; None where a signal is no pressure of its own.
+
+    Parameters
+    ----------
+    campaign : measured runs with their tolerances
+    """
+    tolerance = campaign.tolerances.session[SESSION.index(GAIN)]
+    return -tolerance if campaign.brake_signal == "brake_pressure" else None
+
+
+def reaches_limit(model: RunModel, rules: JointRules, gain: float) -> bool:
     """Whether the front wheels of the vehicle file come to the limit of their tyres for some time in a run.
 
     Parameters
     ----------
     model : the run
     rules : of the joint fit
+    gain : of the brakes beside the file's [1]
     """
-    scale = simulate_run(model, np.zeros(len(EFFECT_TABLE))).column("abs_scale_f")
+    scale = simulate_run(model, build_parameter_vector({GAIN: max(gain, -0.9)})).column("abs_scale_f")
     return bool(np.sum(scale < 1.0) * model.run.interval > rules.limited_time)
 
 

@@ -161,7 +161,10 @@ def test_a_wheel_that_locks_is_not_called_frozen(tmp_path: Path) -> None:
     row = np.arange(len(log["w_r"]))
     log["w_r"] = np.where((row >= 150) & (row < 250), 0.0, log["w_r"])
     told = problems_of(tmp_path, log)
-    assert "wheel_speed_rear: stands still, as a locked wheel or a dead sensor does: it holds 0 for 1.00 s" in told
+    assert (
+        "wheel_speed_rear: stands still, as a locked wheel or a dead sensor does: it holds 0 for 1.00 s"
+        in told
+    )
     assert "is frozen" not in told
 
 
