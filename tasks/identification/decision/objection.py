@@ -47,12 +47,6 @@ def object_to_last(
             f"{hypothesis.name} would fit with {off:.2g}, which is less than such a number is known to"
             f" ({rules.negligible_share:g}): not named"
         )
-    speed = error["speed"]
-    if moved and speed.after > rules.retuned_limit * min(speed.frozen, speed.retuned):
-        return (
-            f"{', '.join(h.name for h in named)} would fit, but the speed of the held-out runs is missed by"
-            f" {speed.after:.3g} m/s with it and by {min(speed.frozen, speed.retuned):.3g} without: not named"
-        )
     worse = find_worse_channels(error, rules.worse_limit, speed_decides=moved)
     if worse:
         return (
