@@ -176,8 +176,6 @@ class Campaign:
     channels : of `CHANNELS`, those that were measured
     brake_signal : signal or unit that stands for the brake pressure
     gauge_zero : what its gauge read at rest in all runs alike, taken off their pressures [MPa]
-    noise : AR(1) coefficient [1] and standard deviation [unit of the channel] of every channel, float64 [7] each, where
-        longer runs than these told them; None where these runs tell them
     """
 
     name: str
@@ -189,7 +187,6 @@ class Campaign:
     channels: tuple[str, ...] = CHANNELS
     brake_signal: str = "brake_pressure"
     gauge_zero: float = 0.0
-    noise: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
 
     @property
     def is_measured(self) -> NDArray[np.bool_]:

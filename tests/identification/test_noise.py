@@ -7,9 +7,8 @@ import pytest
 
 from tasks.campaign.campaign import CHANNELS, Campaign, Run
 from tasks.errors import InputError
-from tasks.identification.inference.driver import begin_at_brake
 from tasks.identification.inference.noise import estimate_channel_noise, unwhiten_channels, whiten_channels
-from tests.identification.synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, plain_run
+from tests.identification.synthetic import NOISE, TOLERANCES, plain_run
 
 
 def quiet_campaign(step: np.ndarray | float = 0.0, brake_at: float = 1.0, *, noise: float = 1.0) -> Campaign:
@@ -153,13 +152,3 @@ def test_a_receiver_of_10_hz_has_the_noise_of_its_few_samples_before_the_brake(
     )  # fmt: skip
     sigma = estimate_channel_noise(campaign)[1][0]
     assert bool(abs(sigma - 0.03) < 0.01) is is_told
-
-
-def test_runs_that_begin_at_their_brake_keep_the_noise_of_what_was_cut_off() -> None:
-    campaign = quiet_campaign()
-    begun = begin_at_brake(campaign, VEHICLE, SURFACE, 0.1)
-    assert len(begun.runs[0].pressure) < len(campaign.runs[0].pressure)
-    for found, whole in zip(estimate_channel_noise(begun), estimate_channel_noise(campaign), strict=True):
-        assert np.array_equal(found, whole)
-    speed = estimate_channel_noise(replace(begun, channels=("speed",)))
-    assert speed[1][0] == estimate_channel_noise(campaign)[1][0] and np.all(np.isinf(speed[1][1:]))

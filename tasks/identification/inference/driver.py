@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from tasks.campaign.campaign import CHANNELS, Campaign, Run
 from tasks.identification.inference.forward import RunModel, predict_channels, prepare_run
-from tasks.identification.inference.noise import estimate_channel_noise
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.slots import Slot
 from tasks.vehicle.parameters import Vehicle
@@ -64,8 +63,6 @@ def begin_at_brake(
 ) -> Campaign:
     """Return a campaign whose stops on a flat road begin as the driver changes from throttle to brake.
 
-    The noise of its channels is that of the whole runs: what is cut off is the quiet part, which tells it.
-
     Parameters
     ----------
     campaign : measured runs
@@ -80,6 +77,4 @@ def begin_at_brake(
             return run
         return run.begin_at(max(onset - round(0.5 * LIFT / run.interval), 0))
 
-    return replace(
-        campaign, runs=tuple(begin(run) for run in campaign.runs), noise=estimate_channel_noise(campaign)
-    )
+    return replace(campaign, runs=tuple(begin(run) for run in campaign.runs))

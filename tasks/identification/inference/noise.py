@@ -44,9 +44,6 @@ def estimate_channel_noise(campaign: Campaign) -> tuple[NDArray[np.float64], NDA
     InputError
         If a measured channel never changes, or the training runs are too short.
     """
-    if campaign.noise is not None:
-        rho, sigma = campaign.noise
-        return np.where(campaign.is_measured, rho, 0.0), np.where(campaign.is_measured, sigma, np.inf)
     floor = np.where(campaign.is_measured, _compute_rounding_variance(campaign), np.inf)
     stretches = [stretch for run in campaign.train for stretch in _list_stretches(run)]
     problems = _find_problems(campaign, floor, _find_longest(stretches))
