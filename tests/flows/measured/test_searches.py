@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from catalogs.effects import load_effects
 from flows.measured import searches
 from tasks.identification.decision.disputes import ForeignCarError
 
@@ -28,3 +29,11 @@ def test_the_search_is_chosen_by_what_is_known_and_by_whether_the_runs_agree(
     monkeypatch.setattr(searches, "find_effects_in_two_looks", find_one)
     monkeypatch.setattr(searches, "judge_jointly", lambda *_, disagreement: f"joint, because {disagreement}")
     assert searches.judge_campaign(SimpleNamespace(), SimpleNamespace(), SimpleNamespace(), ()) == judge
+
+
+def test_single_effects_leave_out_what_only_a_joint_fit_looks_for(monkeypatch):
+    monkeypatch.setattr(searches, "needs_joint_fit", lambda *_: False)
+    monkeypatch.setattr(searches, "find_effects_in_two_looks", lambda *given: {e.name for e in given[3]})
+    asked = searches.judge_campaign(SimpleNamespace(), SimpleNamespace(), SimpleNamespace(), load_effects())
+    left = {effect.name for effect in load_effects()} - asked
+    assert left == {"retuned_wet_friction", "retuned_snow_friction", "engine_braking_gears"}
