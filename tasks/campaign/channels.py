@@ -7,7 +7,7 @@ from typing import Literal
 from tasks.errors import InputError
 
 SpeedSource = Literal["ground", "wheels"]
-"""What the channel ``speed`` is: over ground, or of the wheels, whose slip it has."""
+"""Where the channel ``speed`` was measured: over ground, or at the wheels, whose slip it then has."""
 GRAVITY = 9.80665
 """Standard gravity [m/s^2]."""
 UNITS: dict[str, tuple[str, float]] = {

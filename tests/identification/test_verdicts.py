@@ -317,7 +317,7 @@ def test_an_effect_by_slip_needs_a_wheel_speed_and_a_pitch_moment_a_channel_of_t
         ("effect", "relaxation_length", 0.02, True),
     ],
 )
-def test_a_number_that_is_off_by_less_than_anybody_knows_it_to_is_not_wrong(
+def test_a_number_that_is_off_by_less_than_it_is_known_to_is_not_wrong(
     effect_class: str, name: str, value: float, is_named: bool
 ) -> None:
     """Tyres 1.3 % stiffer were named beside a right load sensitivity."""

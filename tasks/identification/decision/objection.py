@@ -22,8 +22,8 @@ def object_to_last(
     """Return why held-out runs contradict what was named last; None if they do not.
 
     The marginal likelihood can buy a fit with disturbances; prediction of unseen runs cannot be bought. A number that
-    re-tuning does not move must do better than the numbers that it moves, and be off by more than nobody knows it to: a
-    tyre that is 1 % stiffer takes up the slip that another anti-lock brake holds.
+    re-tuning does not move must do better than the numbers that it moves, and be off by more than such a number is
+    known to: a tyre that is 1 % stiffer takes up the slip that another anti-lock brake holds.
 
     Parameters
     ----------

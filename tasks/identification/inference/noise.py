@@ -115,8 +115,8 @@ def _compute_variogram(stretches: list[Stretch]) -> NDArray[np.float64]:
     sums, counts = np.zeros((len(LAGS), len(CHANNELS))), np.zeros((len(LAGS), len(CHANNELS)))
     for stretch in stretches:
         # a receiver of 10 Hz has a dozen samples before the brake: fewer lags of what is quiet, and no braking
-        long = np.count_nonzero(told[:, stretch.channels], axis=0) >= FEWEST_LAGS
-        for taken, end in ((long, stretch.quiet), (~long, len(stretch.values))):
+        enough = np.count_nonzero(told[:, stretch.channels], axis=0) >= FEWEST_LAGS
+        for taken, end in ((enough, stretch.quiet), (~enough, len(stretch.values))):
             channels, values = stretch.channels[taken], stretch.values[:end].compress(taken, axis=1)
             for i, lag in enumerate(LAGS):
                 if len(values) > 3 * lag:

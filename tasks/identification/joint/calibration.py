@@ -4,11 +4,11 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from tasks.campaign.campaign import CHANNELS, Campaign
+from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
 from tasks.identification.decision.disputes import ForeignCarError
 from tasks.identification.inference.noise import estimate_channel_noise
 from tasks.identification.joint.fit import JointFit, fit_jointly, measure_misfit, suggest_starts
-from tasks.identification.joint.numbers import GAIN, JointNumber, choose_numbers, is_gain_unknown
+from tasks.identification.joint.numbers import GAIN, JointNumber, choose_numbers
 from tasks.identification.joint.stops import Stop, make_stop
 from tasks.identification.rules import JointRules
 from tasks.surface.state import SurfaceParameters
@@ -34,6 +34,18 @@ def needs_joint_fit(campaign: Campaign, rules: JointRules) -> bool:
         or campaign.brake_signal != "brake_pressure"
         or any(run.throttle is not None for run in campaign.runs)
     )
+
+
+def is_gain_unknown(campaign: Campaign, rules: JointRules) -> bool:
+    """Whether the brake's gain is to be found: the file hardly knows it, or the signal is no pressure.
+
+    Parameters
+    ----------
+    campaign : measured runs with their tolerances
+    rules : of the joint fit
+    """
+    tolerance = campaign.tolerances.session[SESSION.index(GAIN)]
+    return campaign.brake_signal != "brake_pressure" or tolerance >= rules.unknown_gain_tolerance
 
 
 def has_few_runs(campaign: Campaign, rules: JointRules) -> bool:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from tasks.identification.inference.noise import correlate_with_next
+from tasks.identification.joint.derivatives import differentiate_run
 from tasks.identification.joint.fit import JointFit, describe_fit, fit_jointly
 from tasks.identification.joint.numbers import FRICTION, JointNumber
 from tasks.identification.joint.stops import Stop
@@ -263,7 +264,11 @@ def foresee_falls(
     """
     numbers = (*fitted.numbers, *others)
     values = np.append(fitted.values, np.zeros(len(others)))
-    beside = describe_fit(stops, numbers, values, fitted.offsets, fitted.scales, fitted.cost)
+    runs = [
+        differentiate_run(stop, numbers, values, own, fitted.scales)
+        for stop, own in zip(stops, fitted.offsets, strict=True)
+    ]
+    beside = describe_fit(runs, numbers, values, fitted.offsets, fitted.scales, fitted.cost)
     information = np.diag([1.0 / n.sigma**2 for n in numbers])
     gradient = np.zeros(len(numbers))
     for residual, slope in zip(beside.residuals, beside.slopes, strict=True):

@@ -192,7 +192,7 @@ def _fit_from(
         residual, x, jac=jacobian, bounds=(lower, upper), loss="soft_l1", x_scale="jac", ftol=ENOUGH, xtol=ENOUGH,
         max_nfev=MOST_EVALUATIONS,
     )  # fmt: skip
-    return _describe_point(
+    return describe_fit(
         differentiate_runs(found.x),
         numbers,
         found.x[:k],
@@ -203,32 +203,6 @@ def _fit_from(
 
 
 def describe_fit(
-    stops: Sequence[Stop],
-    numbers: tuple[JointNumber, ...],
-    values: NDArray[np.float64],
-    offsets: NDArray[np.float64],
-    scales: NDArray[np.float64],
-    cost: float,
-) -> JointFit:
-    """Return a point of the fit with its residuals and derivatives.
-
-    Parameters
-    ----------
-    stops : training runs
-    numbers : of the fit
-    values : float64 [K] of the numbers
-    offsets : float64 [R, 3] of the runs
-    scales : float64 [7] size of a misfit that counts one
-    cost : robust misfit with the priors, over 2
-    """
-    runs = [
-        differentiate_run(stop, numbers, values, own, scales)
-        for stop, own in zip(stops, offsets, strict=True)
-    ]
-    return _describe_point(runs, numbers, values, offsets, scales, cost)
-
-
-def _describe_point(
     runs: Sequence[Derivatives],
     numbers: tuple[JointNumber, ...],
     values: NDArray[np.float64],
@@ -236,7 +210,17 @@ def _describe_point(
     scales: NDArray[np.float64],
     cost: float,
 ) -> JointFit:
-    """Return a point of the fit from the misfits and derivatives of its runs."""
+    """Return a point of the fit from the misfits and derivatives of its runs.
+
+    Parameters
+    ----------
+    runs : of each training run at the point, as `differentiate_run` returns them
+    numbers : of the fit
+    values : float64 [K] of the numbers
+    offsets : float64 [R, 3] of the runs
+    scales : float64 [7] size of a misfit that counts one
+    cost : robust misfit with the priors, over 2
+    """
     k = len(numbers)
     slopes = tuple(_without_offsets(columns[:, :k], columns[:, k:]) for _, columns in runs)
     information = np.diag([1.0 / n.sigma**2 for n in numbers]) + sum(a.T @ a for a in slopes)

@@ -1,4 +1,4 @@
-"""What an optimiser asks for twice at one point is computed once."""
+"""Keep the result at the last point, for which an optimiser asks twice."""
 
 from collections.abc import Callable
 from typing import TypeVar
@@ -20,7 +20,7 @@ def keep_last(compute: Callable[[NDArray[np.float64]], Result]) -> Callable[[NDA
     """
     kept: dict[bytes, Result] = {}
 
-    def recall(x: NDArray[np.float64]) -> Result:
+    def recall_result(x: NDArray[np.float64]) -> Result:
         point = x.tobytes()
         if point not in kept:
             result = compute(x)
@@ -28,4 +28,4 @@ def keep_last(compute: Callable[[NDArray[np.float64]], Result]) -> Callable[[NDA
             kept[point] = result
         return kept[point]
 
-    return recall
+    return recall_result

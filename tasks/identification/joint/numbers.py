@@ -18,6 +18,8 @@ CALIBRATED = ("gain", FRICTION, "radius")
 """Groups of numbers that re-tuning moves."""
 AT_BOUND = 0.005
 """Share of its range within which a number lies at an end of it [1]."""
+WEAKEST = -0.9
+"""Change of the brake gain below which no brakes are left [1]."""
 SMOOTHED = 0.3
 """Time over which a deceleration is averaged before its peak is taken [s]."""
 
@@ -89,7 +91,7 @@ def choose_numbers(
     chosen = []
     engine = any(run.drive_torque is not None for run in campaign.runs)
     known = {*campaign.channels, *(["drive_torque"] if engine else [])}
-    weakest = weakest_gain(campaign)
+    weakest = find_weakest_gain(campaign)
     stops = sum(shows_brake_curve(model, rules) for model in models)
     for number in numbers:
         if not any(need in campaign.channels for need in number.needs):
@@ -153,18 +155,6 @@ def coasts_down(model: RunModel, rules: JointRules) -> bool:
     return not run.pressure.any() and not driven and lost
 
 
-def is_gain_unknown(campaign: Campaign, rules: JointRules) -> bool:
-    """Whether the brake's gain is to be found: the file hardly knows it, or the signal is no pressure.
-
-    Parameters
-    ----------
-    campaign : measured runs with their tolerances
-    rules : of the joint fit
-    """
-    tolerance = campaign.tolerances.session[SESSION.index(GAIN)]
-    return campaign.brake_signal != "brake_pressure" or tolerance >= rules.unknown_gain_tolerance
-
-
 def shows_brake_curve(model: RunModel, rules: JointRules) -> bool:
     """Whether a run brakes hard enough to show something of the brake's curve.
 
@@ -190,7 +180,7 @@ def _find_runs_on(
     return [model for model in models if number.weather in own and model.run.weather == number.weather]
 
 
-def weakest_gain(campaign: Campaign) -> float | None:
+def find_weakest_gain(campaign: Campaign) -> float | None:
     """Return by how much the brakes may be weaker than the file's [1]; None where a signal is no pressure of its own.
 
     Parameters
@@ -198,7 +188,7 @@ def weakest_gain(campaign: Campaign) -> float | None:
     campaign : measured runs with their tolerances
     """
     tolerance = campaign.tolerances.session[SESSION.index(GAIN)]
-    return -tolerance if campaign.brake_signal == "brake_pressure" else None
+    return max(-tolerance, WEAKEST) if campaign.brake_signal == "brake_pressure" else None
 
 
 def reaches_limit(model: RunModel, rules: JointRules, gain: float) -> bool:
@@ -210,7 +200,7 @@ def reaches_limit(model: RunModel, rules: JointRules, gain: float) -> bool:
     rules : of the joint fit
     gain : of the brakes beside the file's [1]
     """
-    scale = simulate_run(model, build_parameter_vector({GAIN: max(gain, -0.9)})).column("abs_scale_f")
+    scale = simulate_run(model, build_parameter_vector({GAIN: gain})).column("abs_scale_f")
     return bool(np.sum(scale < 1.0) * model.run.interval > rules.limited_time)
 
 

@@ -20,7 +20,7 @@ from tasks.identification.decision.held_out import find_worse_channels, is_predi
 from tasks.identification.decision.log_faults import tell_log_faults
 from tasks.identification.decision.missed import tell_miss
 from tasks.identification.inference.disturbance import Disturbance
-from tasks.identification.joint.calibration import fit_first_numbers
+from tasks.identification.joint.calibration import fit_first_numbers, is_gain_unknown
 from tasks.identification.joint.elimination import (
     Substitute,
     certain_numbers,
@@ -53,7 +53,6 @@ from tasks.identification.joint.numbers import (
     JointNumber,
     choose_numbers,
     free_numbers,
-    is_gain_unknown,
 )
 from tasks.identification.joint.stops import FITTED, Stop, complete_numbers, make_stop
 from tasks.identification.joint.words import tell_lumped_resistance, tell_rivals, tell_what_was_used
@@ -231,7 +230,8 @@ def _settle(
     train: Sequence[Stop], fitted: JointFit, starts: Sequence[Mapping[str, float]], rules: JointRules
 ) -> tuple[JointFit, tuple[int, int]]:
     """Return the best fit of the numbers left from several starts, and how many of these reach it."""
-    begins = [fitted.by_name, *({**starts[0], **grip} for grip in vary_grip(fitted)), *starts[1:]]
+    grips = vary_grip(fitted) or [{}]
+    begins = [fitted.by_name, *({**starts[0], **grip} for grip in grips), *starts[1:]]
     fits = fit_jointly(train, fitted.numbers, begins, scales=fitted.scales)
     near = rules.same_fit_errors * standard_errors(fits[0], rules)
     same = sum(bool(np.all(np.abs(f.values - fits[0].values) < near)) for f in fits)

@@ -1,5 +1,6 @@
 """Held-out runs decide which explanations of the training runs stay."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -8,7 +9,12 @@ from catalogs.decision_rules import load_decision_rules
 from catalogs.joint_numbers import load_joint_numbers
 from tasks.identification.decision.answer import ChannelError
 from tasks.identification.joint import held_out
-from tasks.identification.joint.held_out import drop_contradicted_rivals, makes_difference
+from tasks.identification.joint.held_out import (
+    drop_contradicted_rivals,
+    drop_what_predicts_worse,
+    makes_difference,
+)
+from tests.identification.joint.known_car import slow_brakes
 
 RULES = load_decision_rules().joint
 
@@ -36,3 +42,14 @@ def test_a_number_is_named_for_what_it_does_beside_retuning(after: float, number
     assert RULES.noticed_share == 0.85
     assert makes_difference(fitted, {"speed": error}, RULES, reasons) is is_named
     assert is_named or "a lag of 0.05 s, but beside re-tuning that makes no difference of 15%" in reasons[0]
+
+
+@pytest.mark.parametrize("share", ["better_prediction_share", "equal_prediction_share"])
+def test_the_rules_say_from_which_held_out_error_a_number_is_not_named(share: str):
+    found, reasons = slow_brakes(), list[str]()
+    rules = replace(RULES, **{share: 1000.0})
+    left = drop_what_predicts_worse(found.train, found.held_out, found.fitted, rules, reasons)
+    assert "lag" in found.fitted.by_name and "lag" not in left.by_name
+    assert reasons[0].startswith(
+        "the training runs suggest that the brakes follow the pressure with a lag of 0.0"
+    )

@@ -1,90 +1,22 @@
 """A joint fit finds what a car has, whatever its file starts from, and names nothing that its runs do not show."""
 
-from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
 
-from catalogs.decision_rules import load_decision_rules
 from catalogs.joint_numbers import load_joint_numbers
-from tasks.campaign.campaign import CHANNELS, SESSION, Campaign, Run
+from tasks.campaign.campaign import CHANNELS, SESSION
 from tasks.identification.decision.answer import NamedEffect
-from tasks.identification.decision.missed import compare_with_noise, tell_miss
 from tasks.identification.joint import verdict
 from tasks.identification.joint.calibration import needs_joint_fit
 from tasks.identification.joint.elimination import (
-    FORESEEN_SHARE,
     Substitute,
-    eliminate_uncertain_numbers,
-    foresee_falls,
-    refit_numbers,
-    standard_errors,
 )
-from tasks.identification.joint.held_out import drop_what_predicts_worse
-from tasks.identification.joint.numbers import JointNumber
 from tasks.identification.joint.verdict import JointTrace, judge_jointly
-from tasks.identification.rules import DecisionRules
 from tasks.vehicle.effects.table import build_parameter_vector
-from tasks.vehicle.parameters import Vehicle
+from tests.identification.joint.known_car import FEW, RULES, campaign_of, judge_car, slow_brakes
 from tests.identification.synthetic import SURFACE, TOLERANCES, VEHICLE, measured, plain_run
-
-SPEED_AND_ACCELERATION = ("speed", "longitudinal_acceleration")
-RULES = load_decision_rules()
-NUMBERS = load_joint_numbers()
-FEW = tuple(
-    n
-    for n in NUMBERS
-    if n.name in {"pressure_gain", "lag", "drag_area", "rolling_coefficient", "engine_torque", "mass"}
-)
-"""For what follows from a name, and not for how it is found: all sixteen take twice as long."""
-STOPS = ((29.0, 0.9), (17.0, 2.0), (22.0, 2.0))
-"""Speed [m/s] and brake pressure [MPa] of the runs; the last is held out."""
-
-
-def campaign_of(
-    truth: dict[str, float], channels: tuple[str, ...] = SPEED_AND_ACCELERATION, engine: float | None = None
-) -> Campaign:
-    """Return runs of a car with other numbers than the file's; an engine holds it back once the brake is on."""
-    runs = []
-    for i, (speed, pressure) in enumerate(STOPS):
-        run = shortened(plain_run(speed, pressure, name=f"run-{i}"))
-        if engine is not None:
-            run = replace(run, drive_torque=np.where(run.pressure > 0.0, engine, 0.0))
-        runs.append(
-            own_channels(
-                measured(run, build_parameter_vector(truth), 70 + i).run, channels, i == len(STOPS) - 1
-            )
-        )
-    return Campaign(
-        name="known", vehicle="paper-reference", runs=tuple(runs), channels=channels, content_hash="", split_hash="",
-        tolerances=replace(TOLERANCES, session=(0.2, *TOLERANCES.session[1:])),
-    )  # fmt: skip
-
-
-def shortened(run: Run) -> Run:
-    """One second of braking, after one without, says as much of the brakes as three."""
-    return replace(run, pressure=run.pressure[:200], response=run.response[:200])
-
-
-def own_channels(run: Run, channels: tuple[str, ...], held_out: bool) -> Run:
-    seen = np.array([name in channels for name in CHANNELS])
-    return replace(run, response=np.where(seen, run.response, 0.0), held_out=held_out)
-
-
-def judge(
-    campaign: Campaign,
-    vehicle: Vehicle = VEHICLE,
-    rules: DecisionRules = RULES,
-    numbers: Sequence[JointNumber] = NUMBERS,
-) -> JointTrace:
-    return judge_jointly(campaign, vehicle, SURFACE, numbers, rules)
-
-
-@cache
-def slow_brakes() -> JointTrace:
-    return judge(campaign_of({"pressure_gain": 0.3, "lag": 0.09}))
 
 
 def named_intervals(trace: JointTrace) -> dict[str, tuple[float, float, float]]:
@@ -109,7 +41,7 @@ def test_the_error_of_a_stop_that_no_fit_has_seen_falls_below_the_re_tuned_model
 
 def test_the_answer_does_not_depend_on_the_numbers_that_the_file_starts_from():
     truth = campaign_of({"pressure_gain": 0.3, "lag": 0.09})
-    found = named_intervals(judge(truth, replace(VEHICLE, brake_gain=0.4 * VEHICLE.brake_gain)))
+    found = named_intervals(judge_car(truth, replace(VEHICLE, brake_gain=0.4 * VEHICLE.brake_gain)))
     assert found.keys() == {"brake_lag", "retuned_pressure_gain"}
     assert found["brake_lag"][1] == pytest.approx(named_intervals(slow_brakes())["brake_lag"][1], abs=0.01)
     assert 0.4 * (1.0 + found["retuned_pressure_gain"][1]) == pytest.approx(1.3, abs=0.02)
@@ -123,16 +55,6 @@ def test_why_single_effects_could_not_be_told_is_the_first_reason():
     assert why not in judge_jointly(campaign_of({}), VEHICLE, SURFACE, numbers, RULES).verdict.reasons
 
 
-def test_no_claim_that_nothing_is_missing_stands_beside_a_stop_that_is_missed():
-    calm, strong = campaign_of({}), campaign_of({"pressure_gain": 0.8})
-    trace = judge(replace(calm, runs=(*calm.runs[:-1], strong.runs[-1])), numbers=FEW)
-    why = trace.verdict.disagreement
-    assert trace.verdict.verdict == "NOTHING" and trace.verdict.misses and trace.verdict.reasons[0] == why
-    missed = trace.verdict.error["speed"].after
-    assert why.startswith(f"the speed of the held-out runs is missed by {missed:.3g} m/s, ")
-    assert compare_with_noise(calm, trace.verdict.error) == pytest.approx(missed / 0.03, rel=0.2)
-
-
 def test_a_mass_and_frictions_are_wrong_by_the_tolerances_of_their_campaign():
     numbers = {n.name: n for n in load_joint_numbers()}
     campaign = campaign_of({})
@@ -142,47 +64,14 @@ def test_a_mass_and_frictions_are_wrong_by_the_tolerances_of_their_campaign():
     assert found == named | {"wet_friction": campaign.tolerances.friction}
 
 
-def test_noise_is_no_larger_than_what_a_fit_leaves_on_its_training_runs(monkeypatch):
-    """At 5 Hz whole stops counted as noise: nothing was missed beside 0.9 m/s."""
-    campaign, error = campaign_of({}), slow_brakes().verdict.error
-    noise = error["speed"].after / compare_with_noise(campaign, error)
-    for follows, taken in ((0.5 * noise, 0.5 * noise), (2.0 * noise, noise)):
-        assert compare_with_noise(campaign, error, follows) == pytest.approx(error["speed"].after / taken)
-    assert not judge(campaign).verdict.disagreement
-    monkeypatch.setattr(verdict, "measure_misfit", lambda *_: np.full(len(CHANNELS), 0.1 * noise))
-    assert judge(campaign).verdict.disagreement.startswith("the speed of the held-out runs is missed by")
-
-
-def test_a_stop_that_is_missed_beside_a_name_is_told():
-    assert not any("is missed by" in reason for reason in slow_brakes().verdict.reasons)
-    late, windy = campaign_of({"lag": 0.2}), campaign_of({"lag": 0.2, "drag_area": 3.0})
-    trace = judge(replace(late, runs=(*late.runs[:-1], windy.runs[-1])), numbers=FEW)
-    assert trace.verdict.effects and trace.verdict.disagreement == ""
-    said = "what is named is not all that the model lacks"
-    assert trace.verdict.reasons[-1].endswith(said)
-    # why single effects could not be told does not say that these stops are missed
-    foreign = replace(trace.verdict, reasons=("the runs disagree",), disagreement="the runs disagree")
-    assert tell_miss(foreign, late, RULES.joint.foreign_misfit).reasons[-1].endswith(said)
-    nothing = replace(foreign, effects=())
-    assert tell_miss(nothing, late, RULES.joint.foreign_misfit) is nothing
-
-
-def test_a_stop_that_is_just_missed_is_not_told_by_the_limit_itself():
-    campaign, told = campaign_of({}), slow_brakes().verdict
-    speed = told.error["speed"]
-    noise = speed.after / compare_with_noise(campaign, told.error)
-    missed = replace(told, error={**told.error, "speed": replace(speed, after=5.3 * noise)})
-    assert "5.3 times its noise (at most 5)" in tell_miss(missed, campaign, 5.0).reasons[-1]
-
-
 def test_a_gain_that_predicts_unseen_stops_is_told_and_grown_although_nothing_is_named():
-    trace = judge(campaign_of({"pressure_gain": 0.3}))
+    trace = judge_car(campaign_of({"pressure_gain": 0.3}))
     assert trace.verdict.verdict == "NOTHING" and trace.verdict.disagreement == ""
     assert [effect.name for effect in trace.calibrated] == ["retuned_pressure_gain"]
 
 
 def test_a_car_that_is_as_its_file_says_lacks_nothing():
-    trace = judge(campaign_of({}))
+    trace = judge_car(campaign_of({}))
     assert trace.verdict.verdict == "NOTHING" and not named_intervals(trace)
     assert trace.fitted.by_name["pressure_gain"] == pytest.approx(0.0, abs=0.01)
 
@@ -193,7 +82,7 @@ def test_a_number_of_the_file_is_wrong_only_beyond_as_many_tolerances_as_the_rul
     assert [e.name for e in near.verdict.effects] == ["brake_lag"]
     assert [e.name for e in near.calibrated] == ["retuned_pressure_gain"]
     strict = replace(RULES.joint, wrong_number_tolerances=1.0, same_fit_errors=1e-12)
-    trace = judge(campaign_of({"pressure_gain": 0.3, "lag": 0.09}), rules=replace(RULES, joint=strict))
+    trace = judge_car(campaign_of({"pressure_gain": 0.3, "lag": 0.09}), rules=replace(RULES, joint=strict))
     assert {e.name for e in trace.verdict.effects} == {"brake_lag", "retuned_pressure_gain"}
     assert trace.agreeing[0] == 1 < slow_brakes().agreeing[0]
 
@@ -214,7 +103,7 @@ def test_a_gain_that_the_file_claims_to_know_is_doubted_where_a_resistance_expla
     monkeypatch.setattr(verdict, "drop_contradicted_rivals", lambda _held_out, _fitted, found, _rules: found)
     campaign = campaign_of({"pressure_gain": 0.5})
     known = replace(campaign, tolerances=replace(TOLERANCES, session=(tolerance, *TOLERANCES.session[1:])))
-    told = judge(known, numbers=FEW).verdict
+    told = judge_car(known, numbers=FEW).verdict
     assert (told.verdict, [effect.name for effect in told.effects]) == (kind, ["retuned_pressure_gain"])
     assert [(of, rival.name) for of, rival in told.rivals] == [("retuned_pressure_gain", n) for n in rivals]
 
@@ -222,9 +111,9 @@ def test_a_gain_that_the_file_claims_to_know_is_doubted_where_a_resistance_expla
 def test_nothing_is_named_that_predicts_unseen_stops_worse_than_the_file(monkeypatch):
     """Grip 31 % below the file's was named, and the held-out stop missed by 0.8 m/s, which the file misses by 0.2."""
     campaign = campaign_of({"lag": 0.09})
-    assert judge(campaign, numbers=FEW).verdict.effects
+    assert judge_car(campaign, numbers=FEW).verdict.effects
     monkeypatch.setattr(verdict, "find_worse_channels", lambda _error, _limit, speed_decides: ["speed"])
-    trace = judge(campaign, numbers=FEW)
+    trace = judge_car(campaign, numbers=FEW)
     assert trace.verdict.error["speed"].after == trace.verdict.error["speed"].retuned
     assert trace.verdict.verdict == "NOTHING" and not trace.calibrated
     assert any("file predicts speed of the held-out runs better" in r for r in trace.verdict.reasons)
@@ -232,7 +121,7 @@ def test_nothing_is_named_that_predicts_unseen_stops_worse_than_the_file(monkeyp
 
 def test_what_makes_no_difference_beside_retuning_is_not_named(monkeypatch):
     monkeypatch.setattr(verdict, "makes_difference", lambda *_: False)
-    trace = judge(campaign_of({"lag": 0.09}), numbers=FEW)
+    trace = judge_car(campaign_of({"lag": 0.09}), numbers=FEW)
     assert trace.verdict.verdict == "NOTHING"
     assert trace.verdict.error["speed"].after == trace.verdict.error["speed"].retuned
 
@@ -243,29 +132,6 @@ def test_a_lag_that_would_have_to_be_longer_than_any_is_not_named():
     trace = judge_jointly(campaign_of({"lag": 0.09}), VEHICLE, SURFACE, numbers, RULES)
     assert "lag" not in trace.fitted.by_name
     assert any("lag of 0.05 s, as far as it may go: not named" in r for r in trace.verdict.reasons)
-
-
-def test_a_friction_of_which_the_runs_say_little_more_than_its_prior_goes():
-    """Beside a dead band the tyres were said to grip 0.36 % less, in an interval of all that is allowed."""
-    numbers = {n.name: n for n in load_joint_numbers()}
-    stops = slow_brakes().train
-    free = (numbers["pressure_gain"], numbers["friction"], numbers["lag"])
-    fitted = refit_numbers(stops, slow_brakes().fitted, free)
-    error = float(standard_errors(fitted, RULES.joint)[1])
-    for sigma, left in ((1.9 * error, {"pressure_gain", "lag"}), (2.1 * error, {n.name for n in free})):
-        wide = replace(fitted, numbers=(free[0], replace(free[1], sigma=sigma), free[2]))
-        assert {n.name for n in eliminate_uncertain_numbers(stops, wide, RULES.joint).numbers} == left
-
-
-def test_a_friction_that_the_runs_need_stays_though_they_tell_it_badly():
-    """On a race car brakes and tyres stand in for each other: without either the stops were missed by 20 m."""
-    numbers = {n.name: n for n in load_joint_numbers()}
-    stops, begun = slow_brakes().train, slow_brakes().fitted
-    gain, lag = numbers["pressure_gain"], replace(numbers["lag"], group="friction", removable=False)
-    fitted = refit_numbers(stops, begun, (gain, lag))
-    badly = replace(lag, sigma=float(standard_errors(fitted, RULES.joint)[1]))
-    left = eliminate_uncertain_numbers(stops, replace(fitted, numbers=(gain, badly)), RULES.joint)
-    assert left.numbers == (gain, badly)
 
 
 def test_tyres_at_their_limit_are_a_rival_of_the_brakes_curve():
@@ -290,7 +156,7 @@ def test_a_number_within_its_tolerance_that_other_physics_explains_as_well_is_na
         (of, rival.name) for of, rival in slow_brakes().verdict.rivals
     ]
     monkeypatch.setattr(verdict, "_tolerances", lambda *_: {"lag": 1.0, "pressure_gain": 0.2})
-    trace = judge(campaign_of({"lag": 0.09}))
+    trace = judge_car(campaign_of({"lag": 0.09}))
     assert trace.verdict.verdict == "SET" and [e.name for e in trace.verdict.effects] == ["brake_lag"]
     assert "brake_lag" not in [e.name for e in trace.calibrated]
 
@@ -299,64 +165,26 @@ def test_runs_that_never_coast_say_which_resistance_stands_for_all():
     """Air drag, the first in the list, stood for a motor's drag at 8 m/s, and the brake's curve was bent to fit."""
     truths = {"engine_torque": 400.0, "drag_area": 3.0, "engine_power": 40.0}
     for truth, lump in (({name: value}, name) for name, value in truths.items()):
-        fitted = judge(campaign_of(truth)).fitted
+        fitted = judge_car(campaign_of(truth)).fitted
         assert [n.name for n in fitted.numbers if n.group == "resistance"] == [lump]
-
-
-def test_a_fit_foresees_which_number_makes_good_what_another_did():
-    found = slow_brakes()
-    without = refit_numbers(
-        found.train, found.fitted, tuple(n for n in found.fitted.numbers if n.name != "lag")
-    )
-    late = [n for n in load_joint_numbers() if n.name in ("lag", "dead_time", "acceleration_scale")]
-    foreseen = dict(zip((n.name for n in late), foresee_falls(found.train, without, late), strict=True))
-    reached = {
-        n.name: without.cost - refit_numbers(found.train, without, (*without.numbers, n)).cost for n in late
-    }
-    least = FORESEEN_SHARE * reached["lag"]
-    assert min(foreseen["lag"], foreseen["dead_time"]) > 2.0 * least
-    assert foreseen["acceleration_scale"] < least and reached["acceleration_scale"] < 0.1 * reached["lag"]
-
-
-@pytest.mark.parametrize("share", ["better_prediction_share", "equal_prediction_share"])
-def test_the_rules_say_from_which_held_out_error_a_number_is_not_named(share: str):
-    found, reasons = slow_brakes(), list[str]()
-    rules = replace(RULES.joint, **{share: 1000.0})
-    left = drop_what_predicts_worse(found.train, found.held_out, found.fitted, rules, reasons)
-    assert "lag" in found.fitted.by_name and "lag" not in left.by_name
-    assert reasons[0].startswith(
-        "the training runs suggest that the brakes follow the pressure with a lag of 0.0"
-    )
-
-
-def test_what_the_training_runs_had_in_common_is_not_named_where_the_held_out_run_contradicts_it():
-    windy, calm = campaign_of({"lag": 0.09, "drag_area": 3.0}), campaign_of({"lag": 0.09})
-    everywhere = judge(windy, numbers=FEW)
-    assert {"brake_lag", "aerodynamic_drag"} <= named_intervals(everywhere).keys()
-    contradicted = judge(replace(windy, runs=(*windy.runs[:-1], calm.runs[-1])), numbers=FEW)
-    assert "aerodynamic_drag" not in named_intervals(contradicted)
-    assert any(
-        "suggest that the air holds" in reason and "not named" in reason
-        for reason in contradicted.verdict.reasons
-    )
 
 
 def test_an_engine_that_was_measured_is_an_input_and_no_effect():
     campaign = campaign_of({"pressure_gain": 0.3}, engine=-500.0)
-    with_engine = judge(campaign, numbers=FEW)
+    with_engine = judge_car(campaign, numbers=FEW)
     assert not with_engine.verdict.effects and named_intervals(with_engine).keys() == {
         "retuned_pressure_gain"
     }
     assert with_engine.fitted.by_name["pressure_gain"] == pytest.approx(0.3, abs=0.03)
     assert any("engine torque" in reason for reason in with_engine.verdict.reasons)
-    blind = judge(
+    blind = judge_car(
         replace(campaign, runs=tuple(replace(run, drive_torque=None) for run in campaign.runs)), numbers=FEW
     )
     assert "engine_braking" in named_intervals(blind)
 
 
 def test_speed_and_pressure_alone_name_a_delay_as_a_set():
-    trace = judge(campaign_of({"pressure_gain": 0.3, "lag": 0.12}, channels=("speed",)))
+    trace = judge_car(campaign_of({"pressure_gain": 0.3, "lag": 0.12}, channels=("speed",)))
     assert trace.verdict.verdict in ("FOUND", "SET")
     delays = {"brake_lag", "brake_dead_time"}
     assert delays & (named_intervals(trace).keys() | {rival.name for _, rival in trace.verdict.rivals})
@@ -382,5 +210,23 @@ def test_a_speed_of_the_wheels_is_compared_with_the_models_own_wheels():
     assert 0.1 < np.max(slip) < 2.0
     campaign = campaign_of({"lag": 0.09})
     runs = tuple(replace(run, speed_of_wheels=True) for run in campaign.runs)
-    told = judge(replace(campaign, runs=runs)).verdict.reasons
+    told = judge_car(replace(campaign, runs=runs)).verdict.reasons
     assert any("compared: speed of the wheels, longitudinal acceleration" in reason for reason in told)
+
+
+def test_what_the_training_runs_had_in_common_is_not_named_where_the_held_out_run_contradicts_it():
+    windy, calm = campaign_of({"lag": 0.09, "drag_area": 3.0}), campaign_of({"lag": 0.09})
+    everywhere = judge_car(windy, numbers=FEW)
+    assert {"brake_lag", "aerodynamic_drag"} <= named_intervals(everywhere).keys()
+    contradicted = judge_car(replace(windy, runs=(*windy.runs[:-1], calm.runs[-1])), numbers=FEW)
+    assert "aerodynamic_drag" not in named_intervals(contradicted)
+    assert any(
+        "suggest that the air holds" in reason and "not named" in reason
+        for reason in contradicted.verdict.reasons
+    )
+
+
+def test_every_start_is_tried_though_no_friction_is_free():
+    trace = slow_brakes()
+    assert "friction" not in trace.fitted.by_name
+    assert trace.agreeing == (4, 4)  # the fit itself, and three gains

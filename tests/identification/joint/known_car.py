@@ -1,0 +1,73 @@
+"""Stops of a car whose truth is known, and the verdict on it: what the tests of the joint fit start from."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from catalogs.decision_rules import load_decision_rules
+from catalogs.joint_numbers import load_joint_numbers
+from tasks.campaign.campaign import CHANNELS, Campaign, Run
+from tasks.identification.joint.numbers import JointNumber
+from tasks.identification.joint.verdict import JointTrace, judge_jointly
+from tasks.identification.rules import DecisionRules
+from tasks.vehicle.effects.table import build_parameter_vector
+from tasks.vehicle.parameters import Vehicle
+from tests.identification.synthetic import SURFACE, TOLERANCES, VEHICLE, measured, plain_run
+
+SPEED_AND_ACCELERATION = ("speed", "longitudinal_acceleration")
+RULES = load_decision_rules()
+NUMBERS = load_joint_numbers()
+FEW = tuple(
+    n
+    for n in NUMBERS
+    if n.name in {"pressure_gain", "lag", "drag_area", "rolling_coefficient", "engine_torque", "mass"}
+)
+"""For what follows from a name, and not for how it is found: all sixteen take twice as long."""
+STOPS = ((29.0, 0.9), (17.0, 2.0), (22.0, 2.0))
+"""Speed [m/s] and brake pressure [MPa] of the runs; the last is held out."""
+
+
+def campaign_of(
+    truth: dict[str, float], channels: tuple[str, ...] = SPEED_AND_ACCELERATION, engine: float | None = None
+) -> Campaign:
+    """Return runs of a car with other numbers than the file's; an engine holds it back once the brake is on."""
+    runs = []
+    for i, (speed, pressure) in enumerate(STOPS):
+        run = shortened(plain_run(speed, pressure, name=f"run-{i}"))
+        if engine is not None:
+            run = replace(run, drive_torque=np.where(run.pressure > 0.0, engine, 0.0))
+        runs.append(
+            own_channels(
+                measured(run, build_parameter_vector(truth), 70 + i).run, channels, i == len(STOPS) - 1
+            )
+        )
+    return Campaign(
+        name="known", vehicle="paper-reference", runs=tuple(runs), channels=channels, content_hash="", split_hash="",
+        tolerances=replace(TOLERANCES, session=(0.2, *TOLERANCES.session[1:])),
+    )  # fmt: skip
+
+
+def shortened(run: Run) -> Run:
+    """One second of braking, after one without, says as much of the brakes as three."""
+    return replace(run, pressure=run.pressure[:200], response=run.response[:200])
+
+
+def own_channels(run: Run, channels: tuple[str, ...], held_out: bool) -> Run:
+    seen = np.array([name in channels for name in CHANNELS])
+    return replace(run, response=np.where(seen, run.response, 0.0), held_out=held_out)
+
+
+def judge_car(
+    campaign: Campaign,
+    vehicle: Vehicle = VEHICLE,
+    rules: DecisionRules = RULES,
+    numbers: Sequence[JointNumber] = NUMBERS,
+) -> JointTrace:
+    return judge_jointly(campaign, vehicle, SURFACE, numbers, rules)
+
+
+@cache
+def slow_brakes() -> JointTrace:
+    return judge_car(campaign_of({"pressure_gain": 0.3, "lag": 0.09}))
