@@ -22,6 +22,8 @@ VARIABLE_UNITS = {
 }
 """Unit of each variable, as catalogue files write it."""
 VARIABLES = tuple(VARIABLE_UNITS)
+AXLE_VARIABLES = ("disc_temperature", "load_ratio", "suspension_travel", "suspension_speed")
+"""Variables of which each axle has its own value; all others are the vehicle's."""
 
 
 def format_unit(unit: str) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
-from tasks.vehicle.effects.ports import PORTS, VARIABLES
+from tasks.vehicle.effects.ports import AXLE_VARIABLES, PORTS, VARIABLES
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,11 +37,13 @@ class SlotTables(NamedTuple):
     keys : int64 [N, 2] place of port and variable in `PORTS` and `VARIABLES`
     grids : float64 [N, 2] origin and spacing [unit of the variable]
     tables : float64 [N, K] values; short tables go on with their last one [unit of the port]
+    by_axle : whether a variable is an axle's own, so that the sums differ between the axles
     """
 
     keys: NDArray[np.int64]
     grids: NDArray[np.float64]
     tables: NDArray[np.float64]
+    by_axle: bool
 
 
 def pack_slots(slots: Sequence[Slot]) -> SlotTables:
@@ -58,7 +60,8 @@ def pack_slots(slots: Sequence[Slot]) -> SlotTables:
     for table, slot in zip(tables, slots, strict=True):
         table[:] = slot.values[-1]
         table[: len(slot.values)] = slot.values
-    return SlotTables(keys.reshape(-1, 2), grids.reshape(-1, 2), tables)
+    by_axle = any(s.variable in AXLE_VARIABLES for s in slots)
+    return SlotTables(keys.reshape(-1, 2), grids.reshape(-1, 2), tables, by_axle)
 
 
 @register_jitable(cache=True, error_model="numpy", forceinline=True)

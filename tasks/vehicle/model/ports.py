@@ -106,10 +106,12 @@ def compute_ports(
             collect_form_variables(speed, ground_f.load / body.static_f, strut_f, memory.front, instant),
             forms,
         )
-        forms_r = sum_slots(
-            collect_form_variables(speed, ground_r.load / body.static_r, strut_r, memory.rear, instant),
-            forms,
-        )
+        forms_r = forms_f
+        if forms.by_axle:
+            forms_r = sum_slots(
+                collect_form_variables(speed, ground_r.load / body.static_r, strut_r, memory.rear, instant),
+                forms,
+            )
     if standing:
         front, rear = (
             compute_standing_axle(ground_f, strut_f, wheels),
