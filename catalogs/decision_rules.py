@@ -19,6 +19,7 @@ class JointRulesEntry(CatalogueEntry):
     unknown_gain_tolerance: Level
     fewest_runs: Count
     foreign_misfit: Level
+    questioned_misfit: Level
     noticed_share: Share
     driven_acceleration: Annotated[Scalar, require_quantity("m s-2", above=0)]
     brake_onset_share: Share
@@ -63,7 +64,6 @@ class DecisionRulesEntry(CatalogueEntry):
     relinearised_candidates: Count
     relinearisation_change: Share
     retune_pull: Level
-    runaway_pull: Level
     negligible_share: Level
     relinearisation_pull: Level
     disagreement: Level

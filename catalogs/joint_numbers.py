@@ -22,7 +22,7 @@ class JointNumberEntry(CatalogueEntry):
     lower: Limit
     upper: Limit
     unit: Text
-    group: Literal["gain", "friction", "radius", "delay", "curve", "resistance", "sensor", "mass"]
+    group: Literal["gain", "friction", "grip", "radius", "delay", "curve", "resistance", "sensor", "mass"]
     removable: bool
     needs: Annotated[tuple[Text, ...], Field(min_length=1)]
     source: Text

@@ -1,13 +1,11 @@
-"""Two searches for what a model lacks, and which of them judges a campaign."""
+"""The two searches of a verdict, with the rules and tables that they take from the catalogues."""
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.joint_numbers import load_joint_numbers
 from tasks.campaign.campaign import Campaign
-from tasks.identification.decision.disputes import ForeignCarError
 from tasks.identification.decision.verdict import Trace
-from tasks.identification.joint.calibration import needs_joint_fit
-from tasks.identification.joint.second_look import find_effects_in_two_looks
-from tasks.identification.joint.verdict import JointTrace, judge_jointly
+from tasks.identification.joint.two_searches import judge_by_two_searches
+from tasks.identification.joint.verdict import JointTrace
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.parameters import Vehicle
@@ -19,7 +17,7 @@ SEARCHES = ("one effect at a time", "joint fit")
 def judge_campaign(
     measured: Campaign, model: Vehicle, road: SurfaceParameters, effects: tuple[Effect, ...]
 ) -> Trace | JointTrace:
-    """Look for one effect at a time where the car is the model's but for its brake gain; else fit all numbers at once.
+    """Return what a model lacks, by the rules and the numbers of the catalogues.
 
     Parameters
     ----------
@@ -27,12 +25,5 @@ def judge_campaign(
     model, road : the model that is judged
     effects : library of candidates
     """
-    rules, numbers = load_decision_rules(), load_joint_numbers()
-    disagreement = ""
-    if not needs_joint_fit(measured, rules.joint):
-        single = tuple(effect for effect in effects if effect.alone)
-        try:
-            return find_effects_in_two_looks(measured, model, road, single, numbers, rules)
-        except ForeignCarError as error:
-            disagreement = str(error)
-    return judge_jointly(measured, model, road, numbers, rules, disagreement=disagreement)
+    single = tuple(effect for effect in effects if effect.alone)
+    return judge_by_two_searches(measured, model, road, single, load_joint_numbers(), load_decision_rules())

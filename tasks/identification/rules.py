@@ -12,6 +12,7 @@ class JointRules:
     unknown_gain_tolerance : tolerance of the brake gain from which a vehicle file hardly knows its car [1]
     fewest_runs : training or held-out runs below which effects cannot be screened one by one [1]
     foreign_misfit : misfit of a calibrated car over its sensors' noise from which its equations are not the model's [1]
+    questioned_misfit : error of the held-out speed over its noise from which a name is held against a joint fit [1]
     noticed_share : share of some channel's held-out error that a name must leave at most, where the gain was not known
         [1]
     driven_acceleration : mean drive force before the brake, over the mass, from which a car is driven [m s-2]
@@ -37,6 +38,7 @@ class JointRules:
     unknown_gain_tolerance: float
     fewest_runs: int
     foreign_misfit: float
+    questioned_misfit: float
     noticed_share: float
     driven_acceleration: float
     brake_onset_share: float
@@ -87,7 +89,6 @@ class DecisionRules:
     relinearisation_change : relative change of parameters below which a second relinearisation is not needed [1]
     retune_pull : pull of a session nuisance, in prior sigmas, from which it is a wrong number of the vehicle [1]
     negligible_share : change of a number that no session re-tunes, below which it is not wrong [1]
-    runaway_pull : pull from which a search of single effects that misses the stops has run away [1]
     relinearisation_pull : pull, in prior sigmas, from which the runs are linearised anew at the session [1]
     disagreement : inflation of a named effect from which a single form is compared with it; of the runs without any
         name, from which speed and accelerometer are asked alone [1]
@@ -130,7 +131,6 @@ class DecisionRules:
     relinearised_candidates: int
     relinearisation_change: float
     retune_pull: float
-    runaway_pull: float
     negligible_share: float
     relinearisation_pull: float
     disagreement: float

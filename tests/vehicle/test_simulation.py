@@ -10,12 +10,15 @@ from tasks.errors import InputError
 from tasks.surface.road_profile import RoadHazard
 from tasks.vehicle.brake import compute_brake_pressure
 from tasks.vehicle.effects.grown import apply_effects
-from tasks.vehicle.effects.slots import Slot
+from tasks.vehicle.effects.ports import AXLE_VARIABLES, VARIABLES
+from tasks.vehicle.effects.slots import Slot, pack_slots
 from tasks.vehicle.effects.table import EFFECT_TABLE, EFFECT_UNITS, PARAMETERS
+from tasks.vehicle.model.axle_ports import collect_form_variables
 from tasks.vehicle.model.brake_input import make_command_input, make_trace_input
 from tasks.vehicle.model.chassis import Conditions
 from tasks.vehicle.model.simulation import Recording, simulate
-from tasks.vehicle.model.states import STATE_WIDTH, pack_state, unpack_state
+from tasks.vehicle.model.states import STATE_WIDTH, AxleMemory, Instant, pack_state, unpack_state
+from tasks.vehicle.model.vertical_ports import Strut
 from tasks.vehicle.parameters import compute_surface_response
 from tests.vehicle.conftest import command
 
@@ -102,6 +105,35 @@ def test_a_branch_differs_from_where_something_else_acts(run):
     branch = run(samples=150, start=whole.states[150], slots=(pulse,))
     np.testing.assert_array_equal(branch.history, run(slots=(pulse,)).history[150:])
     assert branch.column("speed")[-1] < whole.column("speed")[-1] - 0.05
+
+
+@pytest.mark.parametrize(
+    ("variable", "origin", "spacing"), [("load_ratio", 0.98, 0.01), ("suspension_travel", 0.0, 0.001)]
+)
+def test_a_form_of_an_axles_own_variable_acts_on_that_axle_alone(run, variable, origin, spacing):
+    """While a car brakes, its rear axle is light and its rear springs are long: the form acts there."""
+    values = np.array([0.1, 0.0] if variable == "load_ratio" else [0.0, 0.1])
+    form = Slot(port="brake_torque", variable=variable, origin=origin, spacing=spacing, values=values)
+    plain, changed = run(conditions=Conditions()), run(conditions=Conditions(), slots=(form,))
+    free = (plain.column("abs_scale_f") == 1.0) & (changed.column("abs_scale_r") == 1.0)
+    braking = free & (plain.column("brake_pressure_mpa") > 1.0)
+    assert np.count_nonzero(braking) > 20
+    for axle, more in (("f", 1.0), ("r", 1.1)):
+        torque = f"brake_torque_{axle}"
+        np.testing.assert_allclose(
+            changed.column(torque)[braking], more * plain.column(torque)[braking], rtol=1e-3
+        )
+
+
+def test_what_two_axles_can_differ_in_is_what_a_table_says():
+    instant = Instant(1.0, 2.0, 3.0, 4.0, False, False, 0.0)
+    front = collect_form_variables(20.0, 1.2, Strut(0.01, 0.2, 0.0), AxleMemory(0.0, 0.0, 50.0), instant)
+    rear = collect_form_variables(20.0, 0.8, Strut(0.02, 0.3, 0.0), AxleMemory(0.0, 0.0, 30.0), instant)
+    differ = [name for name, a, b in zip(VARIABLES, front, rear, strict=True) if a != b]
+    assert differ == list(AXLE_VARIABLES)
+    flat = [Slot(port="friction", variable=v, origin=0.0, spacing=1.0, values=np.zeros(2)) for v in VARIABLES]
+    assert [slot.variable for slot in flat if pack_slots([slot]).by_axle] == differ
+    assert pack_slots(flat).by_axle
 
 
 def test_a_grade_takes_its_share_of_gravity_and_pitches_the_body_as_braking_does(vehicle, run):

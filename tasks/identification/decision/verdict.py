@@ -20,14 +20,13 @@ from tasks.identification.decision.correlation import correlate_residual_with_pr
 from tasks.identification.decision.discovery import search_library_and_forms
 from tasks.identification.decision.disputes import settle_disputes
 from tasks.identification.decision.experiment import plan_next_experiment
-from tasks.identification.decision.held_out import compute_held_out_errors, is_predicted_better
+from tasks.identification.decision.held_out import compute_held_out_errors, is_lowered
 from tasks.identification.decision.intervals import (
     compute_curvature_interval,
     compute_profile_interval,
     refit_named,
 )
 from tasks.identification.decision.log_faults import tell_log_faults
-from tasks.identification.decision.missed import tell_miss
 from tasks.identification.decision.objection import object_to_last
 from tasks.identification.decision.rivals import RivalComparison, compare_with_rivals
 from tasks.identification.decision.screening import can_show, find_detectable_sizes
@@ -205,8 +204,7 @@ def find_missing_effects(
         forked=evidence.forked,
         reasons=tuple(reasons),
     )
-    verdict = tell_miss(verdict, campaign, rules.joint.foreign_misfit)
-    told = named or is_predicted_better(error)
+    told = named or is_lowered(error["speed"])
     return Trace(
         verdict=verdict,
         start=start,

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from tasks.identification.decision.answer import ChannelError, NamedEffect
 from tasks.identification.decision.attribution import Candidate
-from tasks.identification.decision.held_out import is_predicted_better
+from tasks.identification.decision.held_out import is_lowered
 from tasks.identification.inference.hypothesis import moves_speed
 from tasks.vehicle.effects.library import Effect, say_number
 
@@ -57,9 +57,9 @@ def tell_verdict(
             if misses
             else "These runs show nothing that the model lacks"
         )
-        if not own or not is_predicted_better(error) or not _is_told_apart(error["speed"]):
+        if not own or not is_lowered(error["speed"]) or not _is_told_apart(error["speed"]):
             return f"{nothing}."
-        figures = {name: e for name, e in manoeuvres.items() if e.change_high < 0.0}
+        figures = {name: e for name, e in manoeuvres.items() if is_lowered(e)}
         return (
             f"{nothing}; its own numbers, fitted to these runs ({own}), take the error"
             f" {_say_errors({'speed': error['speed'], **figures})}, on runs to which no number was fitted."

@@ -14,6 +14,8 @@ from tasks.vehicle.parameters import compute_surface_response
 
 GAIN = "pressure_gain"
 FRICTION = "friction"
+GRIP = "grip"
+"""Group of what makes the tyres' limit depend on how they are driven."""
 CALIBRATED = ("gain", FRICTION, "radius")
 """Groups of numbers that re-tuning moves."""
 AT_BOUND = 0.005
@@ -100,7 +102,7 @@ def choose_numbers(
             continue  # discs of one temperature show no fade
         if number.group == "curve" and stops < rules.fewest_curve_stops:
             continue  # one stop gives a gain and a delay, and no curve
-        if number.group == FRICTION and not any(
+        if number.group in (FRICTION, GRIP) and not any(
             saturates_tyres(model, rules) or (weakest is not None and reaches_limit(model, rules, weakest))
             for model in _find_runs_on(number, numbers, models)
         ):
@@ -111,7 +113,10 @@ def choose_numbers(
                 number, sigma=number.sigma * max(largest, rules.least_pressure_range), of_pressure=False
             )
         chosen.append(
-            replace(number, stands_in=bool(number.free_with) and known.isdisjoint(number.free_with))
+            replace(
+                number,
+                stands_in=number.stands_in or (bool(number.free_with) and known.isdisjoint(number.free_with)),
+            )
         )
     return tuple(chosen)
 
@@ -169,7 +174,7 @@ def shows_brake_curve(model: RunModel, rules: JointRules) -> bool:
 def _find_runs_on(
     number: JointNumber, numbers: Sequence[JointNumber], models: Sequence[RunModel]
 ) -> list[RunModel]:
-    """Return the runs that tell a friction: those of its weather, and of what no other number stands for.
+    """Return the runs that tell a number of the tyres' limit: those of its weather, and of what no other stands for.
 
     Runs of one kind of weather alone tell the friction that is common to all.
     """
@@ -177,7 +182,9 @@ def _find_runs_on(
     own = {n.weather for n in numbers if n.weather is not None} if len(kinds) > 1 else set()
     if number.weather is None:
         return [model for model in models if model.run.weather not in own]
-    return [model for model in models if number.weather in own and model.run.weather == number.weather]
+    if number.group == FRICTION and number.weather not in own:
+        return []
+    return [model for model in models if model.run.weather == number.weather]
 
 
 def find_weakest_gain(campaign: Campaign) -> float | None:

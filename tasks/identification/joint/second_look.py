@@ -3,16 +3,13 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
-
-from tasks.campaign.campaign import SESSION, Campaign
+from tasks.campaign.campaign import Campaign
 from tasks.identification.decision.disputes import ForeignCarError, moves_body_alone
 from tasks.identification.decision.held_out import (
     compare_with_retuned,
     compute_held_out_errors,
     find_worse_channels,
 )
-from tasks.identification.decision.missed import compare_with_noise
 from tasks.identification.decision.screening import compute_inflation
 from tasks.identification.decision.verdict import Trace
 from tasks.identification.decision.words import join_phrases
@@ -77,30 +74,7 @@ def find_effects_in_two_looks(
         why = f"the runs disagree with the model by a factor of {disagreement:.1f} (noise alone gives 1)"
         if second := _look_along_road(campaign, search, rules, why):
             return second
-    if runaway := _tell_runaway(first, campaign, rules):
-        raise ForeignCarError(runaway)
     return first
-
-
-def _tell_runaway(found: Trace, campaign: Campaign, rules: DecisionRules) -> str:
-    """Return what is wrong with the numbers of the session where nothing is named and they still miss the stops.
-
-    Runs that no effect explains push the numbers that are free in every fit to where no car of the file has them, or to
-    where held-out runs are predicted much worse than by re-tuning. Empty text where they do neither.
-    """
-    verdict, base = found.verdict, found.end.base
-    if compare_with_noise(campaign, verdict.error) <= rules.joint.foreign_misfit:
-        return ""
-    most = int(np.argmax(base.pulls))
-    if base.pulls[most] > rules.runaway_pull:
-        return f"single effects leave {SESSION[most]} {base.pulls[most]:.0f} tolerances off, and the stops are missed"
-    speed = verdict.error["speed"]
-    if speed.after > rules.retuned_limit * speed.retuned:
-        return (
-            f"a search of single effects predicts the speed of held-out stops worse ({speed.after:.3g} m/s) than"
-            f" re-tuning ({speed.retuned:.3g})"
-        )
-    return ""
 
 
 def _look_along_road(

@@ -16,7 +16,7 @@ from tasks.identification.decision.answer import (
     is_within_tolerance,
     make_estimate,
 )
-from tasks.identification.decision.held_out import find_worse_channels, is_predicted_better
+from tasks.identification.decision.held_out import find_worse_channels, is_lowered
 from tasks.identification.decision.log_faults import tell_log_faults
 from tasks.identification.decision.missed import tell_miss
 from tasks.identification.inference.disturbance import Disturbance
@@ -195,7 +195,7 @@ def judge_jointly(
     verdict = tell_miss(verdict, campaign, joint.foreign_misfit, follows)
     return JointTrace(
         verdict=verdict,
-        calibrated=calibrated if effects or is_predicted_better(error) else (),
+        calibrated=calibrated if effects or is_lowered(error["speed"]) else (),
         fitted=fitted,
         errors=standard_errors(fitted, joint),
         train=train,

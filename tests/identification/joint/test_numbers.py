@@ -189,6 +189,18 @@ def test_a_friction_is_free_for_each_kind_of_weather_whose_stops_come_to_the_fil
     assert frictions == free
 
 
+@pytest.mark.parametrize(
+    ("kinds", "told"),
+    [(("dry",), False), (("rain",), True), (("dry", "rain"), True), (("dry", "snow"), False), ((), False)],
+)
+def test_a_fall_of_wet_friction_with_speed_is_never_free_and_stands_in_for_a_lower_one(kinds, told):
+    """A car whose wet tyres lose grip with speed was told that its wet roads grip 13 % less, and nothing else."""
+    models = [at_the_limit()[kind] for kind in kinds] or [stops()[0]]
+    shown = choose_numbers(load_joint_numbers(), campaign_of(models), models, RULES)
+    assert [n.stands_in for n in shown if n.name == "wet_speed"] == [True] * told
+    assert not any(n.name == "wet_speed" for numbers in free_numbers(shown, models, RULES) for n in numbers)
+
+
 def test_a_stop_at_the_files_limit_is_as_long_as_the_catalogue_says_for_the_weakest_brakes_that_the_file_allows():
     full = [at_the_limit()["dry"]]
     assert "friction" in chosen_priors(full, RULES)

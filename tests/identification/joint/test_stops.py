@@ -19,7 +19,7 @@ NUMBERS = [number.name for number in load_joint_numbers()]
 @pytest.mark.parametrize("name", [*NUMBERS, *OFFSETS])
 def test_what_only_instruments_show_leaves_the_motion_as_it_is(name: str, engine: float | None):
     """Its derivative takes no simulation of its own, so that to call another number so would lose the number."""
-    run = plain_run(25.0, 2.0)
+    run = replace(plain_run(25.0, 2.0), weather="rain", precipitation_mm_h=2.0)
     if engine is not None:
         run = replace(run, drive_torque=np.full(len(run.pressure), engine))
     stop = make_stop(

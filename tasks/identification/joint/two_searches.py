@@ -1,0 +1,67 @@
+"""Two searches for what a model lacks: which of them judges a campaign, and where both do, the better prediction."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from tasks.campaign.campaign import Campaign
+from tasks.identification.decision.disputes import ForeignCarError
+from tasks.identification.decision.missed import compare_with_noise, tell_miss
+from tasks.identification.decision.verdict import Trace
+from tasks.identification.decision.words import join_phrases
+from tasks.identification.joint.calibration import needs_joint_fit
+from tasks.identification.joint.numbers import JointNumber
+from tasks.identification.joint.second_look import find_effects_in_two_looks
+from tasks.identification.joint.verdict import JointTrace, judge_jointly
+from tasks.identification.rules import DecisionRules
+from tasks.surface.state import SurfaceParameters
+from tasks.vehicle.effects.library import Effect
+from tasks.vehicle.parameters import Vehicle
+
+
+def judge_by_two_searches(
+    campaign: Campaign,
+    vehicle: Vehicle,
+    surface: SurfaceParameters,
+    effects: tuple[Effect, ...],
+    numbers: Sequence[JointNumber],
+    rules: DecisionRules,
+) -> Trace | JointTrace:
+    """Look for one effect at a time where the car is the model's but for its brake gain; else fit all numbers at once.
+
+    Where the first misses the held-out stops and names nothing, or names something and misses them by much more, both
+    judge, and the better prediction counts.
+
+    Parameters
+    ----------
+    campaign : measured runs with their split
+    vehicle, surface : the model that is judged
+    effects : library of candidates of the search for one effect at a time
+    numbers : that a joint fit may move
+    rules : of the decision
+    """
+    joint = rules.joint
+
+    def fit_all(why: str = "") -> JointTrace:
+        return judge_jointly(campaign, vehicle, surface, numbers, rules, disagreement=why)
+
+    if needs_joint_fit(campaign, joint):
+        return fit_all()
+    try:
+        found = find_effects_in_two_looks(campaign, vehicle, surface, effects, tuple(numbers), rules)
+    except ForeignCarError as error:
+        return fit_all(str(error))
+    single = replace(found, verdict=tell_miss(found.verdict, campaign, joint.foreign_misfit))
+    names, left = [effect.name for effect in single.verdict.effects], single.verdict.error
+    followed = joint.questioned_misfit if names else joint.foreign_misfit
+    if compare_with_noise(campaign, left) <= followed:
+        return single
+    fitted = fit_all()
+    before, now = left["speed"].after, fitted.verdict.error["speed"].after
+    if now >= joint.better_prediction_share * before:
+        return single
+    found_by_one = join_phrases(names or ["nothing"])
+    reason = (
+        f"a search of single effects names {found_by_one} and leaves an error of {before:.3g} m/s in the speed of"
+        f" held-out stops, and a joint fit of all numbers one of {now:.3g} m/s"
+    )
+    return replace(fitted, verdict=replace(fitted.verdict, reasons=(reason, *fitted.verdict.reasons)))

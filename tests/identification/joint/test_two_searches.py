@@ -1,0 +1,104 @@
+"""Which search judges a campaign: by what is known of the car, whether its runs agree, and what predicts better."""
+
+from dataclasses import replace
+
+import pytest
+
+from tasks.campaign.campaign import Campaign
+from tasks.identification.decision.answer import Verdict
+from tasks.identification.decision.disputes import ForeignCarError
+from tasks.identification.decision.verdict import Trace
+from tasks.identification.joint import two_searches
+from tasks.identification.joint.two_searches import judge_by_two_searches
+from tasks.identification.joint.verdict import JointTrace
+from tests.identification.joint.known_car import RULES, SURFACE, VEHICLE, campaign_of, slow_brakes
+
+NOISE, LIMIT, SHARE = 0.03, RULES.joint.foreign_misfit, RULES.joint.better_prediction_share
+CAMPAIGN = campaign_of({})
+"""Its speed has a noise of `NOISE`."""
+
+
+def answer(error: float, names: bool = False) -> Verdict:
+    """A verdict whose speed misses held-out runs by an error [m/s]."""
+    told = slow_brakes().verdict
+    return replace(
+        told, effects=told.effects[:1] if names else (), verdict="FOUND" if names else "NOTHING",
+        error={"speed": replace(told.error["speed"], after=error)}, reasons=("as it was",), disagreement="",
+    )  # fmt: skip
+
+
+def judge(
+    monkeypatch, single: Verdict | Exception, joint: Verdict, *, says_little: bool = False
+) -> tuple[Trace | JointTrace, list[str]]:
+    """The verdict where both searches answer as given, and why joint fits were asked for."""
+    asked: list[str] = []
+
+    def find_one(*_: object) -> Trace:
+        if isinstance(single, Exception):
+            raise single
+        return Trace(verdict=single, start=None, end=None, compared=())
+
+    def fit_all(*_: object, disagreement: str) -> JointTrace:
+        asked.append(disagreement)
+        return replace(slow_brakes(), verdict=joint)
+
+    monkeypatch.setattr(two_searches, "needs_joint_fit", lambda *_: says_little)
+    monkeypatch.setattr(two_searches, "find_effects_in_two_looks", find_one)
+    monkeypatch.setattr(two_searches, "judge_jointly", fit_all)
+    return judge_by_two_searches(CAMPAIGN, VEHICLE, SURFACE, (), (), RULES), asked
+
+
+def test_a_car_that_is_hardly_known_and_runs_that_disagree_are_left_to_the_joint_fit(monkeypatch):
+    foreign = ForeignCarError("the runs disagree")
+    for single, says_little, why in ((answer(0.0), True, ""), (foreign, False, "the runs disagree")):
+        trace, asked = judge(monkeypatch, single, answer(1.0), says_little=says_little)
+        assert isinstance(trace, JointTrace) and asked == [why]
+
+
+def test_stops_that_are_followed_are_left_to_the_single_search_and_a_name_leaves_more_than_nothing_named(
+    monkeypatch,
+):
+    """Right names leave up to 15 times the noise; a dead time of 0.013 s stood beside stops missed by 10 m."""
+    for most, names in ((LIMIT, False), (RULES.joint.questioned_misfit, True)):
+        for share, by_both in ((0.8, False), (1.2, True)):
+            trace, asked = judge(monkeypatch, answer(share * most * NOISE, names), answer(0.0))
+            assert isinstance(trace, JointTrace) is by_both and len(asked) == by_both
+            named = trace.verdict.reasons[0].split(" names ")[-1].split(" and ")[0]
+            assert named == ("brake_lag" if names else "nothing") or not by_both
+
+
+@pytest.mark.parametrize(("share", "is_better"), [(0.99 * SHARE, True), (1.01 * SHARE, False)])
+def test_where_nothing_is_named_and_stops_are_missed_the_better_prediction_counts(
+    monkeypatch, share, is_better
+):
+    """A log of 10 Hz whose driver held his speed: nothing beside a metre, where the joint fit saw its pads."""
+    missed = 2.0 * LIMIT * NOISE
+    trace, asked = judge(monkeypatch, answer(missed), answer(share * missed, names=True))
+    assert isinstance(trace, JointTrace) is is_better and asked == [""]
+    if is_better:
+        reason, *rest = trace.verdict.reasons
+        assert (
+            f"leaves an error of {missed:.3g} m/s" in reason and f"one of {share * missed:.3g} m/s" in reason
+        )
+        # the car is the model's, with other numbers: nothing says that its runs disagree
+        assert rest == ["as it was"] and trace.verdict.disagreement == ""
+    else:
+        assert trace.verdict.misses and "is missed by" in trace.verdict.disagreement
+
+
+def test_a_miss_is_told_beside_a_name_too(monkeypatch):
+    trace, _ = judge(monkeypatch, answer(2.0 * LIMIT * NOISE, names=True), answer(0.0))
+    assert trace.verdict.misses and trace.verdict.reasons[-1].endswith("not all that the model lacks")
+
+
+def test_a_miss_is_measured_by_the_noise_of_whole_runs(monkeypatch):
+    """A stop that is cut at its brake has no quiet part: its braking passed for noise of 0.9 m/s."""
+    seen = []
+
+    def tell(verdict: Verdict, campaign: Campaign, limit: float) -> Verdict:
+        seen.append((campaign, limit))
+        return verdict
+
+    monkeypatch.setattr(two_searches, "tell_miss", tell)
+    judge(monkeypatch, answer(0.0), answer(0.0))
+    assert seen == [(CAMPAIGN, LIMIT)]
