@@ -29,7 +29,8 @@ def judge_by_two_searches(
     """Look for one effect at a time where the car is the model's but for its brake gain; else fit all numbers at once.
 
     Where the first misses the held-out stops and names nothing, or names something and misses them by much more, both
-    judge, and the better prediction counts.
+    judge, and the better prediction counts. Numbers of the vehicle's file alone are no discovery then: the whole
+    library was held against the runs, and what it does not hold may stand behind them.
 
     Parameters
     ----------
@@ -41,8 +42,10 @@ def judge_by_two_searches(
     """
     joint = rules.joint
 
-    def fit_all(why: str = "") -> JointTrace:
-        return judge_jointly(campaign, vehicle, surface, numbers, rules, disagreement=why)
+    def fit_all(why: str = "", *, names_numbers: bool = True) -> JointTrace:
+        return judge_jointly(
+            campaign, vehicle, surface, numbers, rules, disagreement=why, names_numbers=names_numbers
+        )
 
     if needs_joint_fit(campaign, joint):
         return fit_all()
@@ -55,7 +58,7 @@ def judge_by_two_searches(
     followed = joint.questioned_misfit if names else joint.foreign_misfit
     if compare_with_noise(campaign, left) <= followed:
         return single
-    fitted = fit_all()
+    fitted = fit_all(names_numbers=False)
     before, now = left["speed"].after, fitted.verdict.error["speed"].after
     if now >= joint.better_prediction_share * before:
         return single

@@ -104,6 +104,7 @@ def judge_jointly(
     rules: DecisionRules,
     *,
     disagreement: str = "",
+    names_numbers: bool = True,
     progress: Callable[[str], None] = lambda stage: None,
 ) -> JointTrace:
     """Calibrate a car on its training runs, take away what does not earn its place, and name what is left.
@@ -115,6 +116,7 @@ def judge_jointly(
     numbers : that a fit may move
     rules : of the decision
     disagreement : why single effects could not be told; empty where they were not looked for
+    names_numbers : whether numbers of the vehicle's file may be named without any other name; else they are calibrated
     progress : called with the name of each stage as it begins
     """
     joint = rules.joint
@@ -163,6 +165,8 @@ def judge_jointly(
     disputed = {substitute.of for substitute in substitutes}
     effects += [e for e in calibrated if e.parameters[0].name in disputed]
     calibrated = tuple(e for e in calibrated if e not in effects)
+    if not names_numbers and all(e.effect_class == "retune" for e in effects):
+        effects, calibrated, substitutes = [], (*effects, *calibrated), ()
     rivals = _name_rivals(fitted, substitutes, effects, joint)
     kind = _kind(effects, rivals)
     reasons += tell_what_was_used(campaign, train, agreeing, joint)

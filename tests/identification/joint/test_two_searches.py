@@ -29,17 +29,17 @@ def answer(error: float, names: bool = False) -> Verdict:
 
 def judge(
     monkeypatch, single: Verdict | Exception, joint: Verdict, *, says_little: bool = False
-) -> tuple[Trace | JointTrace, list[str]]:
-    """The verdict where both searches answer as given, and why joint fits were asked for."""
-    asked: list[str] = []
+) -> tuple[Trace | JointTrace, list[tuple[str, bool]]]:
+    """The verdict where both searches answer so; why joint fits were asked for, and if numbers alone may be named."""
+    asked: list[tuple[str, bool]] = []
 
     def find_one(*_: object) -> Trace:
         if isinstance(single, Exception):
             raise single
         return Trace(verdict=single, start=None, end=None, compared=())
 
-    def fit_all(*_: object, disagreement: str) -> JointTrace:
-        asked.append(disagreement)
+    def fit_all(*_: object, disagreement: str, names_numbers: bool) -> JointTrace:
+        asked.append((disagreement, names_numbers))
         return replace(slow_brakes(), verdict=joint)
 
     monkeypatch.setattr(two_searches, "needs_joint_fit", lambda *_: says_little)
@@ -52,7 +52,7 @@ def test_a_car_that_is_hardly_known_and_runs_that_disagree_are_left_to_the_joint
     foreign = ForeignCarError("the runs disagree")
     for single, says_little, why in ((answer(0.0), True, ""), (foreign, False, "the runs disagree")):
         trace, asked = judge(monkeypatch, single, answer(1.0), says_little=says_little)
-        assert isinstance(trace, JointTrace) and asked == [why]
+        assert isinstance(trace, JointTrace) and asked == [(why, True)]
 
 
 def test_stops_that_are_followed_are_left_to_the_single_search_and_a_name_leaves_more_than_nothing_named(
@@ -74,7 +74,7 @@ def test_where_nothing_is_named_and_stops_are_missed_the_better_prediction_count
     """A log of 10 Hz whose driver held his speed: nothing beside a metre, where the joint fit saw its pads."""
     missed = 2.0 * LIMIT * NOISE
     trace, asked = judge(monkeypatch, answer(missed), answer(share * missed, names=True))
-    assert isinstance(trace, JointTrace) is is_better and asked == [""]
+    assert isinstance(trace, JointTrace) is is_better and asked == [("", False)]
     if is_better:
         reason, *rest = trace.verdict.reasons
         assert (

@@ -148,6 +148,21 @@ def test_tyres_at_their_limit_are_a_rival_of_the_brakes_curve():
     assert [rival.name for _, rival in found] == ["retuned_wet_friction"]
 
 
+def test_numbers_alone_are_calibrated_and_not_named_where_the_whole_library_was_searched():
+    """A valley of friction over speed, of which one channel shows little, passed for wet roads that grip less."""
+    strong = campaign_of({"pressure_gain": 0.9})
+    named, own = (
+        judge_jointly(strong, VEHICLE, SURFACE, FEW, RULES, names_numbers=alone) for alone in (True, False)
+    )
+    assert [e.name for e in named.verdict.effects] == ["retuned_pressure_gain"]
+    assert own.verdict.verdict == "NOTHING" and not own.verdict.rivals and not own.substitutes
+    assert [e.name for e in own.calibrated] == ["retuned_pressure_gain"]
+    slow = judge_jointly(
+        campaign_of({"pressure_gain": 0.9, "lag": 0.09}), VEHICLE, SURFACE, FEW, RULES, names_numbers=False
+    )
+    assert "brake_lag" in [e.name for e in slow.verdict.effects]
+
+
 def test_a_number_within_its_tolerance_that_other_physics_explains_as_well_is_named_with_its_rival(
     monkeypatch,
 ):
