@@ -146,9 +146,12 @@ def read_campaign(folder: str | Path) -> Campaign:
         problems += gain_problems(readable, interval, slippery=slippery)
     if problems:
         raise InputError(cap_problems([f"{shorten(folder.name)}: {problem}" for problem in problems]))
-    taught = {name: columns for name, columns in readable.items() if name not in judged}
-    is_gauge = signal == "brake_pressure" and header.brake_stands_for is None
-    zero = find_gauge_zero(measure_resting_levels(taught, interval)) if is_gauge else 0.0
+    zero = 0.0
+    if header.brake_stands_for is None:
+        taught = {
+            run.name: {"brake_pressure": run.pressure, "speed": run.speed} for run in runs if not run.held_out
+        }
+        zero = find_gauge_zero(measure_resting_levels(taught, interval))
     split = "\n".join(["train", *sorted(train), "held_out", *sorted(held_out)])
     return Campaign(
         name=header.campaign,

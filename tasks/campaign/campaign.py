@@ -175,7 +175,7 @@ class Campaign:
     split_hash : SHA-256 over the names of the training and held-out runs
     channels : of `CHANNELS`, those that were measured
     brake_signal : signal or unit that stands for the brake pressure
-    gauge_zero : what its gauge read at rest in all runs alike, taken off their pressures [MPa]
+    gauge_zero : what that signal says at rest in all runs alike, taken off it, as a pressure [MPa]
     """
 
     name: str

@@ -1,6 +1,7 @@
-"""The brake pressure at rest: a gauge that reads more than 0 while nobody brakes.
+"""The brake signal at rest: a gauge that reads more than 0 while nobody brakes, or a command that idles above 0.
 
-The model would brake with that pressure, and a fit would find a brake that does nothing below it.
+The model would brake with that pressure, and a fit would find a brake that does nothing below it. A run that seems to
+brake from its first sample on does not tell what drove it before.
 """
 
 from collections.abc import Mapping
@@ -31,7 +32,7 @@ FEWEST_RUNS = 2
 def measure_resting_levels(
     runs: Mapping[str, Mapping[str, NDArray[np.float64]]], interval: float
 ) -> dict[str, float]:
-    """Return the pressure that the gauge reads before the first application, for each run in which it rests [MPa].
+    """Return the pressure that the signal says before the first application, for each run in which it rests [MPa].
 
     Parameters
     ----------
@@ -43,7 +44,7 @@ def measure_resting_levels(
 
 
 def find_gauge_zero(levels: Mapping[str, float]) -> float:
-    """Return what a gauge reads without pressure: one level at which all runs rest; 0 where they differ [MPa].
+    """Return what a signal says while nobody brakes: one level at which all runs rest; 0 where they differ [MPa].
 
     Pads that needed just that pressure to touch would brake by the same torque, so nothing is lost by taking it off.
 

@@ -227,6 +227,20 @@ def test_what_a_gauge_reads_at_rest_in_all_runs_alike_is_its_zero(folder: Path) 
     assert read_campaign(folder).gauge_zero == 0.0
 
 
+def test_a_command_that_idles_above_0_is_counted_from_there(folder: Path) -> None:
+    """A drive-by-wire car commands 0.15 while it does not brake: it braked from the first sample, stops 11 m off."""
+    before = read_campaign(folder)
+    for number, name in enumerate(NAMES):
+        columns = braking_columns(number)
+        command = 0.15 + 0.1 * columns.pop("brake_pressure")
+        write_run(folder, name, columns | {"brake_command": command})
+    change_header(folder, lambda h: h.update(brake_signal="brake_command", not_measured=["brake_pressure"]))
+    after = read_campaign(folder)
+    assert after.gauge_zero == pytest.approx(1.5, abs=0.005)
+    for one, other in zip(before.runs, after.runs, strict=True):
+        assert other.pressure == pytest.approx(one.pressure, abs=0.03)  # the gauge's noise
+
+
 def test_every_measured_campaign_at_hand_is_sound() -> None:
     folders = sorted(path.parent for path in (DATA / "measured" / "campaigns").glob("*/campaign.yaml"))
     if not folders:

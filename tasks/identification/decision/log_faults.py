@@ -3,12 +3,13 @@
 from collections.abc import Collection, Sequence
 
 from tasks.campaign.campaign import Campaign
+from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME
 from tasks.campaign.resting_pressure import describe_rest, measure_resting_levels
 from tasks.identification.decision.answer import NamedEffect
 
 
 def tell_log_faults(campaign: Campaign, named: Sequence[NamedEffect], rivals: Collection[str]) -> list[str]:
-    """Return a sentence for each fault of the log that a named effect may be, and on a gauge that rests above 0.
+    """Return a sentence for each fault of the log that a named effect may be, and on a brake signal that rests above 0.
 
     Parameters
     ----------
@@ -23,9 +24,12 @@ def tell_log_faults(campaign: Campaign, named: Sequence[NamedEffect], rivals: Co
             " brake signal and the others share a clock"
         )
     if campaign.gauge_zero:
+        signal = CHANNELS_BY_NAME[campaign.brake_signal]
+        level = campaign.gauge_zero / BRAKE_SIGNALS[signal.name]
         told.append(
-            f"the brake pressure rests at {campaign.gauge_zero:.3f} MPa while the car does not brake, in all training"
-            " runs alike: taken for the gauge's zero; pads that need that pressure to touch would look the same"
+            f"the {signal.name.replace('_', ' ')} rests at {level:.3f}{'' if signal.unit == '1' else f' {signal.unit}'}"
+            " while the car does not brake, in all training runs alike: taken for its zero; pads that need as much to"
+            " touch would look the same"
         )
     elif campaign.brake_signal == "brake_pressure":
         runs = {run.name: {"brake_pressure": run.pressure, "speed": run.speed} for run in campaign.runs}
