@@ -74,7 +74,7 @@ def test_polynomial_exponential_keeps_its_stated_error() -> None:
     assert got[:3].tolist() == [0, 0, np.float32(0.999)]
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.lists(st.floats(0.0625, 1e6, width=32), max_size=60))
 def test_depths_sort_stably(depths: list[float]) -> None:
     keys = np.array(depths, dtype=np.float32)
