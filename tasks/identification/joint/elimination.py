@@ -143,6 +143,8 @@ def eliminate_uncertain_numbers(stops: Sequence[Stop], fitted: JointFit, rules: 
         # without much of what moved the car, tyres that grip less may hide a brake's curve: the best of several starts
         grips = [{}, *vary_grip(fitted)]
         fitted = min((refit_numbers(stops, fitted, left, grip) for grip in grips), key=lambda fit: fit.cost)
+    # a friction that nobody needs makes the certain uncertain
+    fitted = _drop_unknown_frictions(stops, fitted, rules)
     while True:
         sure = count_standard_errors(fitted, rules)
         weak = [(float(here), n.name) for n, here in zip(fitted.numbers, sure, strict=True) if n.removable]

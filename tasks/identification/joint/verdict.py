@@ -233,13 +233,15 @@ def _fit_everything(
 def _settle(
     train: Sequence[Stop], fitted: JointFit, starts: Sequence[Mapping[str, float]], rules: JointRules
 ) -> tuple[JointFit, tuple[int, int]]:
-    """Return the best fit of the numbers left from several starts, and how many of these reach it."""
+    """Return the best fit of the numbers left, from several starts too, and how many of these reach it."""
     grips = vary_grip(fitted) or [{}]
     begins = [fitted.by_name, *({**starts[0], **grip} for grip in grips), *starts[1:]]
     fits = fit_jointly(train, fitted.numbers, begins, scales=fitted.scales)
-    near = rules.same_fit_errors * standard_errors(fits[0], rules)
-    same = sum(bool(np.all(np.abs(f.values - fits[0].values) < near)) for f in fits)
-    return fits[0], (same, len(fits))
+    # runs whose own numbers start anew may end in a worse minimum than where they are
+    best = min((fitted, *fits), key=lambda fit: fit.cost)
+    near = rules.same_fit_errors * standard_errors(best, rules)
+    same = sum(bool(np.all(np.abs(f.values - best.values) < near)) for f in fits)
+    return best, (same, len(fits))
 
 
 def _name_effects(fitted: JointFit, rules: JointRules) -> list[NamedEffect]:

@@ -158,6 +158,32 @@ def test_a_friction_that_the_runs_need_stays_though_they_tell_it_badly():
     assert left.numbers == (gain, badly)
 
 
+def test_a_friction_that_nobody_needs_takes_no_other_number_away(monkeypatch):
+    """With a friction that six runs did not tell, a lag and a dead band went, and stops were missed by 6 m."""
+    both = replace(
+        slow_brakes().fitted, numbers=(NUMBERS["friction"], LAG), values=np.array([0.1, 0.05]), cost=7.0
+    )
+    refits = []
+
+    def refit(_stops, fitted, numbers, _start=None):
+        refits.append([n.name for n in numbers])
+        return replace(fitted, numbers=numbers, values=fitted.values[-len(numbers) :])
+
+    def count(fitted, _rules):
+        sure = {"friction": 0.3, "lag": 1.0 if len(fitted.numbers) > 1 else 99.0}
+        return np.array([sure[n.name] for n in fitted.numbers])
+
+    def errors(fitted, _rules):
+        return np.array([9.0 if n.name == "friction" else 1e-3 for n in fitted.numbers])
+
+    monkeypatch.setattr(elimination, "refit_numbers", refit)
+    monkeypatch.setattr(elimination, "count_standard_errors", count)
+    monkeypatch.setattr(elimination, "standard_errors", errors)
+    monkeypatch.setattr(elimination, "_stable_names", lambda *_: {"lag"})
+    left = eliminate_uncertain_numbers((), both, RULES)
+    assert [n.name for n in left.numbers] == ["lag"] and refits == [["lag"]]
+
+
 def test_a_fit_foresees_which_number_makes_good_what_another_did():
     found = slow_brakes()
     without = refit_numbers(
