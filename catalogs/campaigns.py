@@ -29,6 +29,7 @@ from tasks.campaign.campaign import (
 )
 from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME, SpeedSource
 from tasks.campaign.resting_pressure import find_gauge_zero, measure_resting_levels
+from tasks.campaign.resting_throttle import find_throttle_rest
 from tasks.campaign.run_validation import COLUMN_UNITS, motion_problem, run_problems
 from tasks.campaign.slow_channels import collect_samples, fill_between_samples
 from tasks.errors import InputError
@@ -152,17 +153,20 @@ def read_campaign(folder: str | Path) -> Campaign:
             run.name: {"brake_pressure": run.pressure, "speed": run.speed} for run in runs if not run.held_out
         }
         zero = find_gauge_zero(measure_resting_levels(taught, interval))
+    runs = [run.lower_pressure(zero) for run in runs] if zero else runs
+    rest = find_throttle_rest([run for run in runs if not run.held_out])
     split = "\n".join(["train", *sorted(train), "held_out", *sorted(held_out)])
     return Campaign(
         name=header.campaign,
         vehicle=header.vehicle,
-        runs=tuple(run.lower_pressure(zero) if zero else run for run in runs),
+        runs=tuple(run.lower_throttle(rest) if rest else run for run in runs),
         tolerances=_make_tolerances(header.tolerances_1sigma),
         content_hash=digest.hexdigest(),
         split_hash=hashlib.sha256(split.encode()).hexdigest(),
         channels=tuple(name for name in CHANNELS if name in needed),
         brake_signal=signal if header.brake_stands_for is None else header.brake_stands_for,
         gauge_zero=zero,
+        throttle_rest=rest,
     )
 
 

@@ -138,6 +138,17 @@ class Run:
         """
         return replace(self, pressure=np.maximum(self.pressure - zero, 0.0))
 
+    def lower_throttle(self, rest: float) -> "Run":
+        """Return a run whose throttle is counted from what it reads at rest.
+
+        Parameters
+        ----------
+        rest : that reading [1]
+        """
+        return (
+            self if self.throttle is None else replace(self, throttle=np.maximum(self.throttle - rest, 0.0))
+        )
+
     def begin_at(self, first: int) -> "Run":
         """Return a run on a flat road from a sample on.
 
@@ -176,6 +187,7 @@ class Campaign:
     channels : of `CHANNELS`, those that were measured
     brake_signal : signal or unit that stands for the brake pressure
     gauge_zero : what that signal says at rest in all runs alike, taken off it, as a pressure [MPa]
+    throttle_rest : what the throttle reads while the brake is applied, taken off it [1]
     """
 
     name: str
@@ -187,6 +199,7 @@ class Campaign:
     channels: tuple[str, ...] = CHANNELS
     brake_signal: str = "brake_pressure"
     gauge_zero: float = 0.0
+    throttle_rest: float = 0.0
 
     @property
     def is_measured(self) -> NDArray[np.bool_]:

@@ -241,6 +241,26 @@ def test_a_command_that_idles_above_0_is_counted_from_there(folder: Path) -> Non
         assert other.pressure == pytest.approx(one.pressure, abs=0.03)  # the gauge's noise
 
 
+def test_a_throttle_that_rests_above_0_is_counted_from_what_it_reads_while_the_brake_is_applied(
+    folder: Path,
+) -> None:
+    """A plate that idles at 0.15 drove the car through its stops: an engine was said to hold it back with 565 N m."""
+    assert read_campaign(folder).throttle_rest == 0.0
+    for number, name in enumerate(NAMES):
+        columns = braking_columns(number)
+        driven = np.where(columns["time"] < 0.8, 0.3, 0.0)
+        write_run(folder, name, columns | {"throttle": 0.15 + 0.85 * driven + (0.1 if number == 5 else 0.0)})
+    campaign = read_campaign(folder)
+    assert campaign.throttle_rest == pytest.approx(0.15)
+    for run in campaign.runs:
+        if run.name != NAMES[5]:  # one driver's foot on both pedals is no rest
+            assert run.throttle is not None and run.throttle[-1] == 0.0
+            assert run.throttle[0] == pytest.approx(0.255)
+    for number, name in enumerate(NAMES):  # a foot that holds both pedals
+        write_run(folder, name, braking_columns(number) | {"throttle": np.full(len(driven), 0.31)})
+    assert read_campaign(folder).throttle_rest == 0.0
+
+
 def test_every_measured_campaign_at_hand_is_sound() -> None:
     folders = sorted(path.parent for path in (DATA / "measured" / "campaigns").glob("*/campaign.yaml"))
     if not folders:

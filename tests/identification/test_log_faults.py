@@ -33,6 +33,8 @@ def test_a_gauge_that_drifts_is_told_and_a_zero_that_was_taken_off_is_too() -> N
     assert "rests at 0.080 MPa" in told and "touch would look the same" in told
     (told,) = tell_log_faults(replace(drifting, gauge_zero=1.5, brake_signal="brake_command"), (), ())
     assert told.startswith("the brake command rests at 0.150 while the car")
+    (told,) = tell_log_faults(replace(drifting, throttle_rest=0.155), (), ())
+    assert told == "the throttle rests at 0.155 while the brake is applied: counted from there"
     assert tell_log_faults(drifting, (), ()) == []
     assert tell_log_faults(replace(drifting, runs=runs, brake_signal="brake_command"), (), ()) == []
 

@@ -9,7 +9,7 @@ from tasks.identification.decision.answer import NamedEffect
 
 
 def tell_log_faults(campaign: Campaign, named: Sequence[NamedEffect], rivals: Collection[str]) -> list[str]:
-    """Return a sentence for each fault of the log that a named effect may be, and on a brake signal that rests above 0.
+    """Return a sentence for each fault that a named effect may be, and on a brake or throttle that rests above 0.
 
     Parameters
     ----------
@@ -22,6 +22,10 @@ def tell_log_faults(campaign: Campaign, named: Sequence[NamedEffect], rivals: Co
         told.append(
             "brakes that answer late look the same as responses that are all logged late by one time: check that the"
             " brake signal and the others share a clock"
+        )
+    if campaign.throttle_rest:
+        told.append(
+            f"the throttle rests at {campaign.throttle_rest:.3f} while the brake is applied: counted from there"
         )
     if campaign.gauge_zero:
         signal = CHANNELS_BY_NAME[campaign.brake_signal]
