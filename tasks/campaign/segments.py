@@ -71,12 +71,16 @@ def cut_segments(
     cut : how
     """
     applied = convert_to_channel(signals[brake.sources[0]], brake)
+    pressure = BRAKE_SIGNALS[brake.channel] * applied.values
+    if len(pressure) and (lowest := float(np.nanmin(pressure))) >= cut.threshold:
+        fault = (
+            f"channel {brake.channel} never falls below {lowest:.3g} MPa, or what stands for it: above_mpa must be"
+            f" more than it idles at; it is {cut.threshold:g}"
+        )
+        return [Segment(start=float(applied.time[0]), end=float(applied.time[-1]), fault=fault)]
     episodes = pressure_episodes(
-        applied.time,
-        BRAKE_SIGNALS[brake.channel] * applied.values,
-        threshold=cut.threshold,
-        merge_gap=cut.merge_gap,
-    )
+        applied.time, pressure, threshold=cut.threshold, merge_gap=cut.merge_gap
+    )  # fmt: skip
     parts = _convert_signals(signals, rules)
     speed = next((signal for channel, signal in parts if channel == "speed"), None)
     first, last = float(applied.time[0]), float(applied.time[-1])

@@ -39,6 +39,17 @@ def test_every_brake_signal_cuts_by_the_pressure_that_it_stands_for(channel: str
     assert find_brake_rule([SPEED]) is None
 
 
+def test_a_signal_that_idles_above_the_threshold_says_so() -> None:
+    """A drive-by-wire command idles at 0.15: the whole drive was one application, and the car was said to stand."""
+    rule = ChannelRule(channel="brake_command", sources=("b",), unit="1")
+    command = np.where((TIME > 10.0) & (TIME < 12.0), 0.3, 0.15)
+    (segment,) = cut_segments({"b": Signal(time=TIME, values=command)}, [rule], rule, CUT)
+    assert "brake_command never falls below 1.5 MPa" in segment.fault and "it is 0.3" in segment.fault
+    above = SegmentRule(threshold=1.6, merge_gap=0.5, minimum=0.5, before=2.0, after=0.5)
+    (segment,) = cut_segments({"b": Signal(time=TIME, values=command)}, [rule], rule, above)
+    assert not segment.fault and segment.start == pytest.approx(8.0, abs=0.02)
+
+
 @pytest.mark.parametrize("applied", [(), ((10.0, 10.2),)])
 def test_a_drive_without_a_brake_application_has_no_segments(
     applied: tuple[tuple[float, float], ...],
