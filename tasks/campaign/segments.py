@@ -12,6 +12,9 @@ from tasks.campaign.episodes import Episode, pressure_episodes
 from tasks.campaign.held_inputs import take_samples
 from tasks.campaign.signals import ChannelRule, Signal, convert_to_channel
 
+IDLING = 0.1
+"""Share of the range of a brake signal, from its lowest, in which it is for a quarter of a drive if it idles [1]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class SegmentRule:
@@ -72,15 +75,14 @@ def cut_segments(
     """
     applied = convert_to_channel(signals[brake.sources[0]], brake)
     pressure = BRAKE_SIGNALS[brake.channel] * applied.values
-    if len(pressure) and (lowest := float(np.nanmin(pressure))) >= cut.threshold:
+    lowest, low, highest = np.nanquantile(pressure, (0.0, 0.25, 1.0)) if len(pressure) else np.zeros(3)
+    if lowest >= cut.threshold and low <= lowest + IDLING * (highest - lowest):
         fault = (
             f"channel {brake.channel} never falls below {lowest:.3g} MPa, or what stands for it: above_mpa must be"
             f" more than it idles at; it is {cut.threshold:g}"
         )
         return [Segment(start=float(applied.time[0]), end=float(applied.time[-1]), fault=fault)]
-    episodes = pressure_episodes(
-        applied.time, pressure, threshold=cut.threshold, merge_gap=cut.merge_gap
-    )  # fmt: skip
+    episodes = pressure_episodes(applied.time, pressure, threshold=cut.threshold, merge_gap=cut.merge_gap)
     parts = _convert_signals(signals, rules)
     speed = next((signal for channel, signal in parts if channel == "speed"), None)
     first, last = float(applied.time[0]), float(applied.time[-1])

@@ -45,6 +45,10 @@ def test_a_signal_that_idles_above_the_threshold_says_so() -> None:
     command = np.where((TIME > 10.0) & (TIME < 12.0), 0.3, 0.15)
     (segment,) = cut_segments({"b": Signal(time=TIME, values=command)}, [rule], rule, CUT)
     assert "brake_command never falls below 1.5 MPa" in segment.fault and "it is 0.3" in segment.fault
+    # a recording that the brake starts is all braking, and idles nowhere
+    pressed = np.clip(0.05 + (TIME - 5.0) / 10.0, 0.05, 0.5)[500:1200]
+    (segment,) = cut_segments({"b": Signal(time=TIME[500:1200], values=pressed)}, [rule], rule, CUT)
+    assert not segment.fault
     above = SegmentRule(threshold=1.6, merge_gap=0.5, minimum=0.5, before=2.0, after=0.5)
     (segment,) = cut_segments({"b": Signal(time=TIME, values=command)}, [rule], rule, above)
     assert not segment.fault and segment.start == pytest.approx(8.0, abs=0.02)

@@ -249,11 +249,11 @@ def test_a_throttle_that_rests_above_0_is_counted_from_what_it_reads_while_the_b
     for number, name in enumerate(NAMES):
         columns = braking_columns(number)
         driven = np.where(columns["time"] < 0.8, 0.3, 0.0)
-        write_run(folder, name, columns | {"throttle": 0.15 + 0.85 * driven + (0.1 if number == 5 else 0.0)})
+        write_run(folder, name, columns | {"throttle": 0.15 + 0.85 * driven + (0.1 if number == 1 else 0.0)})
     campaign = read_campaign(folder)
     assert campaign.throttle_rest == pytest.approx(0.15)
     for run in campaign.runs:
-        if run.name != NAMES[5]:  # one driver's foot on both pedals is no rest
+        if run.name != NAMES[1]:  # one driver's foot on both pedals is no rest
             assert run.throttle is not None and run.throttle[-1] == 0.0
             assert run.throttle[0] == pytest.approx(0.255)
     for number, name in enumerate(NAMES):  # a foot that holds both pedals

@@ -32,8 +32,8 @@ def tell_log_faults(campaign: Campaign, named: Sequence[NamedEffect], rivals: Co
         level = campaign.gauge_zero / BRAKE_SIGNALS[signal.name]
         told.append(
             f"the {signal.name.replace('_', ' ')} rests at {level:.3f}{'' if signal.unit == '1' else f' {signal.unit}'}"
-            " while the car does not brake, in all training runs alike: taken for its zero; pads that need as much to"
-            " touch would look the same"
+            " while the car does not brake, in all training runs alike: taken for its zero; brakes that need as much to"
+            " begin would look the same"
         )
     elif campaign.brake_signal == "brake_pressure":
         runs = {run.name: {"brake_pressure": run.pressure, "speed": run.speed} for run in campaign.runs}

@@ -76,7 +76,7 @@ class JointTrace:
     Parameters
     ----------
     verdict : the answer
-    calibrated : numbers that the prediction rests on and that differ from the file by no more than its tolerances
+    calibrated : numbers of the file that the prediction rests on and that are no discovery
     fitted : the fit that it rests on
     errors : float64 [K] standard errors of its numbers
     train, held_out : the runs
@@ -166,6 +166,10 @@ def judge_jointly(
     effects += [e for e in calibrated if e.parameters[0].name in disputed]
     calibrated = tuple(e for e in calibrated if e not in effects)
     if not names_numbers and all(e.effect_class == "retune" for e in effects):
+        reasons += [
+            f"{effect.name} is told as a number of the vehicle's own: other physics may stand behind it"
+            for effect in effects
+        ]
         effects, calibrated, substitutes = [], (*effects, *calibrated), ()
     rivals = _name_rivals(fitted, substitutes, effects, joint)
     kind = _kind(effects, rivals)

@@ -18,6 +18,7 @@ SEPARATE = {
     "resistance": "coast down from the highest speed to 5 m/s with the clutch open, and once in gear",
     "delay": "press the brake in steps from constant speed, logging at 100 Hz or more",
     "curve": "brake at three constant pressures from the same speed, below the limit of the tyres",
+    "grip": "brake to the limit of the tyres on one wet road, from a high and from a low speed",
 }
 """The run that tells numbers of one group apart."""
 
@@ -70,7 +71,9 @@ def tell_what_was_used(
             if has_few_runs(campaign, rules)
             else []
         ),
-        f"{agreeing[0]} of {agreeing[1]} starts reach this fit",
+        f"{agreeing[0]} of {agreeing[1]} starts reach this fit"
+        if agreeing[0]
+        else f"of {agreeing[1]} further starts none reaches this fit, which explains more than theirs",
         "the held-out runs decide which numbers stay, so their error is not that of a blind test",
     ]
 
@@ -97,9 +100,10 @@ def tell_rivals(
     sentences = []
     for of, rival in rivals:
         one, other = named[of], rival.parameters[0]
+        run = find_separating_run([numbers[one.name], numbers[other.name]])
         sentences.append(
             f"these runs cannot tell whether {numbers[one.name].say(one.value)} or"
-            f" {numbers[other.name].say(other.value)}: {find_separating_run([numbers[one.name], numbers[other.name]])}"
+            f" {numbers[other.name].say(other.value)}{'' if run is None else f': {run}'}"
         )
     return sentences
 

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from tasks.campaign.campaign import Campaign
@@ -9,7 +10,7 @@ from tasks.identification.decision.answer import Verdict
 from tasks.identification.decision.disputes import ForeignCarError
 from tasks.identification.decision.verdict import Trace
 from tasks.identification.joint import two_searches
-from tasks.identification.joint.two_searches import judge_by_two_searches
+from tasks.identification.joint.two_searches import judge_by_two_searches, measure_error_from_brake
 from tasks.identification.joint.verdict import JointTrace
 from tests.identification.joint.known_car import RULES, SURFACE, VEHICLE, campaign_of, slow_brakes
 
@@ -27,6 +28,18 @@ def answer(error: float, names: bool = False) -> Verdict:
     )  # fmt: skip
 
 
+def off_by(error: float, verdict: Verdict, before: float = 0.0) -> JointTrace:
+    """A joint fit whose speed is off by an error from the brake on, and by another one before it [m/s]."""
+    told = slow_brakes()
+    predicted = []
+    for stop, readings in zip(told.held_out, told.predicted, strict=True):
+        off = np.where(np.arange(stop.model.samples) < stop.onset - 10, before, error)
+        moved = readings.copy()
+        moved[-1, :, 0] = stop.model.measured[:, 0] + off
+        predicted.append(moved)
+    return replace(told, verdict=verdict, predicted=tuple(predicted))
+
+
 def judge(
     monkeypatch, single: Verdict | Exception, joint: Verdict, *, says_little: bool = False
 ) -> tuple[Trace | JointTrace, list[tuple[str, bool]]]:
@@ -40,7 +53,7 @@ def judge(
 
     def fit_all(*_: object, disagreement: str, names_numbers: bool) -> JointTrace:
         asked.append((disagreement, names_numbers))
-        return replace(slow_brakes(), verdict=joint)
+        return off_by(joint.error["speed"].after, joint)
 
     monkeypatch.setattr(two_searches, "needs_joint_fit", lambda *_: says_little)
     monkeypatch.setattr(two_searches, "find_effects_in_two_looks", find_one)
@@ -84,6 +97,15 @@ def test_where_nothing_is_named_and_stops_are_missed_the_better_prediction_count
         assert rest == ["as it was"] and trace.verdict.disagreement == ""
     else:
         assert trace.verdict.misses and "is missed by" in trace.verdict.disagreement
+        assert f"leaves an error of {share * missed:.3g} m/s" in trace.verdict.reasons[-1]
+
+
+def test_what_a_joint_fit_predicts_is_compared_from_the_brake_on():
+    """It fits what precedes the brake; a stop that is judged from its brake on has nothing before it."""
+    verdict = slow_brakes().verdict
+    for before in (0.0, 5.0):
+        assert measure_error_from_brake(off_by(0.2, verdict, before)) == pytest.approx(0.2)
+    assert measure_error_from_brake(slow_brakes()) < 0.2
 
 
 def test_a_miss_is_told_beside_a_name_too(monkeypatch):
