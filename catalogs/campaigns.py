@@ -28,7 +28,7 @@ from tasks.campaign.campaign import (
     find_motion,
 )
 from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME, SpeedSource
-from tasks.campaign.resting_pressure import find_gauge_zero, measure_resting_levels
+from tasks.campaign.resting_pressure import find_brake_rest, measure_resting_levels
 from tasks.campaign.resting_throttle import find_throttle_rest
 from tasks.campaign.run_validation import COLUMN_UNITS, motion_problem, run_problems
 from tasks.campaign.slow_channels import collect_samples, fill_between_samples
@@ -152,7 +152,7 @@ def read_campaign(folder: str | Path) -> Campaign:
         taught = {
             run.name: {"brake_pressure": run.pressure, "speed": run.speed} for run in runs if not run.held_out
         }
-        zero = find_gauge_zero(measure_resting_levels(taught, interval))
+        zero = find_brake_rest(measure_resting_levels(taught, interval))
     runs = [run.lower_pressure(zero) for run in runs] if zero else runs
     rest = find_throttle_rest([run for run in runs if not run.held_out])
     split = "\n".join(["train", *sorted(train), "held_out", *sorted(held_out)])
@@ -165,7 +165,7 @@ def read_campaign(folder: str | Path) -> Campaign:
         split_hash=hashlib.sha256(split.encode()).hexdigest(),
         channels=tuple(name for name in CHANNELS if name in needed),
         brake_signal=signal if header.brake_stands_for is None else header.brake_stands_for,
-        gauge_zero=zero,
+        brake_rest=zero,
         throttle_rest=rest,
     )
 

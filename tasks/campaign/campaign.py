@@ -130,11 +130,11 @@ class Run:
         )
 
     def lower_pressure(self, zero: float) -> "Run":
-        """Return a run whose brake pressure is counted from what the gauge reads at rest.
+        """Return a run whose brake pressure is counted from what its signal says at rest.
 
         Parameters
         ----------
-        zero : that reading [MPa]
+        zero : that pressure [MPa]
         """
         return replace(self, pressure=np.maximum(self.pressure - zero, 0.0))
 
@@ -186,7 +186,7 @@ class Campaign:
     split_hash : SHA-256 over the names of the training and held-out runs
     channels : of `CHANNELS`, those that were measured
     brake_signal : signal or unit that stands for the brake pressure
-    gauge_zero : what that signal says at rest in all runs alike, taken off it, as a pressure [MPa]
+    brake_rest : what that signal says at rest in all runs alike, taken off it, as a pressure [MPa]
     throttle_rest : what the throttle reads while the brake is applied, taken off it [1]
     """
 
@@ -198,7 +198,7 @@ class Campaign:
     split_hash: str
     channels: tuple[str, ...] = CHANNELS
     brake_signal: str = "brake_pressure"
-    gauge_zero: float = 0.0
+    brake_rest: float = 0.0
     throttle_rest: float = 0.0
 
     @property

@@ -43,7 +43,7 @@ def measure_resting_levels(
     return {run: level for run, level in levels.items() if level is not None}
 
 
-def find_gauge_zero(levels: Mapping[str, float]) -> float:
+def find_brake_rest(levels: Mapping[str, float]) -> float:
     """Return what a signal says while nobody brakes: one level at which all runs rest; 0 where they differ [MPa].
 
     Pads that needed just that pressure to touch would brake by the same torque, so nothing is lost by taking it off.
@@ -66,7 +66,7 @@ def describe_rest(levels: Mapping[str, float]) -> str | None:
     ----------
     levels : pressure at rest by run [MPa]
     """
-    if zero := find_gauge_zero(levels):
+    if zero := find_brake_rest(levels):
         return (
             f"channel brake_pressure rests at {zero:.3f} MPa while the car does not brake, in {len(levels)} runs alike:"
             f" close-loop takes that for the gauge's zero; lower its offset by {zero:.3f} (offset: {-zero:.3f} where"

@@ -215,16 +215,16 @@ def test_a_gentle_stop_behind_an_engine_that_brakes_is_no_fault_of_the_gauge(fol
 
 def test_what_a_gauge_reads_at_rest_in_all_runs_alike_is_its_zero(folder: Path) -> None:
     before = read_campaign(folder)
-    assert before.gauge_zero == 0.0
+    assert before.brake_rest == 0.0
     for number, name in enumerate(NAMES):
         columns = braking_columns(number)
         write_run(folder, name, columns | {"brake_pressure": columns["brake_pressure"] + 0.08})
     after = read_campaign(folder)
-    assert after.gauge_zero == pytest.approx(0.08, abs=0.005)
+    assert after.brake_rest == pytest.approx(0.08, abs=0.005)
     for one, other in zip(before.runs, after.runs, strict=True):
         assert other.pressure[200:] == pytest.approx(one.pressure[200:], abs=0.01)
     change_header(folder, lambda h: h.update(brake_stands_for="a signal in N m"))
-    assert read_campaign(folder).gauge_zero == 0.0
+    assert read_campaign(folder).brake_rest == 0.0
 
 
 def test_a_command_that_idles_above_0_is_counted_from_there(folder: Path) -> None:
@@ -236,7 +236,7 @@ def test_a_command_that_idles_above_0_is_counted_from_there(folder: Path) -> Non
         write_run(folder, name, columns | {"brake_command": command})
     change_header(folder, lambda h: h.update(brake_signal="brake_command", not_measured=["brake_pressure"]))
     after = read_campaign(folder)
-    assert after.gauge_zero == pytest.approx(1.5, abs=0.005)
+    assert after.brake_rest == pytest.approx(1.5, abs=0.005)
     for one, other in zip(before.runs, after.runs, strict=True):
         assert other.pressure == pytest.approx(one.pressure, abs=0.03)  # the gauge's noise
 

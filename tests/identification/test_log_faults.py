@@ -29,9 +29,9 @@ def test_a_gauge_that_drifts_is_told_and_a_zero_that_was_taken_off_is_too() -> N
     runs = tuple(replace(run, pressure=run.pressure + 0.04 * k) for k, run in enumerate(drifting.runs))
     (told,) = tell_log_faults(replace(drifting, runs=runs), (), ())
     assert "rests at 0.000 (run-1) to 0.080 MPa (run-3)" in told
-    (told,) = tell_log_faults(replace(drifting, gauge_zero=0.08), (), ())
+    (told,) = tell_log_faults(replace(drifting, brake_rest=0.08), (), ())
     assert "rests at 0.080 MPa" in told and "begin would look the same" in told
-    (told,) = tell_log_faults(replace(drifting, gauge_zero=1.5, brake_signal="brake_command"), (), ())
+    (told,) = tell_log_faults(replace(drifting, brake_rest=1.5, brake_signal="brake_command"), (), ())
     assert told.startswith("the brake command rests at 0.150 while the car")
     (told,) = tell_log_faults(replace(drifting, throttle_rest=0.155), (), ())
     assert told == "the throttle rests at 0.155 while the brake is applied: counted from there"

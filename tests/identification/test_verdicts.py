@@ -69,7 +69,7 @@ def judged(
     rules: DecisionRules = RULES,
     experiments: tuple[tuple[str, RunPlan], ...] = EXPERIMENTS[-1:],
     hardly_known: dict[str, tuple[float, float]] | None = None,
-    gauge_zero: float = 0.0,
+    brake_rest: float = 0.0,
 ) -> Verdict:
     """The verdict on a campaign; to weigh every planned run takes as long as all that comes before it."""
     slots = OUTSIDE[outside].slots if outside else ()
@@ -79,7 +79,7 @@ def judged(
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("tasks.identification.decision.experiment.EXPERIMENTS", experiments)
         return find_missing_effects(
-            replace(campaign, runs=runs, gauge_zero=gauge_zero), vehicle, SURFACE, tuple(LIBRARY.values()), rules,
+            replace(campaign, runs=runs, brake_rest=brake_rest), vehicle, SURFACE, tuple(LIBRARY.values()), rules,
             hardly_known=hardly_known or {},
         ).verdict  # fmt: skip
 
@@ -213,7 +213,7 @@ class TestRunsThatDisagreeUntilAFormIsInTheModel:
 
 
 def test_what_a_gauge_read_at_rest_is_told_beside_why_nothing_is_named() -> None:
-    verdict = judged({}, gauge_zero=0.05)
+    verdict = judged({}, brake_rest=0.05)
     assert verdict.verdict == "NOTHING"
     refusal, gauge = verdict.reasons
     assert "best candidate" in refusal or "no effect of the library explains enough" in refusal

@@ -18,6 +18,11 @@ FORM = NamedEffect(
     name="pitch_form", effect_class="form", port="pitch_moment", variable="speed", parameters=(),
     score=45.6, gain=89.0, inflation=1.6, held_out_gain=0.4, cross_validated_gain=0.0, win_share=0.0,
 )  # fmt: skip
+ERROR = ChannelError(
+    frozen=1.0, retuned=1.0, after=1.0, ci_low=0.0, ci_high=1.0, change_low=-1.0, change_high=0.0, wins=3,
+    worst_run="run", unit="m/s",
+)  # fmt: skip
+"""Of the speed on held-out runs."""
 
 
 def judged(
@@ -57,10 +62,7 @@ def test_what_only_the_training_runs_show_is_suggested_and_not_named() -> None:
 
 
 def test_where_nothing_is_missing_the_verdict_says_what_the_vehicles_own_numbers_do() -> None:
-    speed = ChannelError(
-        frozen=0.394, retuned=0.081, after=0.08, ci_low=0.0, ci_high=1.0, change_low=-0.6, change_high=-0.1, wins=5,
-        worst_run="run", unit="m/s",
-    )  # fmt: skip
+    speed = replace(ERROR, frozen=0.394, retuned=0.081, after=0.08, change_low=-0.6, change_high=-0.1)
     stop = replace(speed, frozen=3.14, after=0.36, unit="m")
     own = "most: the brakes give 5.1 % above the torque of the vehicle file"
     told = tell_verdict((), (), (), {"speed": speed}, {"stopping_distance": stop}, own=own)
@@ -73,10 +75,7 @@ def test_where_nothing_is_missing_the_verdict_says_what_the_vehicles_own_numbers
 
 def test_own_numbers_are_told_where_resamples_agree_or_the_error_is_halved() -> None:
     """Of three stops, of which one was right before, one resample in 27 holds that one alone."""
-    unsure = ChannelError(
-        frozen=1.22, retuned=0.62, after=0.62, ci_low=0.0, ci_high=1.0, change_low=-1.8, change_high=0.02, wins=2,
-        worst_run="run", unit="m/s",
-    )  # fmt: skip
+    unsure = replace(ERROR, frozen=1.22, retuned=0.62, after=0.62, change_low=-1.8, change_high=0.02)
     halved = replace(unsure, after=0.6)
     for speed, stop, said in (
         (unsure, halved, ()),
@@ -96,10 +95,7 @@ def test_own_numbers_are_told_where_resamples_agree_or_the_error_is_halved() -> 
 
 
 def test_an_error_that_reads_the_same_before_and_after_is_not_told_as_taken_from_one_to_the_other() -> None:
-    speed = ChannelError(
-        frozen=2.145, retuned=2.082, after=2.082, ci_low=1.0, ci_high=3.0, change_low=-0.1, change_high=-0.01, wins=3,
-        worst_run="run", unit="m/s",
-    )  # fmt: skip
+    speed = replace(ERROR, frozen=2.145, retuned=2.082, after=2.082, change_low=-0.1, change_high=-0.01)
     stop = replace(speed, frozen=7.668, after=7.426, unit="m")
     own = "most: braking pitches the body by a moment 37 % below the vehicle file's"
     told = tell_verdict((), (), (), {"speed": speed}, {"stopping_distance": stop}, misses=True, own=own)
@@ -118,10 +114,7 @@ def test_no_name_beside_runs_that_the_model_misses_is_no_claim_that_nothing_is_m
 
 
 def test_an_error_is_said_without_an_exponent() -> None:
-    error = ChannelError(
-        frozen=121.4, retuned=99.7, after=0.056, ci_low=0.0, ci_high=1.0, change_low=-1.0, change_high=0.0, wins=2,
-        worst_run="a", unit="m/s",
-    )  # fmt: skip
+    error = replace(ERROR, frozen=121.4, retuned=99.7, after=0.056, change_low=-1.0, change_high=0.0)
     told = tell_verdict((FORM,), (), (), {"speed": error}, {"stopping_distance": replace(error, unit="m")})
     assert "of the speed from 121 (re-tuned 100) to 0.056 m/s and of the stopping distance from 121" in told
 
@@ -160,10 +153,7 @@ def test_the_verdict_says_when_cross_validation_confirmed_a_name() -> None:
 
 
 def test_an_instruments_error_is_told_by_its_own_channel_and_not_by_the_speed() -> None:
-    speed = ChannelError(
-        frozen=0.065, retuned=0.44, after=0.094, ci_low=0.0, ci_high=1.0, change_low=0.0, change_high=1.0, wins=1,
-        worst_run="run", unit="m/s",
-    )  # fmt: skip
+    speed = replace(ERROR, frozen=0.065, retuned=0.44, after=0.094, change_low=0.0, change_high=1.0)
     error = {
         "speed": speed,
         "longitudinal_acceleration": replace(speed, frozen=0.46, after=0.073, unit="m/s^2"),
@@ -177,10 +167,7 @@ def test_an_instruments_error_is_told_by_its_own_channel_and_not_by_the_speed() 
 
 def test_a_name_that_the_speed_does_not_show_is_told_by_the_channel_that_does() -> None:
     """A late brake took the error of the acceleration from 0.79 to 0.29, and was told by a speed that got worse."""
-    speed = ChannelError(
-        frozen=0.22, retuned=0.22, after=0.25, ci_low=0.0, ci_high=1.0, change_low=0.0, change_high=1.0, wins=1,
-        worst_run="run", unit="m/s",
-    )  # fmt: skip
+    speed = replace(ERROR, frozen=0.22, retuned=0.22, after=0.25, change_low=0.0, change_high=1.0)
     felt = replace(speed, frozen=0.79, retuned=0.78, after=0.29, unit="m/s^2")
     error = {"speed": speed, "longitudinal_acceleration": felt}
     told = tell_verdict((FORM,), (), (), error, {})
@@ -191,10 +178,7 @@ def test_a_name_that_the_speed_does_not_show_is_told_by_the_channel_that_does() 
 
 
 def test_a_form_of_another_shape_is_not_told_as_the_same_words_again() -> None:
-    speed = ChannelError(
-        frozen=0.42, retuned=0.41, after=0.07, ci_low=0.0, ci_high=1.0, change_low=-1.0, change_high=0.0, wins=2,
-        worst_run="a", unit="m/s",
-    )  # fmt: skip
+    speed = replace(ERROR, frozen=0.42, retuned=0.41, after=0.07, change_low=-1.0, change_high=0.0)
     drag = replace(FORM, name="drag_form", port="longitudinal_force")
     told = tell_verdict((FORM,), (replace(FORM, name="other_shape"),), (), {"speed": speed}, {})
     assert told.count("itch moment depends on speed") == 1

@@ -27,9 +27,9 @@ def tell_log_faults(campaign: Campaign, named: Sequence[NamedEffect], rivals: Co
         told.append(
             f"the throttle rests at {campaign.throttle_rest:.3f} while the brake is applied: counted from there"
         )
-    if campaign.gauge_zero:
+    if campaign.brake_rest:
         signal = CHANNELS_BY_NAME[campaign.brake_signal]
-        level = campaign.gauge_zero / BRAKE_SIGNALS[signal.name]
+        level = campaign.brake_rest / BRAKE_SIGNALS[signal.name]
         told.append(
             f"the {signal.name.replace('_', ' ')} rests at {level:.3f}{'' if signal.unit == '1' else f' {signal.unit}'}"
             " while the car does not brake, in all training runs alike: taken for its zero; brakes that need as much to"

@@ -1,7 +1,7 @@
 """Two searches for what a model lacks: which of them judges a campaign, and where both do, the better prediction."""
 
-from collections.abc import Sequence
 from dataclasses import replace
+from math import inf
 
 import numpy as np
 
@@ -26,7 +26,7 @@ def judge_by_two_searches(
     vehicle: Vehicle,
     surface: SurfaceParameters,
     effects: tuple[Effect, ...],
-    numbers: Sequence[JointNumber],
+    numbers: tuple[JointNumber, ...],
     rules: DecisionRules,
 ) -> Trace | JointTrace:
     """Look for one effect at a time where the car is the model's but for its brake gain; else fit all numbers at once.
@@ -53,7 +53,7 @@ def judge_by_two_searches(
     if needs_joint_fit(campaign, joint):
         return fit_all()
     try:
-        found = find_effects_in_two_looks(campaign, vehicle, surface, effects, tuple(numbers), rules)
+        found = find_effects_in_two_looks(campaign, vehicle, surface, effects, numbers, rules)
     except ForeignCarError as error:
         return fit_all(str(error))
     single = replace(found, verdict=tell_miss(found.verdict, campaign, joint.foreign_misfit))
@@ -63,13 +63,13 @@ def judge_by_two_searches(
         return single
     fitted = fit_all(names_numbers=False)
     before, now = left["speed"].after, measure_error_from_brake(fitted)
-    found_by_one = join_phrases(names or ["nothing"])
     if now >= joint.better_prediction_share * before:
         reason = (
             f"a joint fit of all numbers leaves an error of {now:.3g} m/s in the speed of these stops, and counts only"
             f" below {joint.better_prediction_share:.0%} of {before:.3g} m/s"
         )
         return replace(single, verdict=replace(single.verdict, reasons=(*single.verdict.reasons, reason)))
+    found_by_one = join_phrases(names or ["nothing"])
     reason = (
         f"a search of single effects names {found_by_one} and leaves an error of {before:.3g} m/s in the speed of"
         f" held-out stops, and a joint fit of all numbers one of {now:.3g} m/s from the brake on"
@@ -78,7 +78,7 @@ def judge_by_two_searches(
 
 
 def measure_error_from_brake(trace: JointTrace) -> float:
-    """Return the error of the speed of held-out runs from the brake on [m/s].
+    """Return the error of the speed of held-out runs from the brake on; infinite without a sample there [m/s].
 
     A joint fit fits the beginning of each run, and a single search may judge a stop from its brake on alone: what both
     predict is the stop.
@@ -93,5 +93,6 @@ def measure_error_from_brake(trace: JointTrace) -> float:
         begin = max(stop.onset - round(0.5 * LIFT / model.run.interval), 0) if brakes else 0
         rows = model.find_samples(SPEED)
         rows = rows[rows >= begin]
-        square.append(float(np.mean((model.measured[rows, SPEED] - predicted[-1, rows, SPEED]) ** 2)))
-    return float(np.sqrt(np.mean(square)))
+        if rows.size:
+            square.append(float(np.mean((model.measured[rows, SPEED] - predicted[-1, rows, SPEED]) ** 2)))
+    return float(np.sqrt(np.mean(square))) if square else inf

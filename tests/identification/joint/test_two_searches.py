@@ -19,7 +19,7 @@ CAMPAIGN = campaign_of({})
 """Its speed has a noise of `NOISE`."""
 
 
-def answer(error: float, names: bool = False) -> Verdict:
+def make_verdict(error: float, names: bool = False) -> Verdict:
     """A verdict whose speed misses held-out runs by an error [m/s]."""
     told = slow_brakes().verdict
     return replace(
@@ -40,7 +40,7 @@ def off_by(error: float, verdict: Verdict, before: float = 0.0) -> JointTrace:
     return replace(told, verdict=verdict, predicted=tuple(predicted))
 
 
-def judge(
+def judge_answers(
     monkeypatch, single: Verdict | Exception, joint: Verdict, *, says_little: bool = False
 ) -> tuple[Trace | JointTrace, list[tuple[str, bool]]]:
     """The verdict where both searches answer so; why joint fits were asked for, and if numbers alone may be named."""
@@ -63,8 +63,8 @@ def judge(
 
 def test_a_car_that_is_hardly_known_and_runs_that_disagree_are_left_to_the_joint_fit(monkeypatch):
     foreign = ForeignCarError("the runs disagree")
-    for single, says_little, why in ((answer(0.0), True, ""), (foreign, False, "the runs disagree")):
-        trace, asked = judge(monkeypatch, single, answer(1.0), says_little=says_little)
+    for single, says_little, why in ((make_verdict(0.0), True, ""), (foreign, False, "the runs disagree")):
+        trace, asked = judge_answers(monkeypatch, single, make_verdict(1.0), says_little=says_little)
         assert isinstance(trace, JointTrace) and asked == [(why, True)]
 
 
@@ -74,7 +74,9 @@ def test_stops_that_are_followed_are_left_to_the_single_search_and_a_name_leaves
     """Right names leave up to 15 times the noise; a dead time of 0.013 s stood beside stops missed by 10 m."""
     for most, names in ((LIMIT, False), (RULES.joint.questioned_misfit, True)):
         for share, by_both in ((0.8, False), (1.2, True)):
-            trace, asked = judge(monkeypatch, answer(share * most * NOISE, names), answer(0.0))
+            trace, asked = judge_answers(
+                monkeypatch, make_verdict(share * most * NOISE, names), make_verdict(0.0)
+            )
             assert isinstance(trace, JointTrace) is by_both and len(asked) == by_both
             named = trace.verdict.reasons[0].split(" names ")[-1].split(" and ")[0]
             assert named == ("brake_lag" if names else "nothing") or not by_both
@@ -86,7 +88,7 @@ def test_where_nothing_is_named_and_stops_are_missed_the_better_prediction_count
 ):
     """A log of 10 Hz whose driver held his speed: nothing beside a metre, where the joint fit saw its pads."""
     missed = 2.0 * LIMIT * NOISE
-    trace, asked = judge(monkeypatch, answer(missed), answer(share * missed, names=True))
+    trace, asked = judge_answers(monkeypatch, make_verdict(missed), make_verdict(share * missed, names=True))
     assert isinstance(trace, JointTrace) is is_better and asked == [("", False)]
     if is_better:
         reason, *rest = trace.verdict.reasons
@@ -106,10 +108,15 @@ def test_what_a_joint_fit_predicts_is_compared_from_the_brake_on():
     for before in (0.0, 5.0):
         assert measure_error_from_brake(off_by(0.2, verdict, before)) == pytest.approx(0.2)
     assert measure_error_from_brake(slow_brakes()) < 0.2
+    (stop,) = slow_brakes().held_out
+    sampled = np.arange(stop.model.samples)[:, np.newaxis] < np.full(7, stop.onset - 20)
+    run = replace(stop.model.run, sampled=sampled)
+    silent = replace(stop, model=replace(stop.model, run=run))
+    assert measure_error_from_brake(replace(slow_brakes(), held_out=(silent,))) == np.inf
 
 
 def test_a_miss_is_told_beside_a_name_too(monkeypatch):
-    trace, _ = judge(monkeypatch, answer(2.0 * LIMIT * NOISE, names=True), answer(0.0))
+    trace, _ = judge_answers(monkeypatch, make_verdict(2.0 * LIMIT * NOISE, names=True), make_verdict(0.0))
     assert trace.verdict.misses and trace.verdict.reasons[-1].endswith("not all that the model lacks")
 
 
@@ -122,5 +129,5 @@ def test_a_miss_is_measured_by_the_noise_of_whole_runs(monkeypatch):
         return verdict
 
     monkeypatch.setattr(two_searches, "tell_miss", tell)
-    judge(monkeypatch, answer(0.0), answer(0.0))
+    judge_answers(monkeypatch, make_verdict(0.0), make_verdict(0.0))
     assert seen == [(CAMPAIGN, LIMIT)]
