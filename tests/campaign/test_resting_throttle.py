@@ -11,8 +11,9 @@ from tests.identification.synthetic import plain_run
 
 
 def drive(rest: float, cruise: float = 0.4, *, idle: float = 0.0, brakes: bool = True) -> Run:
-    """A run whose driver lifts before he brakes; its brake signal idles, and has the noise of a gauge."""
+    """A run that cruises for longer than its driver brakes; its brake signal idles, and has the noise of a gauge."""
     run = plain_run(20.0, 2.0)
+    run = replace(run, pressure=run.pressure[:180])
     noise = 0.01 * np.abs(np.random.default_rng(0).normal(size=len(run.pressure)))
     pressed = run.pressure if brakes else np.zeros_like(run.pressure)
     throttle = np.where(run.pressure > 0.0, rest, cruise) if brakes else np.full(len(pressed), cruise)

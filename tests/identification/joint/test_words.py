@@ -34,6 +34,22 @@ def test_a_rival_is_told_in_plain_words_with_the_run_that_separates_the_two():
     )
 
 
+def test_a_rival_that_no_known_run_separates_is_told_without_one():
+    """A gain and a mass look alike in every stop: "cannot tell whether A or B: None", it said."""
+    gain = named_effect("retuned_pressure_gain", "pressure_gain", 0.1)
+    (sentence,) = tell_rivals(
+        [gain], [(gain.name, named_effect("retuned_mass", "mass", -0.1))], load_joint_numbers()
+    )
+    assert sentence.endswith("the car's mass is 10 % below that of the vehicle file")
+    wet = named_effect("retuned_wet_friction", "wet_friction", -0.2)
+    (sentence,) = tell_rivals(
+        [wet], [(wet.name, named_effect("wet_friction_speed", "wet_speed", 0.01))], load_joint_numbers()
+    )
+    assert sentence.endswith(
+        "brake to the limit of the tyres on one wet road, from a high and from a low speed"
+    )
+
+
 def test_a_resistance_is_told_from_anything_else_by_coasting():
     curve, engine = (
         named_effect("pressure_nonlinearity", "pressure_curve", 0.04),
