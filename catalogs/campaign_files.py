@@ -77,7 +77,7 @@ def parse_rows(content: bytes, needed: Collection[str], numbers: Collection[str]
     ----------
     content : CSV as UTF-8
     needed : columns that there must be
-    numbers : those of them that hold finite numbers
+    numbers : columns that hold finite numbers, where there are such
 
     Raises
     ------
@@ -120,6 +120,7 @@ def _row_problems(row: dict[str, str], numbers: Collection[str], place: str, see
     if name in seen:
         problems.append(f"{name}: stands twice in runs.csv: give each run its own name")
     seen.add(name)
+    numbers = [key for key in numbers if key in row]
     wrong = [key for key in numbers if not _is_number(row[key])]
     problems += [f"{name}: {key} must be a finite number; it is {shorten_value(row[key])}" for key in wrong]
     if problem := weather_problem(row["weather"]):

@@ -51,6 +51,9 @@ RUN_NUMBERS = (
     "hazard_length_m", "hazard_height_m",
 )  # fmt: skip
 
+HEAT_COLUMN = "braking_heat_j_kg"
+"""Column of runs.csv with the heat of the discs that an import estimates; a campaign may lack it."""
+
 
 class Split(BaseModel):
     """Names of the runs that may be fitted, and of those that only judge."""
@@ -181,7 +184,7 @@ def _read_header_and_runs(
     except InputError as error:
         problems += error.problems
     try:
-        rows = parse_rows(table, ("run", "weather", *RUN_NUMBERS), RUN_NUMBERS)
+        rows = parse_rows(table, ("run", "weather", *RUN_NUMBERS), (*RUN_NUMBERS, HEAT_COLUMN))
         problems += [
             f"{row['run']}: direction must be 1 or -1; it is {shorten(row['direction'], 40)}"
             for row in rows
@@ -260,6 +263,7 @@ def _make_run(
         snow_accumulation_h=float(row["snow_accumulation_h"]),
         direction=int(float(row["direction"])),
         disc_rise=float(row["disc_temperature_above_ambient_c"]),
+        braking_heat=float(row.get(HEAT_COLUMN) or 0.0),
         hazard_center=float(row["hazard_center_m"]),
         hazard_length=float(row["hazard_length_m"]),
         hazard_height=float(row["hazard_height_m"]),

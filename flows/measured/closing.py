@@ -21,6 +21,7 @@ from flows.measured.verdict_report import write_verdict_page
 from flows.store.outputs import Outputs
 from manifests.canonical import sha256_of, sha256_of_file
 from manifests.provenance import code_version
+from tasks.campaign.braking_heat import estimate_disc_temperatures
 from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
 from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter, Verdict
 from tasks.identification.decision.excitation import find_reached_range
@@ -56,6 +57,7 @@ def close_loop(
     measured = read_campaign(Path(campaign))
     name = vehicle or measured.vehicle
     model, road = load_vehicle(name), load_surface(surface)
+    measured = estimate_disc_temperatures(measured, model.mass)
     grown = f"{Path(name).stem}-grown.yaml"
     beside = tyre_beside(name)
     results = Outputs(out, "close-loop", "split.json", "verdict.json", "report.html", grown, *beside)

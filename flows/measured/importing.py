@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow as pa
 import yaml
 
+from catalogs.campaigns import HEAT_COLUMN
 from catalogs.channel_maps import ChannelMap, FaultyMap, load_channel_map
 from catalogs.channel_maps.conditions import Conditions
 from catalogs.recordings import read_signals, recording_files, recording_root, stored_files
@@ -22,6 +23,7 @@ from flows.store.telemetry import write_parquet
 from manifests.canonical import sha256_of_file
 from tasks.campaign.assembly import Assembled, assemble_run
 from tasks.campaign.brake_gain import gain_problems
+from tasks.campaign.braking_heat import measure_braking_heat
 from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME
 from tasks.campaign.run_validation import motion_problem
 from tasks.campaign.signals import Signal
@@ -116,7 +118,8 @@ def import_measurements(
         beside["warnings"] = warnings
     if left_out:
         beside["left_out"] = left_out
-    return write_campaign(folder, root, channel_map, made, sources, sha256_of_file(map_file), beside)
+    heat = _estimate_heat(channel_map, made, recordings)
+    return write_campaign(folder, root, channel_map, made, heat, sources, sha256_of_file(map_file), beside)
 
 
 def write_campaign(
@@ -124,6 +127,7 @@ def write_campaign(
     root: Path,
     channel_map: ChannelMap,
     made: list[tuple[PlannedRun, Assembled]],
+    heat: dict[str, float],
     sources: dict[str, str],
     map_hash: str,
     beside: dict[str, Any],
@@ -132,11 +136,17 @@ def write_campaign(
     rate = channel_map.sample_rate_hz
     split = {part: [run.name for run, _ in made if run.part == part] for part in ("train", "held_out")}
     table = io.StringIO()
-    writer = csv.DictWriter(table, ["run", *Conditions.model_fields, "drive", "start_s"], lineterminator="\n")
+    columns = ["run", *Conditions.model_fields, HEAT_COLUMN, "drive", "start_s"]
+    writer = csv.DictWriter(table, columns, lineterminator="\n")
     writer.writeheader()
     for run, found in made:
         drive = run.file.relative_to(root).with_suffix("").as_posix()
-        row = {"run": run.name, "drive": drive, "start_s": f"{found.start:.6f}"}
+        row = {
+            "run": run.name,
+            HEAT_COLUMN: f"{heat[run.name]:.4g}",
+            "drive": drive,
+            "start_s": f"{found.start:.6f}",
+        }
         writer.writerow(row | run.conditions.model_dump())
         write_parquet(run_table(found.columns, rate), folder / "runs" / f"{run.name}.parquet")
     write_atomically(folder / "runs.csv", table.getvalue().encode())
@@ -176,6 +186,23 @@ def write_campaign(
     }
     write_json(folder / "import.json", report)
     return report
+
+
+def _estimate_heat(
+    channel_map: ChannelMap,
+    made: list[tuple[PlannedRun, Assembled]],
+    recordings: dict[Path, dict[str, Signal]],
+) -> dict[str, float]:
+    """Return the heat with which each run begins, by its name [J/kg]; 0 where a disc temperature is declared."""
+    heat = dict.fromkeys((run.name for run, _ in made), 0.0)
+    if any(run.conditions.disc_temperature_above_ambient_c for run, _ in made):
+        return heat
+    for file, signals in recordings.items():
+        starts = {run.name: found.start for run, found in made if run.file == file}
+        heat |= zip(
+            starts, measure_braking_heat(signals, channel_map.rules, list(starts.values())), strict=True
+        )
+    return heat
 
 
 def _leave_out_acceleration(

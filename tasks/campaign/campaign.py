@@ -89,6 +89,7 @@ class Run:
     road_slope : float64 [N] of the road, uphill positive [rad]; None where it was not measured
     throttle : float64 [N] share of the full throttle [1]; None where it was not measured
     speed_of_wheels : the speed was measured at the wheels, whose slip it has
+    braking_heat : of the discs at the start, by the drive before it, per mass of the car [J/kg]
     sampled : bool [N, 7] instants at which each channel has a sample; None where all have one at every instant
     """
 
@@ -109,6 +110,7 @@ class Run:
     road_slope: NDArray[np.float64] | None = None
     throttle: NDArray[np.float64] | None = None
     speed_of_wheels: bool = False
+    braking_heat: float = 0.0
     sampled: NDArray[np.bool_] | None = None
 
     @property

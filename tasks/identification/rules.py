@@ -97,7 +97,7 @@ class DecisionRules:
     retune_widening : factor on the session's tolerances when a model is re-tuned without any new effect [1]
     error_resamples : bootstrap resamples of the held-out errors [1]
     worse_limit : ratio of held-out errors from which a channel is worse than under the frozen model [1]
-    retuned_limit : error of the held-out runs, all channels, over that of the re-tuned model beyond which nothing is
+    retuned_limit : error of any channel of the held-out runs, over that of the re-tuned model, beyond which nothing is
         named [1]
     noticed_share : share of a held-out error below which an effect makes a noticeable difference to it [1]
     longest_lag : longest lag at which residual and brake pressure are correlated [s]

@@ -15,7 +15,7 @@ from tasks.identification.decision.alternatives import find_pairs, find_pulled_n
 from tasks.identification.decision.answer import ChannelError
 from tasks.identification.decision.attribution import Candidate, judge_hypothesis
 from tasks.identification.decision.forms import ResidualSpline, is_session_number, make_form_hypotheses
-from tasks.identification.decision.held_out import find_worse_channels, is_noticed
+from tasks.identification.decision.held_out import find_missed_channels, find_worse_channels, is_noticed
 from tasks.identification.decision.rivals import (
     RivalComparison,
     compare_with_rivals,
@@ -143,6 +143,13 @@ class TestHeldOutChannels:
     def test_the_speed_does(self) -> None:
         error = dict.fromkeys(CHANNELS, self.ERROR) | {"speed": self.WORSE}
         assert find_worse_channels(error, 1.05) == ["speed"]
+
+    def test_a_channel_is_missed_where_retuning_predicts_it_much_better(self) -> None:
+        error = dict.fromkeys(CHANNELS, self.ERROR)
+        for ratio, missed in ((1.29, []), (1.31, ["longitudinal_acceleration"])):
+            one = replace(self.ERROR, retuned=0.5, after=0.5 * ratio)
+            assert find_missed_channels(error | {"longitudinal_acceleration": one}, 1.3) == missed
+            assert find_missed_channels(error | {"pitch": one}, 1.3) == []
 
     def test_the_speed_does_not_where_the_effects_leave_it_alone(self) -> None:
         error = dict.fromkeys(CHANNELS, self.ERROR) | {"speed": self.WORSE}

@@ -45,3 +45,13 @@ def test_a_late_brake_is_told_to_look_like_a_late_clock_unless_the_speeds_own_de
     assert "share a clock" in told
     assert tell_log_faults(campaign, late, ["sensor_speed_delay"]) == []
     assert tell_log_faults(campaign, [make_effect("brake_lag")], ()) == []
+
+
+def test_a_fade_by_discs_that_nobody_measured_says_so() -> None:
+    cold = campaign_at_rest(0.0)
+    hot = replace(cold, runs=tuple(replace(run, disc_rise=310.0, braking_heat=2300.0) for run in cold.runs))
+    (told,) = tell_log_faults(hot, [make_effect("brake_fade")], ())
+    assert told.startswith("no disc temperature was measured: the runs begin up to 310 K above ambient")
+    assert tell_log_faults(hot, [make_effect("brake_lag")], ["brake_fade"]) == [told]
+    assert tell_log_faults(hot, [make_effect("brake_lag")], ()) == []
+    assert tell_log_faults(cold, [make_effect("brake_fade")], ()) == []

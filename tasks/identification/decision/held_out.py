@@ -12,6 +12,7 @@ from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.fit import Fit, fit_hypotheses
 from tasks.identification.inference.forward import predict_channels
 from tasks.identification.inference.hypothesis import compose_parameters
+from tasks.identification.inference.linearisation import BODY_CHANNELS
 from tasks.vehicle.effects.table import EFFECT_TABLE
 
 HALF = 0.5
@@ -128,6 +129,21 @@ def compare_with_retuned(error: Mapping[str, ChannelError]) -> float:
     """
     ratios = [e.after / e.retuned for e in error.values() if e.after > 0.0 and e.retuned > 0.0]
     return float(np.exp(np.mean(np.log(ratios)))) if ratios else 1.0
+
+
+def find_missed_channels(error: Mapping[str, ChannelError], limit: float) -> list[str]:
+    """Return the channels of the motion along the road that effects predict much worse than the re-tuned model.
+
+    What a resistance takes from the speed a slope of the session gives back, and the accelerometer feels the slope. A
+    form of the body's motion may be right in all but its shape, which the other channels do not feel.
+
+    Parameters
+    ----------
+    error : by channel
+    limit : ratio of errors beyond which a channel is missed [1]
+    """
+    road = {name: e for name, e in error.items() if name not in BODY_CHANNELS}
+    return [name for name, e in road.items() if e.after > limit * e.retuned > 0.0]
 
 
 def find_worse_channels(

@@ -23,6 +23,12 @@ def tell_log_faults(campaign: Campaign, named: Sequence[NamedEffect], rivals: Co
             "brakes that answer late look the same as responses that are all logged late by one time: check that the"
             " brake signal and the others share a clock"
         )
+    if "brake_fade" in names | set(rivals) and any(run.braking_heat for run in campaign.runs):
+        hottest = max(run.disc_rise for run in campaign.runs)
+        told.append(
+            f"no disc temperature was measured: the runs begin up to {hottest:.0f} K above ambient by the braking"
+            " before them, with discs of the model's heat capacity; a fade per 100 K is of these"
+        )
     if campaign.throttle_rest:
         told.append(
             f"the throttle rests at {campaign.throttle_rest:.3f} while the brake is applied: counted from there"

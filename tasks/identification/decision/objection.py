@@ -9,6 +9,7 @@ from tasks.identification.decision.answer import ChannelError
 from tasks.identification.decision.held_out import (
     compare_with_retuned,
     compute_held_out_errors,
+    find_missed_channels,
     find_worse_channels,
     is_noticed,
 )
@@ -36,7 +37,13 @@ def object_to_last(
     moved = any(moves_speed(h.effect_class, h.variable) for h in named)
     beside, hypothesis = compare_with_retuned(error), last.accepted.hypothesis
     number = hypothesis.effect_class == "retune" and not set(hypothesis.names) <= set(SESSION)
-    if beside > rules.retuned_limit or (number and beside >= 1.0):
+    if missed := find_missed_channels(error, rules.retuned_limit):
+        ratio = max(error[name].after / error[name].retuned for name in missed)
+        return (
+            f"{', '.join(h.name for h in named)} would fit, but predicts {', '.join(missed)} of the held-out runs with"
+            f" {ratio:.3g} times the error of re-tuning alone: not named"
+        )
+    if number and beside >= 1.0:
         return (
             f"{', '.join(h.name for h in named)} would fit, but re-tuning alone predicts the held-out runs better, with"
             f" {1.0 / beside:.3g} of the error: not named"

@@ -160,6 +160,29 @@ def test_one_run_per_brake_application_every_third_held_out(tmp_path: Path) -> N
         ("run-01", "train"), ("run-02", "train"), ("run-03", "held_out"),
     ]  # fmt: skip
     assert [run["start_s"] for run in report["runs"]] == pytest.approx([1.02, 4.02, 7.02], abs=0.02)
+    heat = [run.braking_heat for run in read_campaign(tmp_path / "campaign").runs]
+    at = [float(columns["speed"][np.searchsorted(t, time)]) for time in (1.5, 3.5, 6.5)]
+    lost = [0.5 * (at[0] ** 2 - speed**2) for speed in at]
+    assert heat == pytest.approx(lost, rel=0.05)
+
+
+def test_no_heat_is_estimated_where_a_disc_temperature_is_declared(tmp_path: Path) -> None:
+    columns = braking_columns(14.0)
+    columns["speed"] = 20.0 - np.cumsum(columns["brake_pressure"]) / 100
+    for name in ("wheel_speed_front", "wheel_speed_rear"):
+        columns[name] = columns["speed"] / 0.32
+    write_csv(tmp_path / "log.csv", log_signal(columns))
+    found = []
+    for rise in (0.0, 30.0):
+        runs = [
+            {"name": f"r{i}", "from_s": float(i), "to_s": i + 3.0, "file": "log.csv", "part": part,
+             "conditions": {"disc_temperature_above_ambient_c": rise * i}}
+            for i, part in ((0, "train"), (9, "held_out"))
+        ]  # fmt: skip
+        out = tmp_path / f"campaign-{rise:.0f}"
+        import_measurements(str(tmp_path / "log.csv"), map=write_map(tmp_path, runs=runs), out=str(out))
+        found.append([(run.disc_rise, run.braking_heat > 0.0) for run in read_campaign(out).runs])
+    assert found == [[(0.0, False), (0.0, True)], [(0.0, False), (270.0, False)]]
 
 
 def test_a_segment_that_is_no_run_is_listed_and_the_others_come_in(tmp_path: Path) -> None:

@@ -1,0 +1,113 @@
+"""Heat of the discs that a drive leaves, from what the car loses of its kinetic energy while the brake is applied."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tasks.campaign.braking_heat import (
+    compute_braking_heat,
+    estimate_disc_temperatures,
+    measure_braking_heat,
+)
+from tasks.campaign.campaign import Campaign
+from tasks.campaign.signals import ChannelRule, Signal
+from tests.identification.synthetic import TOLERANCES, VEHICLE, plain_run
+
+RATE = 50.0
+
+
+def drive(*legs: tuple[float, float, float, float], pressed_at: float = 3.0) -> tuple[Signal, Signal]:
+    """Return speed and brake pressure of a drive in legs of duration, first and last speed, and pressure."""
+    speed, pressure = [], []
+    for seconds, first, last, applied in legs:
+        count = round(seconds * RATE)
+        speed.append(np.linspace(first, last, count, endpoint=False))
+        pressure.append(np.full(count, applied * pressed_at))
+    values = np.concatenate(speed)
+    time = np.arange(len(values)) / RATE
+    return Signal(time=time, values=values), Signal(time=time, values=np.concatenate(pressure))
+
+
+def heat_at(time: float, speed: Signal, brake: Signal) -> float:
+    heat = compute_braking_heat(speed, brake)
+    return float(np.interp(time, heat.time, heat.values))
+
+
+def test_a_stop_heats_the_discs_by_the_kinetic_energy_of_the_car():
+    speed, brake = drive((10.0, 30.0, 30.0, 0.0), (3.0, 30.0, 0.0, 1.0), (1.0, 0.0, 0.0, 0.0))
+    # v^2/2 = 450 J/kg, of which the air has taken some 2 % by the time the car stands
+    assert heat_at(13.0, speed, brake) == pytest.approx(450.0, rel=0.03)
+    assert heat_at(9.0, speed, brake) == 0.0
+
+
+@pytest.mark.parametrize(("pace", "seconds"), [(14.0, 200.0), (28.0, 200.0 / 2.0**0.8), (0.0, 1000.0)])
+def test_discs_cool_by_the_loss_of_the_model_and_faster_in_faster_air(pace: float, seconds: float):
+    """12 kJ/K over 60 W/K is 200 s at 14 m/s; the loss grows with the speed to the power of 0.8, from a fifth on."""
+    speed, brake = drive(
+        (5.0, 30.0, 30.0, 0.0), (2.0, 30.0, 14.0, 1.0), (1.0, 14.0, pace, 0.0), (1100.0, pace, pace, 0.0)
+    )
+    early, late = heat_at(20.0, speed, brake), heat_at(20.0 + seconds, speed, brake)
+    assert late / early == pytest.approx(np.exp(-1.0), rel=1e-3)
+
+
+def test_a_car_that_slows_down_without_its_brakes_heats_nothing():
+    speed, brake = drive((20.0, 30.0, 15.0, 0.0), (2.0, 15.0, 10.0, 1.0))
+    assert heat_at(19.0, speed, brake) == 0.0
+
+
+def test_noise_of_the_speed_heats_nothing():
+    speed, brake = drive((5.0, 30.0, 30.0, 0.0), (6.0, 30.0, 10.0, 1.0), (5.0, 10.0, 10.0, 0.0))
+    noise = np.random.default_rng(3).normal(0.0, 0.2, len(speed.values))
+    noisy = replace(speed, values=speed.values + noise)
+    assert heat_at(14.0, noisy, brake) == pytest.approx(heat_at(14.0, speed, brake), rel=0.03)
+
+
+def test_spikes_and_gaps_of_the_speed_heat_nothing():
+    speed, brake = drive((5.0, 30.0, 30.0, 0.0), (6.0, 30.0, 10.0, 1.0), (5.0, 10.0, 10.0, 0.0))
+    values = speed.values.copy()
+    values[549:551], values[330] = 900.0, np.nan  # the first at the end of the braking
+    signals = {"v": replace(speed, values=values), "p": brake}
+    rules = [
+        ChannelRule(channel="speed", sources=("v",), unit="m/s"),
+        ChannelRule(channel="brake_pressure", sources=("p",), unit="MPa"),
+    ]
+    [found] = measure_braking_heat(signals, rules, [14.0])
+    assert found == pytest.approx(heat_at(14.0, speed, brake), rel=0.01)
+    dead = signals | {"v": replace(speed, values=np.full(len(values), np.nan))}
+    assert measure_braking_heat(dead, rules, [14.0]) == [0.0]
+
+
+def test_brake_signals_of_any_size_and_rest_give_the_same_heat():
+    speed, brake = drive((5.0, 30.0, 30.0, 0.0), (3.0, 30.0, 10.0, 1.0), (5.0, 10.0, 10.0, 0.0))
+    command = replace(brake, values=0.15 + 0.1 * brake.values)
+    np.testing.assert_array_equal(
+        compute_braking_heat(speed, command).values, compute_braking_heat(speed, brake).values
+    )
+
+
+def test_a_drive_is_read_through_its_map():
+    speed, brake = drive((5.0, 30.0, 30.0, 0.0), (3.0, 30.0, 10.0, 1.0), (5.0, 10.0, 10.0, 0.0))
+    signals = {"v": replace(speed, values=3.6 * speed.values), "p": brake}
+    rules = [
+        ChannelRule(channel="speed", sources=("v",), unit="km/h"),
+        ChannelRule(channel="brake_pressure", sources=("p",), unit="MPa"),
+    ]
+    expected = [heat_at(time, speed, brake) for time in (4.0, 10.0)]
+    np.testing.assert_allclose(measure_braking_heat(signals, rules, [4.0, 10.0]), expected, rtol=1e-12)
+    assert expected[0] == 0.0 < expected[1]
+
+
+def test_runs_begin_with_the_temperature_of_the_models_discs():
+    """450 J/kg of a car of mass m warm discs of 12 kJ/K by 450 m / 12,000 K."""
+    hot = replace(plain_run(20.0, 2.0, name="hot"), disc_rise=0.0, braking_heat=450.0)
+    campaign = Campaign(
+        name="x",
+        vehicle="paper-reference",
+        runs=(hot,),
+        tolerances=TOLERANCES,
+        content_hash="",
+        split_hash="",
+    )
+    [run] = estimate_disc_temperatures(campaign, VEHICLE.mass).runs
+    assert run.disc_rise == pytest.approx(450.0 * VEHICLE.mass / 12_000.0)
