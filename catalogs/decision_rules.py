@@ -28,6 +28,7 @@ class JointRulesEntry(CatalogueEntry):
     saturation_ratio: Level
     limited_time: Annotated[Scalar, require_quantity("s", above=0)]
     least_pressure_range: Annotated[Scalar, require_quantity("MPa", above=0)]
+    least_disc_range: Annotated[Scalar, require_quantity("K", above=0)]
     delay_interval: Annotated[Scalar, require_quantity("s", above=0)]
     coasted_share: Share
     closed_throttle: Share

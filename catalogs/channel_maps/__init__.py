@@ -241,7 +241,7 @@ class FaultyMap(InputError):
 
 
 def _lay_over(common: Conditions, run: RunEntry) -> Conditions:
-    return Conditions.model_validate(common.model_dump() | run.conditions)
+    return Conditions.model_validate(common.model_dump(exclude_unset=True) | run.conditions)
 
 
 def _unknown_channels(names: Iterable[str]) -> list[str]:

@@ -53,10 +53,11 @@ def bump_study(
     base = load_vehicle(vehicle or recorded.vehicle)
     passages = [passage_of(drive.columns, drive.interval, w.from_s, w.to_s) for w in plan.windows]
     _, car = fit_feature_and_car(passages[0], base)
+    agreement = measure_sensor_agreement(drive.columns, drive.interval)
     result: dict[str, Any] = {
         "campaign": recorded.name,
         "vehicle": base.name,
-        "sensors": asdict(measure_sensor_agreement(drive.columns, drive.interval)),
+        "sensors": None if agreement is None else asdict(agreement),
         "pitch_mode": {"uncalibrated": _mode(base), "calibrated": _mode(car)},
         "windows": [
             {

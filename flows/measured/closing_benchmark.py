@@ -26,17 +26,21 @@ RATES = "closing_error_rates.json"
 FIRST_NULL, FIRST_TRUTH, FIRST_SIZE = 200_000, 300_000, 400_000
 FIRST_PAIR, FIRST_POOR, FIRST_POOR_NULL = 500_000, 600_000, 700_000
 """Seeds: of the first null, of the first campaign of the first truth, size and pair; 100 apart from one truth, size or
-pair to the next. None of them has been used while the engine was made."""
+pair to the next. Seeds 0 to 4 of each served to set rules; a table of error rates begins behind them."""
 SIZE_SEEDS = 5
 """Campaigns of each size of the power table."""
 JUDGES = (
+    "tasks/campaign/",
     "tasks/identification/",
     "tasks/vehicle/",
     "tasks/surface/",
     "catalogs/effects/",
     "catalogs/decision_rules",
+    "catalogs/joint_numbers",
     "catalogs/studies/closing.yaml",
     "catalogs/surfaces/",
+    "catalogs/tyre_families",
+    "catalogs/vehicles/__init__",
     "catalogs/vehicles/paper",
 )
 """Sources that a verdict depends on: campaigns judged by the same ones belong to one table."""

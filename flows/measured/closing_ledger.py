@@ -16,10 +16,10 @@ LEDGER = Path(".musync") / "held-out-readings.jsonl"
 
 
 def record_reading(campaign: Campaign, vehicle_sha256: str) -> int:
-    """Write down that the held-out runs of a campaign have been read, and count the earlier readings.
+    """Write down that a campaign has been read, and count the earlier readings of its held-out runs.
 
-    A reading is known by what the held-out runs measured, so that neither another name, comment, tolerance or split
-    of the same runs nor another way of writing them makes it the first one.
+    A run is known by the speed that it measured, so that neither another name, comment, tolerance, split or map of the
+    same runs nor another way of writing them makes a reading the first one. What was fitted before is no blind test.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def record_reading(campaign: Campaign, vehicle_sha256: str) -> int:
 
     Returns
     -------
-    Number of readings before this one that had a held-out run of it among theirs.
+    Number of readings before this one that had a held-out run of it among their runs.
 
     Raises
     ------
@@ -38,31 +38,29 @@ def record_reading(campaign: Campaign, vehicle_sha256: str) -> int:
     # a link that the user has named is theirs to follow; one that lies in the working folder is not
     path = Path(os.environ["MUSYNC_LEDGER"]).resolve() if "MUSYNC_LEDGER" in os.environ else LEDGER
     known = read_lines(path, {"content_sha256"})
-    held_out = [data_hash(run) for run in campaign.held_out]
+    held_out = {hash_speed(run) for run in campaign.held_out}
     entry = {
         "campaign": campaign.name,
         "content_sha256": campaign.content_hash,
         "split_sha256": campaign.split_hash,
-        "held_out_data_sha256": held_out,
+        "speed_sha256": [hash_speed(run) for run in campaign.runs],
         "vehicle_sha256": vehicle_sha256,
         "source_sha256": code_version()["source_sha256"],
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
     }
     append_line(path, entry)
     return sum(
-        not set(held_out).isdisjoint(e.get("held_out_data_sha256", ()))
-        or e["content_sha256"] == campaign.content_hash
+        not held_out.isdisjoint(e.get("speed_sha256", ())) or e["content_sha256"] == campaign.content_hash
         for e in known
     )
 
 
-def data_hash(run: Run) -> str:
-    """SHA-256 of what a run measured: interval, pressure and responses as numbers, whatever file held them.
+def hash_speed(run: Run) -> str:
+    """SHA-256 of the speed that a run measured: interval and samples as numbers, whatever file held them.
 
     Parameters
     ----------
     run : of a campaign
     """
-    columns = np.column_stack((run.pressure, run.response))
-    head = f"{run.interval!r} {columns.shape}".encode()
-    return hashlib.sha256(head + np.ascontiguousarray(columns, "<f8").tobytes()).hexdigest()
+    head = f"{run.interval!r} {len(run.speed)}".encode()
+    return hashlib.sha256(head + np.ascontiguousarray(run.speed, "<f8").tobytes()).hexdigest()

@@ -193,9 +193,9 @@ def _estimate_heat(
     made: list[tuple[PlannedRun, Assembled]],
     recordings: dict[Path, dict[str, Signal]],
 ) -> dict[str, float]:
-    """Return the heat with which each run begins, by its name [J/kg]; 0 where a disc temperature is declared."""
+    """Return the heat with which each run begins, by its name [J/kg]; 0 where the map declares a disc temperature."""
     heat = dict.fromkeys((run.name for run, _ in made), 0.0)
-    if any(run.conditions.disc_temperature_above_ambient_c for run, _ in made):
+    if any("disc_temperature_above_ambient_c" in run.conditions.model_fields_set for run, _ in made):
         return heat
     for file, signals in recordings.items():
         starts = {run.name: found.start for run, found in made if run.file == file}

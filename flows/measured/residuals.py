@@ -97,7 +97,7 @@ def compute_residual_rmse(runs: Sequence[RunPrediction]) -> dict[str, dict[str, 
     return {
         run.model.run.name: {
             CHANNELS[c]: {
-                name: float(np.sqrt(np.mean((run.model.measured - run.predicted[name])[:, c] ** 2)))
+                name: float(np.sqrt(run.model.compute_square_error(run.predicted[name])[c]))
                 for name in ("frozen", "after")
             }
             for c in run.channels

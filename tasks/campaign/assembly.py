@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tasks.campaign.campaign import LEAST_SAMPLES
 from tasks.campaign.channel_validation import (
     DIGITS_OF_DAY,
     frozen_problem,
@@ -16,7 +17,6 @@ from tasks.campaign.channels import ALIASES, UNITS
 from tasks.campaign.dead_sources import find_dead_sources
 from tasks.campaign.derived_acceleration import is_rate_of_speed
 from tasks.campaign.held_inputs import take_samples
-from tasks.campaign.run_validation import LEAST_SAMPLES
 from tasks.campaign.signals import (
     ChannelRule,
     Signal,
@@ -64,13 +64,14 @@ def assemble_run(
     ----------
     signals : logged signals by name
     rules : the channel map
-    start, end : limits of the run in the logger's time; infinite for the whole recording [s]
+    start, end : limits of the run in the logger's time, delays taken off; infinite for the whole recording [s]
     rate : of the run [Hz]
     """
     found: list[tuple[str, str]] = []
     parts: dict[str, list[Signal]] = {}
     for rule in rules:
-        logged = [take_samples(rule.channel, signals[name]).cut_window(start, end) for name in rule.sources]
+        first, last = start + rule.delay, end + rule.delay
+        logged = [take_samples(rule.channel, signals[name]).cut_window(first, last) for name in rule.sources]
         for signal in logged:
             stated = ALIASES.get(signal.unit, signal.unit)
             if stated in UNITS and stated != rule.unit:
@@ -99,7 +100,10 @@ def assemble_run(
     }
     broken = {channel for channel, _ in found}
     whole = {channel: values for channel, values in columns.items() if channel not in broken}
-    problems += plausibility_problems(whole, 1.0 / rate, {rule.channel: rule.unit for rule in rules})
+    units = {rule.channel: rule.unit for rule in rules}
+    if any(rule.channel == "brake_pressure" and rule.gain is not None for rule in rules):
+        units["brake_pressure"] = "1"  # what stands for it has a scale that nobody knows
+    problems += plausibility_problems(whole, 1.0 / rate, units)
     if problems:
         return Assembled(start=float(clock[0]), columns={}, readable=whole, problems=tuple(problems))
     cleared = {

@@ -8,15 +8,17 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from tasks.campaign.campaign import Campaign
+from tasks.campaign.channels import BRAKE_SIGNALS
 from tasks.campaign.held_inputs import take_samples
 from tasks.campaign.segments import find_brake_rule
-from tasks.campaign.signals import ChannelRule, Signal, convert_to_channel
+from tasks.campaign.signals import ChannelRule, Signal, average_sources
+from tasks.campaign.torque_validation import RELEASED_PRESSURE
 from tasks.vehicle.effects.brake_line import DISC_CAPACITY_F, DISC_CAPACITY_R, DISC_COOLING
 
 APPLIED = 0.05
 """Share of the range of a brake signal, above its rest, from which the brake is applied [1]."""
-RANGE = (0.05, 0.995)
-"""Shares of a drive's samples below its rest and below its hardest braking; a spike is neither [1]."""
+RESTING = 0.05
+"""Quantile of a brake signal that counts as its rest: no car brakes for so much of a drive [1]."""
 SPIKE = 5
 """Samples of which the middle value counts, so that two wrong ones in a row are no energy."""
 COOLING_SPEED = 14.0
@@ -41,13 +43,12 @@ def measure_braking_heat(
     brake, by_channel = find_brake_rule(rules), {rule.channel: rule for rule in rules}
     if brake is None or "speed" not in by_channel:
         return [0.0] * len(instants)
-    speed, applied = (
-        _drop_gaps(convert_to_channel(take_samples(rule.channel, signals[rule.sources[0]]), rule))
-        for rule in (by_channel["speed"], brake)
-    )
+    taken = {name: take_samples(rule.channel, signals[name]) for rule in rules for name in rule.sources}
+    speed, applied = (_drop_gaps(average_sources(taken, rule)) for rule in (by_channel["speed"], brake))
     if not len(speed.time) or not len(applied.time):
         return [0.0] * len(instants)
-    heat = compute_braking_heat(speed, applied)
+    pressure = replace(applied, values=BRAKE_SIGNALS[brake.channel] * applied.values)
+    heat = compute_braking_heat(speed, pressure)
     return np.interp(instants, heat.time, heat.values).tolist()
 
 
@@ -57,7 +58,7 @@ def _drop_gaps(signal: Signal) -> Signal:
     return replace(signal, time=signal.time[finite], values=signal.values[finite])
 
 
-def compute_braking_heat(speed: Signal, brake: Signal) -> Signal:
+def compute_braking_heat(speed: Signal, pressure: Signal) -> Signal:
     """Return the heat in the discs over a drive that begins with cold ones, per mass of the car [J/kg].
 
     While the brake is applied, what the car loses of its kinetic energy heats the discs, which the air cools.
@@ -65,10 +66,12 @@ def compute_braking_heat(speed: Signal, brake: Signal) -> Signal:
     Parameters
     ----------
     speed : of the whole drive [m/s]
-    brake : of the same drive, any signal that grows with braking
+    pressure : of the brake over the same drive, or what stands for it [MPa]
     """
-    rest, hardest = np.quantile(brake.values, RANGE)
-    applied = np.interp(speed.time, brake.time, brake.values) > rest + APPLIED * (hardest - rest)
+    pressed = median_filter(pressure.values, SPIKE, mode="nearest")
+    rest, hardest = float(np.quantile(pressed, RESTING)), float(np.max(pressed))
+    threshold = rest + max(APPLIED * (hardest - rest), RELEASED_PRESSURE)
+    applied = np.interp(speed.time, pressure.time, pressed) > threshold
     energy = 0.5 * median_filter(speed.values, SPIKE, mode="nearest") ** 2
     gained = np.where(applied, -np.diff(energy, prepend=energy[0]), 0.0)
     cooling = 2.0 * DISC_COOLING / (DISC_CAPACITY_F + DISC_CAPACITY_R)

@@ -16,6 +16,8 @@ SESSION = ("pressure_gain", "mass", "pitch_gain", "wheel_radius", "damping", "st
 """Session nuisances, by the name of the parameter that carries them."""
 
 
+LEAST_SAMPLES = 20
+"""A shorter run holds no stop: 20 samples are a second at 20 Hz."""
 MASKED_SPEED = 2.0
 """Speed below which a run is not used: the floor of the slip's denominator distorts slip there [m/s]."""
 
@@ -24,7 +26,7 @@ def find_motion(speed: NDArray[np.float64]) -> tuple[int, int]:
     """Return the first sample of the stretch of a run that is used, and the one behind its last.
 
     It ends where the speed falls below `MASKED_SPEED`. Where a run begins below it, from a standstill or with a dab of
-    the brake at a red light, it is the longest stretch above.
+    the brake at a red light, or is above it for fewer than `LEAST_SAMPLES`, it is the longest stretch above.
 
     Parameters
     ----------
@@ -34,7 +36,7 @@ def find_motion(speed: NDArray[np.float64]) -> tuple[int, int]:
     starts, ends = np.flatnonzero(~moves[:-1] & moves[1:]), np.flatnonzero(moves[:-1] & ~moves[1:])
     if not starts.size:
         return 0, 0
-    used = 0 if starts[0] == 0 else int(np.argmax(ends - starts))
+    used = 0 if starts[0] == 0 and ends[0] >= LEAST_SAMPLES else int(np.argmax(ends - starts))
     return int(starts[used]), int(ends[used])
 
 

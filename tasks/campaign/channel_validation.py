@@ -289,12 +289,14 @@ def _dive_problems(dive: NDArray[np.float64], less: NDArray[np.float64]) -> list
 
 
 def smooth_channel(values: NDArray[np.float64], interval: float) -> NDArray[np.float64]:
-    """Return the mean of a channel over `SMOOTHING`, float64 [M], where the whole window lies within it.
+    """Return the mean of a channel over `SMOOTHING`, or half of a shorter run, where the whole window lies within it.
+
+    That is float64 [M], of which a run of two samples and more has two.
 
     Parameters
     ----------
     values : float64 [N]
     interval : of their clock [s]
     """
-    width = min(max(round(SMOOTHING / interval), 1), len(values))
+    width = max(min(round(SMOOTHING / interval), len(values) // 2), 1)
     return np.convolve(values, np.ones(width) / width, mode="valid")

@@ -8,7 +8,7 @@ from tasks.campaign.campaign import CHANNELS, Run
 from tasks.surface.weather import DRY, find_weather
 
 INTERVAL = 0.01
-"""Time between samples [s]."""
+"""Time between samples of a test bench [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,7 +75,9 @@ EXPERIMENTS: tuple[tuple[str, RunPlan], ...] = (
 """Runs that any proving ground allows, from which one is chosen to separate two hypotheses."""
 
 
-def make_planned_run(drive: RunPlan, name: str, direction: int = 1, *, held_out: bool = False) -> Run:
+def make_planned_run(
+    drive: RunPlan, name: str, direction: int = 1, *, held_out: bool = False, interval: float = INTERVAL
+) -> Run:
     """Return the run of a plan, with its pressure trace and initial speed but no other response.
 
     Parameters
@@ -84,9 +86,10 @@ def make_planned_run(drive: RunPlan, name: str, direction: int = 1, *, held_out:
     name : of the run
     direction : along (1) or against (-1) the route
     held_out : belongs to the runs that no fit may read
+    interval : between samples [s]
     """
-    count = round(drive.duration / INTERVAL)
-    t = np.arange(count) * INTERVAL
+    count = round(drive.duration / interval)
+    t = np.arange(count) * interval
     pressure = abs(drive.peak) * np.clip((t - 1.0) / 0.3, 0.0, 1.0)
     if drive.peak < 0:
         pressure *= np.where((t > 1.5) & (((t - 1.5) % 1.0) < 0.5), 0.3, 1.0)
@@ -97,5 +100,5 @@ def make_planned_run(drive: RunPlan, name: str, direction: int = 1, *, held_out:
         name=name, held_out=held_out, weather=drive.weather, precipitation_mm_h=drive.rate,
         snow_accumulation_h=hours, direction=direction, disc_rise=drive.disc_rise,
         hazard_center=drive.hazard[0], hazard_length=drive.hazard[1], hazard_height=drive.hazard[2],
-        interval=INTERVAL, pressure=pressure, response=response,
+        interval=interval, pressure=pressure, response=response,
     )  # fmt: skip

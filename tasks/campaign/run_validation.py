@@ -5,15 +5,13 @@ from collections.abc import Collection, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.campaign import MASKED_SPEED, find_motion
+from tasks.campaign.campaign import LEAST_SAMPLES, MASKED_SPEED, find_motion
 from tasks.campaign.channel_validation import frozen_problem, plausibility_problems, signal_problems
 from tasks.campaign.channels import CHANNELS_BY_NAME
 from tasks.campaign.signals import Signal
 from tasks.campaign.slow_channels import fill_between_samples, mark_samples
 
 COLUMN_UNITS = {"time": "s", **{name: channel.unit for name, channel in CHANNELS_BY_NAME.items()}}
-LEAST_SAMPLES = 20
-"""A shorter run holds no stop: 20 samples are a second at 20 Hz."""
 CLOCK_STEP, CLOCK_DRIFT = 0.1, 0.001
 """Share by which a step, and a run, may be longer or shorter than declared [1]."""
 

@@ -10,7 +10,7 @@ from tasks.campaign.channel_validation import clock_problems
 from tasks.campaign.channels import BRAKE_SIGNALS
 from tasks.campaign.episodes import Episode, pressure_episodes
 from tasks.campaign.held_inputs import take_samples
-from tasks.campaign.signals import ChannelRule, Signal, convert_to_channel
+from tasks.campaign.signals import ChannelRule, Signal, average_sources, convert_to_channel
 
 IDLING = 0.1
 """Share of the range of a brake signal, from its lowest, in which it is for a quarter of a drive if it idles [1]."""
@@ -41,7 +41,7 @@ class Segment:
 
     Parameters
     ----------
-    start, end : in the logger's time [s]
+    start, end : in the logger's time, delays taken off [s]
     fault : why it is no run; empty where it is one
     """
 
@@ -73,9 +73,11 @@ def cut_segments(
     brake : of the signal at which the drive is cut
     cut : how
     """
-    applied = convert_to_channel(signals[brake.sources[0]], brake)
+    applied = average_sources(signals, brake)
+    if not len(applied.time):
+        return []
     pressure = BRAKE_SIGNALS[brake.channel] * applied.values
-    lowest, low, highest = np.nanquantile(pressure, (0.0, 0.25, 1.0)) if len(pressure) else np.zeros(3)
+    lowest, low, highest = np.nanquantile(pressure, (0.0, 0.25, 1.0))
     if lowest >= cut.threshold and low <= lowest + IDLING * (highest - lowest):
         fault = (
             f"channel {brake.channel} never falls below {lowest:.3g} MPa, or what stands for it: above_mpa must be"

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 SMOOTHING_S = 0.5
 EDGE_S = 2.0
 """Time left out at both ends, where smoothing lacks samples [s]."""
+SHORTEST_S = 2.0
+"""Time that must be left between them [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,14 +32,18 @@ class SensorAgreement:
     gravity_correlation: float
 
 
-def measure_sensor_agreement(columns: Mapping[str, NDArray[np.float64]], interval: float) -> SensorAgreement:
-    """Fit each pair of channels over the run by a line.
+def measure_sensor_agreement(
+    columns: Mapping[str, NDArray[np.float64]], interval: float
+) -> SensorAgreement | None:
+    """Fit each pair of channels over the run by a line, without its ends; None where little more than these is there.
 
     Parameters
     ----------
     columns : speed, longitudinal_acceleration, pitch and pitch_rate, each float64 [N] in campaign units
     interval : [s]
     """
+    if len(columns["speed"]) * interval < 2.0 * EDGE_S + SHORTEST_S:
+        return None
     smooth = {name: _moving_mean(columns[name], interval) for name in
               ("speed", "longitudinal_acceleration", "pitch", "pitch_rate")}  # fmt: skip
     inner = slice(round(EDGE_S / interval), -round(EDGE_S / interval))

@@ -1,5 +1,6 @@
 """A logged signal on its own clock, its conversion by the channel map, and its resampling on a common clock."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -101,6 +102,23 @@ def convert_to_channel(signal: Signal, rule: ChannelRule) -> Signal:
         values=rule.factor * signal.values + rule.offset,
         unit=CHANNELS_BY_NAME[rule.channel].unit,
     )
+
+
+def average_sources(signals: Mapping[str, Signal], rule: ChannelRule) -> Signal:
+    """Return the mean of a channel's sources in its unit, at the true times of the first; empty where one is.
+
+    Parameters
+    ----------
+    signals : logged signals by name
+    rule : from the channel map
+    """
+    first, *others = (convert_to_channel(signals[name], rule) for name in rule.sources)
+    if not others:
+        return first
+    if not all(len(signal.time) for signal in (first, *others)):
+        return Signal(time=np.empty(0), values=np.empty(0), unit=first.unit)
+    beside = [np.interp(first.time, signal.time, signal.values) for signal in others]
+    return Signal(time=first.time, values=np.mean([first.values, *beside], axis=0), unit=first.unit)
 
 
 def resample_on_clock(signal: Signal, clock: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -22,6 +22,7 @@ class JointRules:
     saturation_ratio : peak deceleration over that of the model's tyres above which they grip better than it says [1]
     limited_time : time from which the file's wheels at their tyres' limit say that a run shows friction [s]
     least_pressure_range : brake pressure that a campaign is taken to reach at least, for its priors [MPa]
+    least_disc_range : range of the discs' temperatures, as training runs begin, from which they show fade [K]
     delay_interval : interval between samples up to which a log tells a lag from a dead time [s]
     coasted_share : share of its speed that a run must lose for its resistances to be told apart [1]
     closed_throttle : share of the throttle up to which it is closed [1]
@@ -47,6 +48,7 @@ class JointRules:
     saturation_ratio: float
     limited_time: float
     least_pressure_range: float
+    least_disc_range: float
     delay_interval: float
     coasted_share: float
     closed_throttle: float

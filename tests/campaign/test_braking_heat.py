@@ -80,10 +80,17 @@ def test_spikes_and_gaps_of_the_speed_heat_nothing():
 
 def test_brake_signals_of_any_size_and_rest_give_the_same_heat():
     speed, brake = drive((5.0, 30.0, 30.0, 0.0), (3.0, 30.0, 10.0, 1.0), (5.0, 10.0, 10.0, 0.0))
-    command = replace(brake, values=0.15 + 0.1 * brake.values)
+    command = replace(brake, values=1.5 + 2.0 * brake.values)
     np.testing.assert_array_equal(
         compute_braking_heat(speed, command).values, compute_braking_heat(speed, brake).values
     )
+
+
+def test_a_brake_that_is_hardly_ever_applied_is_told_from_the_noise_of_its_gauge():
+    speed, brake = drive((3000.0, 30.0, 30.0, 0.0), (100.0, 30.0, 10.0, 0.0), (3.0, 10.0, 5.0, 1.0))
+    noise = np.random.default_rng(1).normal(0.0, 0.02, len(brake.values))
+    assert heat_at(3099.0, speed, replace(brake, values=brake.values + noise)) == 0.0
+    assert heat_at(3099.0, speed, replace(brake, values=noise)) == 0.0
 
 
 def test_a_drive_is_read_through_its_map():
@@ -95,6 +102,9 @@ def test_a_drive_is_read_through_its_map():
     ]
     expected = [heat_at(time, speed, brake) for time in (4.0, 10.0)]
     np.testing.assert_allclose(measure_braking_heat(signals, rules, [4.0, 10.0]), expected, rtol=1e-12)
+    both = [rules[0], replace(rules[1], sources=("p", "dead"))]
+    dead = replace(brake, values=np.zeros(len(brake.values)))
+    np.testing.assert_allclose(measure_braking_heat(signals | {"dead": dead}, both, [10.0]), expected[1:])
     assert expected[0] == 0.0 < expected[1]
 
 

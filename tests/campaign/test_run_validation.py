@@ -31,6 +31,15 @@ def test_a_stop_that_a_slow_log_leaves_with_few_samples_is_no_car_that_stands() 
     assert "where it drives, log faster or take a longer run" in problem
 
 
+@pytest.mark.parametrize(("count", "interval"), [(20, 0.01), (150, 0.001)])
+def test_a_run_shorter_than_the_smoothing_is_checked_as_any_other(count: int, interval: float) -> None:
+    """Twenty samples at 100 Hz are a run; they used to end in a traceback."""
+    run = replace(plain_run(20.0, 2.0), interval=interval)
+    columns = {name: values[:count] for name, values in columns_of(run, np.zeros(len(EFFECT_TABLE))).items()}
+    columns["brake_pressure"] = np.linspace(0.0, 0.5, count)
+    assert run_problems(columns, {}, interval, CHANNELS) == []
+
+
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
 @pytest.mark.parametrize("share", [-0.5, 0.5])
 def test_an_effect_that_the_model_lacks_is_no_fault(effect: Effect, share: float) -> None:

@@ -54,6 +54,20 @@ def test_a_signal_that_idles_above_the_threshold_says_so() -> None:
     assert not segment.fault and segment.start == pytest.approx(8.0, abs=0.02)
 
 
+def test_a_drive_is_cut_by_the_mean_of_its_brake_signals_and_an_empty_one_cuts_nothing() -> None:
+    pressed = Signal(time=TIME, values=np.where((TIME > 10.0) & (TIME < 12.0), 2.0, 0.0))
+    dead, empty = Signal(time=TIME[::7], values=np.zeros(429)), Signal(time=np.empty(0), values=np.empty(0))
+    for sources, count in (
+        (("p", "dead"), 1),
+        (("dead", "p"), 1),
+        (("dead",), 0),
+        (("empty",), 0),
+        (("p", "empty"), 0),
+    ):
+        rule = ChannelRule(channel="brake_pressure", sources=sources, unit="MPa")
+        assert len(cut_segments({"p": pressed, "dead": dead, "empty": empty}, [rule], rule, CUT)) == count
+
+
 @pytest.mark.parametrize("applied", [(), ((10.0, 10.2),)])
 def test_a_drive_without_a_brake_application_has_no_segments(
     applied: tuple[tuple[float, float], ...],

@@ -105,11 +105,13 @@ def test_a_run_over_a_road_feature_begins_moving_because_the_feature_has_a_place
         ((0.0, 3.0, 1.0, 9.0, 8.0, 7.0), (3, 6)),
         ((0.0, 9.0, 8.0, 0.0), (1, 3)),
         ((0.0, 1.0), (0, 0)),
+        ((3.0, 1.0, 9.0, 9.0, 9.0), (2, 5)),
     ],
 )
 def test_a_run_is_used_until_it_stops_or_if_it_begins_slowly_where_it_drives_longest(
-    speed: tuple[float, ...], used: tuple[int, int]
+    monkeypatch: pytest.MonkeyPatch, speed: tuple[float, ...], used: tuple[int, int]
 ) -> None:
+    monkeypatch.setattr("tasks.campaign.campaign.LEAST_SAMPLES", 2)
     assert find_motion(np.array(speed)) == used
 
 

@@ -144,6 +144,13 @@ def test_the_next_experiment_excites_what_tells_the_two_apart(monkeypatch: pytes
     assert plan is not None
     assert plan.plan in {words for words, _ in drives} and "hot discs" in plan.plan
     assert plan.expected_d2 > 20.0
+    # a slower log has fewer samples of the same run, each with the noise that the campaign says
+    slow = [
+        replace(run, model=replace(run.model, run=replace(run.model.run, interval=0.05)))
+        for run in evidence.train
+    ]
+    slower = plan_next_experiment(replace(evidence, train=slow), faded, null, VEHICLE, SURFACE)
+    assert slower is not None and slower.expected_d2 < 0.7 * plan.expected_d2
     # of two that are alike, the run that told the others apart best is refused too
     # runs that cannot be better are not differentiated, and any order gives the same one
     monkeypatch.setattr(experiment, "EXPERIMENTS", drives[::-1])

@@ -1,6 +1,6 @@
 """The verdict and its parts: named effects with their parameters, and errors by channel."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -132,6 +132,22 @@ class Verdict:
     reasons: tuple[str, ...]
     disagreement: str = ""
     misses: bool = False
+
+
+def find_kind(named: Sequence[NamedEffect], rivals: Sequence[tuple[str, NamedEffect]]) -> VerdictName:
+    """Return the kind of a verdict that names no form.
+
+    Parameters
+    ----------
+    named : effects that are named
+    rivals : what the runs cannot tell from them, each with the name that it stands in for
+    """
+    if not named:
+        return "NOTHING"
+    if rivals:
+        return "SET"
+    classes = {effect.effect_class for effect in named}
+    return "FOUND" if "effect" in classes else "RETUNE" if "retune" in classes else "SENSOR"
 
 
 def make_estimate(effect: Effect, parameter: Parameter, error: float) -> NamedEffect:

@@ -48,7 +48,7 @@ def plan_next_experiment(
     other, other_slots = compose_parameters(second.parts, second.values, second.session)
     planned = []
     for plan, drive in EXPERIMENTS:
-        run = make_planned_run(drive, plan)
+        run = make_planned_run(drive, plan, interval=evidence.train[0].model.run.interval)
         if (sampled := evidence.train[0].model.sampled) is not None:
             run = replace(run, sampled=np.resize(sampled, run.response.shape))
         model = prepare_run(run, vehicle, surface)

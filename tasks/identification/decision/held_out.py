@@ -49,7 +49,7 @@ def compute_held_out_errors(
         model = run.model
         y = np.array([predict_channels(model, theta, slots=slots) for theta, slots in models])
         names.append(model.run.name)
-        square.append(np.mean((model.measured - y) ** 2, axis=1))
+        square.append(model.compute_square_error(y))
         pressure = model.run.pressure[: model.samples]
         errors = manoeuvre_errors(model.measured, y, pressure, model.run.interval)
         if errors is not None:

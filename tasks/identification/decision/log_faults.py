@@ -42,7 +42,7 @@ def tell_log_faults(campaign: Campaign, named: Sequence[NamedEffect], rivals: Co
             " begin would look the same"
         )
     elif campaign.brake_signal == "brake_pressure":
-        runs = {run.name: {"brake_pressure": run.pressure, "speed": run.speed} for run in campaign.runs}
+        runs = {run.name: {"brake_pressure": run.pressure, "speed": run.speed} for run in campaign.train}
         rest = describe_rest(measure_resting_levels(runs, campaign.runs[0].interval))
         told += [] if rest is None else [rest]
     return told

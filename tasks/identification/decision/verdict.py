@@ -12,6 +12,7 @@ from tasks.identification.decision.answer import (
     NamedEffect,
     Verdict,
     VerdictName,
+    find_kind,
     make_named_effect,
 )
 from tasks.identification.decision.attribution import Candidate
@@ -242,14 +243,9 @@ def _to_tell_apart(
 
 
 def _verdict_name(named: list[NamedEffect], near: list[tuple[str, NamedEffect]]) -> VerdictName:
-    if not named:
-        return "NOTHING"
     forms = {(e.name, e.port, e.variable) for e in named if e.effect_class == "form"}
     if forms:
         # an effect of the library that explains as much at the same port by the same variable is not unknown
         known = {(of, e.port, e.variable) for of, e in near if e.effect_class == "effect"}
         return "SET" if forms & known else "UNKNOWN_FORM"
-    if near:
-        return "SET"
-    classes = {effect.effect_class for effect in named}
-    return "FOUND" if "effect" in classes else "RETUNE" if "retune" in classes else "SENSOR"
+    return find_kind(named, near)

@@ -44,7 +44,6 @@ class RunModel:
     conditions : road feature, snow, direction and disc temperature of the run
     samples : number of samples that are used, to the end of `find_motion`
     initial_speed : speed at the first sample, from the line through the speed before the brake [m/s]
-    climb : force of the measured road slope over time; empty where the slope was not measured
     """
 
     run: Run
@@ -53,7 +52,6 @@ class RunModel:
     conditions: Conditions
     samples: int
     initial_speed: float
-    climb: tuple[Slot, ...] = ()
 
     @property
     def substeps(self) -> int:
@@ -79,6 +77,20 @@ class RunModel:
         """
         rows = self.run.find_samples(channel)
         return rows[rows < self.samples]
+
+    def compute_square_error(self, predicted: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the mean square by which a prediction misses the samples of each channel, float64 [..., 7].
+
+        Parameters
+        ----------
+        predicted : float64 [..., samples, 7]
+        """
+        square = (self.measured - predicted) ** 2
+        if self.sampled is None:
+            return np.asarray(square.mean(axis=-2))
+        return np.asarray(
+            np.where(self.sampled, square, 0.0).sum(axis=-2) / np.maximum(self.count_samples(), 1)
+        )
 
     def count_samples(self) -> NDArray[np.int64]:
         """Return the number of used samples of each channel, int64 [7]."""
@@ -119,7 +131,6 @@ def prepare_run(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunMo
         ),
         samples=samples,
         initial_speed=float(np.polyfit(np.arange(lead), speed[:lead], 1)[1]),
-        climb=_compute_grade_force(run, vehicle),
     )
 
 
@@ -222,7 +233,7 @@ def simulate_run(
         ),
         initial_speed=compute_starting_speed(model, theta) if initial_speed is None else initial_speed,
         start=branch[1].states[first] if branch else None,
-        slots=(*model.climb, *slots),
+        slots=(*_compute_grade_force(model.run, car.vehicle), *slots),
     )
     if branch is None:
         return simulated

@@ -93,7 +93,5 @@ def weigh_misfit(
     left = stop.measured - predict_stop(stop, numbers, offsets, motion)[:, stop.channels]
     apart = stop.model.samples / stop.model.count_samples()[stop.channels]
     weight = np.sqrt(np.minimum(apart * stop.model.run.interval / 0.05, 1.0))
-    weighted = np.asarray(weight * left / scales[stop.channels], dtype=np.float64)[:end]
-    if stop.model.sampled is None:
-        return weighted.ravel()
-    return weighted[stop.model.sampled[:end, stop.channels]]
+    weighted = np.asarray(weight * left / scales[stop.channels], dtype=np.float64)
+    return weighted[:end][stop.grid[:end]]

@@ -5,13 +5,18 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
-from tasks.identification.inference.noise import correlate_with_next
 from tasks.identification.joint.derivatives import differentiate_run
 from tasks.identification.joint.fit import JointFit, describe_fit, fit_jointly
 from tasks.identification.joint.numbers import FRICTION, JointNumber
 from tasks.identification.joint.stops import Stop
+from tasks.identification.joint.uncertainty import (
+    certain_from,
+    count_standard_errors,
+    measure_worst_misfit,
+    soften,
+    standard_errors,
+)
 from tasks.identification.rules import JointRules
 
 GRIPS = (0.0, 0.2, 0.5)
@@ -37,91 +42,6 @@ class Substitute:
     of: str
     name: str
     fitted: JointFit
-
-
-def standard_errors(fitted: JointFit, rules: JointRules) -> NDArray[np.float64]:
-    """Return the standard error of each number, float64 [K] [unit of the table].
-
-    Misfit of a model is no white noise. The larger of two answers is taken: the curvature widened by the residuals'
-    correlation from sample to sample; and, from `fewest_scatter_runs` runs on, the jackknife over runs, linear about
-    the fit (Efron 1982, doi:10.1137/1.9781611970319).
-
-    Parameters
-    ----------
-    fitted : the fit
-    rules : of the joint fit
-    """
-    inverse = np.linalg.inv(fitted.information)
-    wide = max(_lag_inflation(r, rules) * float(np.mean(r**2)) for r in fitted.residuals)
-    error = np.sqrt(np.diag(inverse) * max(wide, 1.0))
-    runs = len(fitted.residuals)
-    if runs < rules.fewest_scatter_runs:
-        return error
-    moves = []
-    for residual, slope in zip(fitted.residuals, fitted.slopes, strict=True):
-        rest = fitted.information - slope.T @ slope
-        moves.append(np.linalg.solve(rest, slope.T @ _softened(residual)))
-    spread = np.array(moves) - np.mean(moves, axis=0)
-    return np.maximum(error, np.sqrt((runs - 1) / runs * np.sum(spread**2, axis=0)))
-
-
-def _softened(residual: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the residuals with the weight that the robust loss gives them."""
-    return residual / np.sqrt(1.0 + residual**2)
-
-
-def _lag_inflation(residual: NDArray[np.float64], rules: JointRules) -> float:
-    """Return how many samples count as one: (1 + rho) / (1 - rho) of first-order autoregressive misfit."""
-    rho = correlate_with_next(residual, rules.most_residual_correlation)
-    return (1.0 + rho) / (1.0 - rho)
-
-
-def compute_interval_quantile(fitted: JointFit) -> float:
-    """Return the number of standard errors of a 95 % interval: Student's t with the runs less one.
-
-    Parameters
-    ----------
-    fitted : the fit
-    """
-    return float(stdtrit(max(len(fitted.residuals) - 1, 2), 0.975))
-
-
-def certain_from(fitted: JointFit, rules: JointRules) -> float:
-    """Return the standard errors from 0 from which a number is named: Student's t, for few runs tell their scatter ill.
-
-    Parameters
-    ----------
-    fitted : the fit
-    rules : of the joint fit
-    """
-    runs = max(len(fitted.residuals), rules.fewest_scatter_runs)
-    return float(stdtrit(runs - 1, 1.0 - rules.false_name_chance))
-
-
-def count_standard_errors(fitted: JointFit, rules: JointRules) -> NDArray[np.float64]:
-    """Return by how many standard errors each number differs from the vehicle file's, float64 [K].
-
-    Parameters
-    ----------
-    fitted : the fit
-    rules : of the joint fit
-    """
-    return np.asarray(np.abs(fitted.values) / standard_errors(fitted, rules))
-
-
-def certain_numbers(fitted: JointFit, rules: JointRules) -> list[tuple[JointNumber, float]]:
-    """Return the numbers that earned their place for certain, and by how many standard errors.
-
-    Parameters
-    ----------
-    fitted : the fit
-    rules : of the joint fit
-    """
-    return [
-        (number, float(sure))
-        for number, sure in zip(fitted.numbers, count_standard_errors(fitted, rules), strict=True)
-        if number.removable and sure >= certain_from(fitted, rules)
-    ]
 
 
 def eliminate_uncertain_numbers(stops: Sequence[Stop], fitted: JointFit, rules: JointRules) -> JointFit:
@@ -213,21 +133,21 @@ def _stable_names(fitted: JointFit, rules: JointRules) -> set[str]:
 
 def _kept_linearly(fitted: JointFit, runs: tuple[int, ...], rules: JointRules) -> set[str]:
     """Return the removable numbers that backward elimination keeps on some runs, linear about the fit."""
-    residual = [_softened(fitted.residuals[i]) for i in runs]
+    residual = [soften(fitted.residuals[i]) for i in runs]
     slopes = [fitted.slopes[i] for i in runs]
     prior = np.array([1.0 / n.sigma**2 for n in fitted.numbers])
-    information = np.diag(prior) + sum(a.T @ a for a in slopes)
+    information = np.asarray(np.diag(prior) + sum(a.T @ a for a in slopes))
     # residuals fall along the slopes: the right-hand side of the values themselves, not of a move
     right = np.asarray(
         information @ fitted.values - sum(a.T @ r for a, r in zip(slopes, residual, strict=True))
     )
     right -= prior * fitted.values
-    wide = max(_lag_inflation(r, rules) * float(np.mean(r**2)) for r in residual)
+    wide = measure_worst_misfit(residual)
     left = list(range(len(fitted.numbers)))
     while True:
         inverse = np.linalg.inv(information[np.ix_(left, left)])
         values = inverse @ right[left]
-        sure = np.abs(values) / np.sqrt(np.diag(inverse) * max(wide, 1.0))
+        sure = np.abs(values) / np.sqrt(np.diag(inverse) * wide)
         weak = [(float(s), j) for s, j in zip(sure, left, strict=True) if fitted.numbers[j].removable]
         if not weak or min(weak)[0] >= certain_from(fitted, rules):
             return {fitted.numbers[j].name for j in left if fitted.numbers[j].removable}
@@ -270,7 +190,7 @@ def foresee_falls(
         differentiate_run(stop, numbers, values, own, fitted.scales)
         for stop, own in zip(stops, fitted.offsets, strict=True)
     ]
-    beside = describe_fit(runs, numbers, values, fitted.offsets, fitted.scales, fitted.cost)
+    beside = describe_fit(stops, runs, numbers, values, fitted.offsets, fitted.scales, fitted.cost)
     information = np.diag([1.0 / n.sigma**2 for n in numbers])
     gradient = np.zeros(len(numbers))
     for residual, slope in zip(beside.residuals, beside.slopes, strict=True):

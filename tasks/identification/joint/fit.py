@@ -50,6 +50,7 @@ class JointFit:
     cost : robust misfit with the priors, over 2
     residuals : weighted, one float64 [M] a run, the channels of an instant together
     slopes : derivatives by the numbers, the run's own offsets taken out, one float64 [M, K] a run
+    grids : where each channel was compared, one bool [N, C] a run with M of them true
     information : float64 [K, K] of the numbers, offsets taken out, priors included
     scales : size of a misfit that counts one, by place in `CHANNELS` [the channel's unit]
     """
@@ -60,6 +61,7 @@ class JointFit:
     cost: float
     residuals: tuple[NDArray[np.float64], ...]
     slopes: tuple[NDArray[np.float64], ...]
+    grids: tuple[NDArray[np.bool_], ...]
     information: NDArray[np.float64]
     scales: NDArray[np.float64]
 
@@ -193,6 +195,7 @@ def _fit_from(
         max_nfev=MOST_EVALUATIONS,
     )  # fmt: skip
     return describe_fit(
+        stops,
         differentiate_runs(found.x),
         numbers,
         found.x[:k],
@@ -203,6 +206,7 @@ def _fit_from(
 
 
 def describe_fit(
+    stops: Sequence[Stop],
     runs: Sequence[Derivatives],
     numbers: tuple[JointNumber, ...],
     values: NDArray[np.float64],
@@ -214,6 +218,7 @@ def describe_fit(
 
     Parameters
     ----------
+    stops : training runs
     runs : of each training run at the point, as `differentiate_run` returns them
     numbers : of the fit
     values : float64 [K] of the numbers
@@ -226,7 +231,7 @@ def describe_fit(
     information = np.diag([1.0 / n.sigma**2 for n in numbers]) + sum(a.T @ a for a in slopes)
     return JointFit(
         numbers=numbers, values=values, offsets=offsets, cost=cost, residuals=tuple(left for left, _ in runs),
-        slopes=slopes, information=np.asarray(information), scales=scales,
+        slopes=slopes, grids=tuple(stop.grid for stop in stops), information=np.asarray(information), scales=scales,
     )  # fmt: skip
 
 

@@ -11,14 +11,10 @@ from tasks.campaign.manoeuvres import MANOEUVRE_UNITS, manoeuvre_errors
 from tasks.identification.decision.answer import ChannelError
 from tasks.identification.decision.held_out import is_noticed, summarise_errors
 from tasks.identification.decision.words import join_phrases
-from tasks.identification.joint.elimination import (
-    Substitute,
-    certain_numbers,
-    eliminate_uncertain_numbers,
-    refit_numbers,
-)
+from tasks.identification.joint.elimination import Substitute, eliminate_uncertain_numbers, refit_numbers
 from tasks.identification.joint.fit import JointFit, lead_offsets
 from tasks.identification.joint.stops import Stop, predict_stop
+from tasks.identification.joint.uncertainty import certain_numbers
 from tasks.identification.rules import DecisionRules, JointRules
 
 
@@ -38,7 +34,7 @@ def drop_what_predicts_worse(
     """
     there = _held_out_misfit(held_out, fitted)
     trials = []
-    for number, _ in certain_numbers(fitted, rules):
+    for number in certain_numbers(fitted, rules):
         without = refit_numbers(train, fitted, tuple(n for n in fitted.numbers if n.name != number.name))
         gone = _held_out_misfit(held_out, without)
         # a number earns its name by what it does to any channel, and not against the speed
@@ -109,7 +105,7 @@ def _held_out_misfit(held_out: Sequence[Stop], fitted: JointFit) -> tuple[float,
     speeds, channels = [], []
     for stop in held_out:
         y = predict_stop(stop, fitted.by_name, lead_offsets(stop, fitted.by_name, fitted.scales))
-        left = np.mean((stop.model.measured - y) ** 2, axis=0)
+        left = stop.model.compute_square_error(y)
         speeds.append(float(left[place]))
         channels.append(float(np.mean(left[stop.channels] / fitted.scales[stop.channels] ** 2)))
     return float(np.sqrt(np.mean(speeds))), float(np.sqrt(np.mean(channels)))
@@ -146,10 +142,7 @@ def summarise_held_out(
     names = [stop.model.run.name for stop in held_out]
     places = held_out[0].channels
     square = np.array(
-        [
-            np.mean((stop.model.measured - y) ** 2, axis=1)[:, places]
-            for stop, y in zip(held_out, predicted, strict=True)
-        ]
+        [stop.model.compute_square_error(y)[:, places] for stop, y in zip(held_out, predicted, strict=True)]
     )
     units = {CHANNELS[c]: CHANNEL_UNITS[c] for c in places}
     channels = summarise_errors(square, names, units, rules.error_resamples)

@@ -98,7 +98,10 @@ def choose_numbers(
     for number in numbers:
         if not any(need in campaign.channels for need in number.needs):
             continue
-        if number.name == "fade" and len({run.disc_rise for run in campaign.train}) < 2:
+        if (
+            number.name == "fade"
+            and np.ptp([run.disc_rise for run in campaign.train]) < rules.least_disc_range
+        ):
             continue  # discs of one temperature show no fade
         if number.group == "curve" and stops < rules.fewest_curve_stops:
             continue  # one stop gives a gain and a delay, and no curve

@@ -56,6 +56,12 @@ class Stop:
         """float64 [N, C] measured channels that are compared."""
         return self.model.measured[:, self.channels]
 
+    @property
+    def grid(self) -> NDArray[np.bool_]:
+        """bool [N, C] instants at which each of them has a sample."""
+        sampled, shape = self.model.sampled, (self.model.samples, len(self.channels))
+        return np.ones(shape, dtype=bool) if sampled is None else sampled[:, self.channels]
+
 
 def make_stop(
     run: Run, vehicle: Vehicle, surface: SurfaceParameters, channels: tuple[str, ...], rules: JointRules

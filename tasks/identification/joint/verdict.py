@@ -12,7 +12,7 @@ from tasks.identification.decision.answer import (
     NamedEffect,
     Parameter,
     Verdict,
-    VerdictName,
+    find_kind,
     is_within_tolerance,
     make_estimate,
 )
@@ -23,13 +23,10 @@ from tasks.identification.inference.disturbance import Disturbance
 from tasks.identification.joint.calibration import fit_first_numbers, is_gain_unknown
 from tasks.identification.joint.elimination import (
     Substitute,
-    certain_numbers,
-    compute_interval_quantile,
     drop_at_bounds,
     eliminate_uncertain_numbers,
     find_substitutes,
     refit_numbers,
-    standard_errors,
     vary_grip,
 )
 from tasks.identification.joint.fit import (
@@ -55,6 +52,11 @@ from tasks.identification.joint.numbers import (
     free_numbers,
 )
 from tasks.identification.joint.stops import FITTED, Stop, complete_numbers, make_stop
+from tasks.identification.joint.uncertainty import (
+    certain_numbers,
+    compute_interval_reach,
+    standard_errors,
+)
 from tasks.identification.joint.words import tell_lumped_resistance, tell_rivals, tell_what_was_used
 from tasks.identification.rules import DecisionRules, JointRules
 from tasks.surface.state import SurfaceParameters
@@ -172,7 +174,7 @@ def judge_jointly(
         ]
         effects, calibrated, substitutes = [], (*effects, *calibrated), ()
     rivals = _name_rivals(fitted, substitutes, effects, joint)
-    kind = _kind(effects, rivals)
+    kind = find_kind(effects, rivals)
     reasons += tell_what_was_used(campaign, train, agreeing, joint)
     reasons += tell_rivals(effects, rivals, shown)
     reasons += tell_log_faults(campaign, effects, [rival.name for _, rival in rivals])
@@ -251,7 +253,7 @@ def _settle(
 def _name_effects(fitted: JointFit, rules: JointRules) -> list[NamedEffect]:
     """Return what is named, new physics first."""
     # what every car needs anew is told whatever its size: the prediction rests on it
-    named = [n for n, _ in certain_numbers(fitted, rules)]
+    named = certain_numbers(fitted, rules)
     named += [n for n in fitted.numbers if not n.removable and not n.is_at_bound(fitted.by_name[n.name])]
     order = {"effect": 0, "sensor": 1, "retune": 2}
     return sorted((_named_effect(fitted, n, rules) for n in named), key=lambda e: order[e.effect_class])
@@ -275,7 +277,7 @@ def _name_rivals(
 def _named_effect(fitted: JointFit, number: JointNumber, rules: JointRules) -> NamedEffect:
     place = fitted.numbers.index(number)
     value, error = float(fitted.values[place]), float(standard_errors(fitted, rules)[place])
-    reach = compute_interval_quantile(fitted) * error
+    reach = float(compute_interval_reach(fitted, rules)[place])
     estimate = Parameter(
         name=number.name, value=value, ci_low=max(value - reach, number.lower),
         ci_high=min(value + reach, number.upper), lower=number.lower, upper=number.upper,
@@ -291,10 +293,3 @@ def _tolerances(campaign: Campaign, shown: Sequence[JointNumber]) -> dict[str, f
     return {name: session[name] for name in (GAIN, "wheel_radius", "mass")} | dict.fromkeys(
         frictions, campaign.tolerances.friction
     )
-
-
-def _kind(effects: Sequence[NamedEffect], rivals: Sequence[tuple[str, NamedEffect]]) -> VerdictName:
-    classes = {effect.effect_class for effect in (*effects, *(rival for _, rival in rivals))}
-    if "effect" in classes:
-        return "SET" if rivals else "FOUND"
-    return "SENSOR" if "sensor" in classes else "RETUNE" if classes else "NOTHING"

@@ -227,10 +227,21 @@ def test_no_edit_beside_the_measured_values_makes_a_reading_the_first(
         commented,
         replace(commented, content_hash="renamed", split_hash="r", runs=renamed[::-1]),
         replace(commented, content_hash="fewer", split_hash="f", runs=made.runs[:-1]),
+        replace(commented, content_hash="zero", runs=tuple(run.lower_pressure(0.01) for run in made.runs)),
     )
-    assert [record_reading(c, "v") for c in variants] == [0, 1, 2, 3]
+    assert [record_reading(c, "v") for c in variants] == [0, 1, 2, 3, 4]
     kept = json.loads((tmp_path / "ledger.jsonl").read_text().splitlines()[1])
     assert kept["content_sha256"] == "with a comment"
+
+
+def test_a_run_that_was_fitted_before_is_no_blind_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MUSYNC_LEDGER", str(tmp_path / "ledger.jsonl"))
+    made = judging(1, "a")
+    turned = tuple(replace(run, held_out=not run.held_out) for run in made.runs)
+    swapped = replace(made, content_hash="swapped", split_hash="s", runs=turned)
+    assert [record_reading(c, "v") for c in (made, swapped)] == [0, 1]
 
 
 def test_a_ledger_from_before_runs_were_hashed_still_counts(

@@ -17,7 +17,7 @@ from flows.measured.importing import import_measurements
 from tasks.campaign.campaign import CHANNELS
 from tasks.campaign.channels import MAIN_CHANNELS
 from tasks.errors import InputError
-from tests.campaign.recorded import braking_columns, log_signal
+from tests.campaign.recorded import MAP, braking_columns, log_signal
 from tests.flows.measured.recordings import Columns, import_columns, write_csv, write_map
 
 
@@ -166,6 +166,25 @@ def test_one_run_per_brake_application_every_third_held_out(tmp_path: Path) -> N
     assert heat == pytest.approx(lost, rel=0.05)
 
 
+def test_a_window_of_a_late_channel_is_cut_where_it_was_measured(tmp_path: Path) -> None:
+    """A speed that the logger stamps 0.35 s late has its samples behind the window of a run of 3 s."""
+    columns = log_signal(braking_columns(14.0))
+    columns["v_kmh"] = np.interp(columns["t_ms"] - 350.0, columns["t_ms"], columns["v_kmh"])
+    write_csv(tmp_path / "log.csv", columns)
+    content = yaml.safe_load(MAP)["channels"]
+    content["speed"]["delay_s"] = 0.35
+    runs = [
+        {"name": name, "from_s": start, "to_s": start + 3.0, "file": "log.csv", "part": part}
+        for name, start, part in (("a", 1.0, "train"), ("b", 5.0, "held_out"))
+    ]
+    report = import_measurements(
+        str(tmp_path / "log.csv"),
+        map=write_map(tmp_path, runs=runs, channels=content),
+        out=str(tmp_path / "out"),
+    )
+    assert [run["duration_s"] for run in report["runs"]] == pytest.approx([3.0, 3.0], abs=0.02)
+
+
 def test_no_heat_is_estimated_where_a_disc_temperature_is_declared(tmp_path: Path) -> None:
     columns = braking_columns(14.0)
     columns["speed"] = 20.0 - np.cumsum(columns["brake_pressure"]) / 100
@@ -173,16 +192,19 @@ def test_no_heat_is_estimated_where_a_disc_temperature_is_declared(tmp_path: Pat
         columns[name] = columns["speed"] / 0.32
     write_csv(tmp_path / "log.csv", log_signal(columns))
     found = []
-    for rise in (0.0, 30.0):
+    for name, conditions in (
+        ("unknown", {}), ("cold", {"disc_temperature_above_ambient_c": 0.0}),
+        ("hot", {"disc_temperature_above_ambient_c": 270.0}),
+    ):  # fmt: skip
         runs = [
             {"name": f"r{i}", "from_s": float(i), "to_s": i + 3.0, "file": "log.csv", "part": part,
-             "conditions": {"disc_temperature_above_ambient_c": rise * i}}
+             "conditions": conditions}
             for i, part in ((0, "train"), (9, "held_out"))
         ]  # fmt: skip
-        out = tmp_path / f"campaign-{rise:.0f}"
+        out = tmp_path / name
         import_measurements(str(tmp_path / "log.csv"), map=write_map(tmp_path, runs=runs), out=str(out))
         found.append([(run.disc_rise, run.braking_heat > 0.0) for run in read_campaign(out).runs])
-    assert found == [[(0.0, False), (0.0, True)], [(0.0, False), (270.0, False)]]
+    assert found == [[(0.0, False), (0.0, True)], [(0.0, False)] * 2, [(270.0, False)] * 2]
 
 
 def test_a_segment_that_is_no_run_is_listed_and_the_others_come_in(tmp_path: Path) -> None:

@@ -1,71 +1,32 @@
-"""How certain a number is follows from the residuals' memory and from the scatter over runs, by the rules."""
+"""What is not certain goes, and what explains nearly as much in the place of what stays is its rival."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import t as student
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.joint_numbers import load_joint_numbers
 from tasks.identification.joint import elimination
 from tasks.identification.joint.elimination import (
     FORESEEN_SHARE,
-    certain_from,
-    certain_numbers,
     drop_at_bounds,
     eliminate_uncertain_numbers,
     find_substitutes,
     foresee_falls,
     refit_numbers,
-    standard_errors,
 )
-from tasks.identification.joint.fit import JointFit
-from tests.identification.joint.known_car import slow_brakes
+from tasks.identification.joint.uncertainty import standard_errors
+from tests.identification.joint.known_car import fit_of, slow_brakes
 
 RULES = load_decision_rules().joint
 NUMBERS = {number.name: number for number in load_joint_numbers()}
 LAG = NUMBERS["lag"]
 
 
-def fit_of(residuals: list[np.ndarray], value: float = 0.1) -> JointFit:
-    """Return a fit of a lag whose derivative is 1 in every sample."""
-    slopes = tuple(np.ones((len(r), 1)) for r in residuals)
-    return JointFit(
-        numbers=(LAG,), values=np.array([value]), offsets=np.zeros((len(residuals), 3)), cost=0.0,
-        residuals=tuple(residuals), slopes=slopes, information=np.array([[sum(len(r) for r in residuals) + 1e-9]]),
-        scales=np.ones(7),
-    )  # fmt: skip
-
-
 def foresee_much(_stops, _fitted, others):
     """Foresee that every number makes good all that is missing."""
     return np.full(len(others), 1e6)
-
-
-def test_residuals_that_remember_widen_an_error_up_to_a_limit():
-    fitted = fit_of([np.full(400, 2.0)])  # correlated by 0.9975 from sample to sample
-    for most in (0.5, RULES.most_residual_correlation):
-        (error,) = standard_errors(fitted, replace(RULES, most_residual_correlation=most))
-        assert error == pytest.approx(np.sqrt(4.0 * (1.0 + most) / (1.0 - most) / 400))
-
-
-def test_the_scatter_of_runs_counts_where_there_are_enough_of_them():
-    runs = [np.resize([level, -level], 100) + level for level in (0.4, -0.4, 0.4, -0.4)]
-    (alone,) = standard_errors(fit_of(runs), replace(RULES, fewest_scatter_runs=len(runs) + 1))
-    (scattered,) = standard_errors(fit_of(runs), replace(RULES, fewest_scatter_runs=len(runs)))
-    assert scattered > 2.0 * alone
-
-
-def test_a_number_is_certain_from_the_chance_of_a_false_name():
-    fitted = fit_of([np.zeros(100)] * 3)
-    for chance in (RULES.false_name_chance, 0.05):
-        rules = replace(RULES, false_name_chance=chance)
-        limit = student.ppf(1.0 - chance, RULES.fewest_scatter_runs - 1)
-        assert certain_from(fitted, rules) == pytest.approx(limit)
-        error = float(standard_errors(fitted, rules)[0])
-        assert not certain_numbers(replace(fitted, values=np.array([0.99 * limit * error])), rules)
-        assert certain_numbers(replace(fitted, values=np.array([1.01 * limit * error])), rules)
 
 
 def test_whatever_explains_nearly_as_much_is_a_rival_of_whichever_kind(monkeypatch):

@@ -142,7 +142,8 @@ def test_tyres_at_their_limit_are_a_rival_of_the_brakes_curve():
     )  # fmt: skip
     fitted = replace(
         slow_brakes().fitted, numbers=(numbers["wet_friction"], numbers["push_out"]), values=np.array([0.1, 0.3]),
-        information=1e6 * np.eye(2), residuals=(np.zeros(10),) * 2, slopes=(np.zeros((10, 2)),) * 2,
+        information=1e6 * np.eye(2), residuals=(np.zeros(10),) * 2,
+        slopes=(np.zeros((10, 2)),) * 2, grids=(np.ones((10, 1), dtype=bool),) * 2,
     )  # fmt: skip
     found = verdict._name_rivals(fitted, [], [curve], RULES.joint)
     assert [rival.name for _, rival in found] == ["retuned_wet_friction"]

@@ -1,0 +1,144 @@
+"""How well the runs tell each number of a joint fit: by what their misfit remembers, and by how they scatter."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+from scipy.special import ndtri, stdtrit
+
+from tasks.identification.inference.noise import correlate_with_next
+from tasks.identification.joint.fit import JointFit
+from tasks.identification.joint.numbers import JointNumber
+from tasks.identification.rules import JointRules
+
+OUTSIDE = 0.025
+"""Share beyond either end of an interval of 95 % [1]."""
+
+
+def standard_errors(fitted: JointFit, rules: JointRules) -> NDArray[np.float64]:
+    """Return the standard error of each number, float64 [K] [unit of the table].
+
+    The curvature with the misfit of the run that is followed worst counts; from `fewest_scatter_runs` runs on the
+    jackknife over runs too, linear about the fit (Efron 1982, doi:10.1137/1.9781611970319). Misfit of a model
+    remembers, which the scatter of runs holds and the curvature does not: of few runs the quantile stands for it.
+
+    Parameters
+    ----------
+    fitted : the fit
+    rules : of the joint fit
+    """
+    runs = len(fitted.residuals)
+    error = np.sqrt(np.diag(np.linalg.inv(fitted.information)) * measure_worst_misfit(fitted.residuals))
+    if runs < rules.fewest_scatter_runs:
+        return np.asarray(error)
+    moves = []
+    for residual, slope in zip(fitted.residuals, fitted.slopes, strict=True):
+        rest = fitted.information - slope.T @ slope
+        moves.append(np.linalg.solve(rest, slope.T @ soften(residual)))
+    spread = np.array(moves) - np.mean(moves, axis=0)
+    return np.maximum(error, np.sqrt((runs - 1) / runs * np.sum(spread**2, axis=0)))
+
+
+def measure_worst_misfit(residuals: Sequence[NDArray[np.float64]]) -> float:
+    """Return the mean square of the weighted misfit of the run that is followed worst, at least 1 [1].
+
+    Parameters
+    ----------
+    residuals : weighted, one float64 [M] a run
+    """
+    return max(1.0, *(float(np.mean(residual**2)) for residual in residuals))
+
+
+def compute_interval_reach(fitted: JointFit, rules: JointRules) -> NDArray[np.float64]:
+    """Return how far the ends of a 95 % interval are from each number, float64 [K] [unit of the table].
+
+    That is Student's t with the runs less one, at least two. Fewer than `fewest_scatter_runs` runs do not tell how they
+    scatter: there the misfit counts as what remembers, if that is more (the sandwich of White 1980,
+    doi:10.2307/1912934).
+
+    Parameters
+    ----------
+    fitted : the fit
+    rules : of the joint fit
+    """
+    runs = len(fitted.residuals)
+    reach = float(stdtrit(max(runs - 1, 2), 1.0 - OUTSIDE)) * standard_errors(fitted, rules)
+    if runs >= rules.fewest_scatter_runs:
+        return np.asarray(reach)
+    score = np.diag([1.0 / n.sigma**2 for n in fitted.numbers])
+    for residual, slope, grid in zip(fitted.residuals, fitted.slopes, fitted.grids, strict=True):
+        score = score + _compute_score_covariance(residual, slope, grid, rules)
+    inverse = np.linalg.inv(fitted.information)
+    remembers = np.sqrt(np.diag(inverse @ score @ inverse))
+    return np.maximum(reach, float(ndtri(1.0 - OUTSIDE)) * remembers)
+
+
+def _compute_score_covariance(
+    residual: NDArray[np.float64], slope: NDArray[np.float64], grid: NDArray[np.bool_], rules: JointRules
+) -> NDArray[np.float64]:
+    """Return the covariance of the gradient of a run, float64 [K, K].
+
+    The misfit of a channel is first-order autoregressive, and that of two channels is correlated at one instant: a
+    model that misses the speed misses the wheels at the same time.
+    """
+    left, columns = np.zeros(grid.shape), np.zeros((*grid.shape, slope.shape[1]))
+    left[grid], columns[grid] = residual, slope
+    for c in range(grid.shape[1]):
+        rows = np.flatnonzero(grid[:, c])
+        apart = float(np.median(np.diff(rows))) if len(rows) > 1 else 1.0
+        kept = correlate_with_next(left[rows, c], rules.most_residual_correlation) ** (1.0 / apart)
+        # the transpose of the filter that makes such misfit of white noise, run backwards over the derivatives
+        sums = lfilter([1.0], [1.0, -kept], columns[::-1, c], axis=0)[::-1]
+        sums[1:] *= np.sqrt(1.0 - kept**2)
+        columns[:, c] = sums
+    common = np.maximum(grid.T.astype(np.float64) @ grid, 1.0)
+    return np.asarray(np.einsum("cd,nck,ndl->kl", left.T @ left / common, columns, columns, optimize=True))
+
+
+def soften(residual: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return residuals with the weight that the robust loss gives them.
+
+    Parameters
+    ----------
+    residual : float64 [M] weighted
+    """
+    return residual / np.sqrt(1.0 + residual**2)
+
+
+def certain_from(fitted: JointFit, rules: JointRules) -> float:
+    """Return the standard errors from 0 from which a number is named: Student's t, for few runs tell their scatter ill.
+
+    Parameters
+    ----------
+    fitted : the fit
+    rules : of the joint fit
+    """
+    runs = max(len(fitted.residuals), rules.fewest_scatter_runs)
+    return float(stdtrit(runs - 1, 1.0 - rules.false_name_chance))
+
+
+def count_standard_errors(fitted: JointFit, rules: JointRules) -> NDArray[np.float64]:
+    """Return by how many standard errors each number differs from the vehicle file's, float64 [K].
+
+    Parameters
+    ----------
+    fitted : the fit
+    rules : of the joint fit
+    """
+    return np.asarray(np.abs(fitted.values) / standard_errors(fitted, rules))
+
+
+def certain_numbers(fitted: JointFit, rules: JointRules) -> list[JointNumber]:
+    """Return the numbers that earned their place for certain.
+
+    Parameters
+    ----------
+    fitted : the fit
+    rules : of the joint fit
+    """
+    return [
+        number
+        for number, sure in zip(fitted.numbers, count_standard_errors(fitted, rules), strict=True)
+        if number.removable and sure >= certain_from(fitted, rules)
+    ]
