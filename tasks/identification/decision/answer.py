@@ -168,7 +168,7 @@ def make_estimate(effect: Effect, parameter: Parameter, error: float) -> NamedEf
 
 
 def is_within_tolerance(effect: NamedEffect, tolerances: Mapping[str, float], limit: float) -> bool:
-    """Whether a number of the file is off by no more than its tolerance and its own error allow.
+    """Whether a number of the file is off by no more than its tolerance and a quarter of its interval allow.
 
     Parameters
     ----------

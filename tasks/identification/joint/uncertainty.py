@@ -53,7 +53,7 @@ def measure_worst_misfit(residuals: Sequence[NDArray[np.float64]]) -> float:
 def compute_interval_reach(fitted: JointFit, rules: JointRules) -> NDArray[np.float64]:
     """Return how far the ends of a 95 % interval are from each number, float64 [K] [unit of the table].
 
-    That is Student's t with the runs less one, at least two. Fewer than `fewest_scatter_runs` runs do not tell how they
+    That is Student's t with the runs less one, at least one. Fewer than `fewest_scatter_runs` runs do not tell how they
     scatter: there the misfit counts as what remembers, if that is more (the sandwich of White 1980,
     doi:10.2307/1912934).
 
@@ -63,7 +63,7 @@ def compute_interval_reach(fitted: JointFit, rules: JointRules) -> NDArray[np.fl
     rules : of the joint fit
     """
     runs = len(fitted.residuals)
-    reach = float(stdtrit(max(runs - 1, 2), 1.0 - OUTSIDE)) * standard_errors(fitted, rules)
+    reach = _interval_quantile(runs) * standard_errors(fitted, rules)
     if runs >= rules.fewest_scatter_runs:
         return np.asarray(reach)
     score = np.diag([1.0 / n.sigma**2 for n in fitted.numbers])
@@ -72,6 +72,11 @@ def compute_interval_reach(fitted: JointFit, rules: JointRules) -> NDArray[np.fl
     inverse = np.linalg.inv(fitted.information)
     remembers = np.sqrt(np.diag(inverse @ score @ inverse))
     return np.maximum(reach, float(ndtri(1.0 - OUTSIDE)) * remembers)
+
+
+def _interval_quantile(runs: int) -> float:
+    """Return the standard errors from the middle to the end of an interval."""
+    return float(stdtrit(max(runs - 1, 1), 1.0 - OUTSIDE))
 
 
 def _compute_score_covariance(
@@ -109,13 +114,16 @@ def soften(residual: NDArray[np.float64]) -> NDArray[np.float64]:
 def certain_from(fitted: JointFit, rules: JointRules) -> float:
     """Return the standard errors from 0 from which a number is named: Student's t, for few runs tell their scatter ill.
 
+    No interval of a named number holds 0 by that t.
+
     Parameters
     ----------
     fitted : the fit
     rules : of the joint fit
     """
-    runs = max(len(fitted.residuals), rules.fewest_scatter_runs)
-    return float(stdtrit(runs - 1, 1.0 - rules.false_name_chance))
+    runs = len(fitted.residuals)
+    certain = float(stdtrit(max(runs, rules.fewest_scatter_runs) - 1, 1.0 - rules.false_name_chance))
+    return max(certain, _interval_quantile(runs))
 
 
 def count_standard_errors(fitted: JointFit, rules: JointRules) -> NDArray[np.float64]:

@@ -114,7 +114,7 @@ def test_the_page_says_the_verdict_its_numbers_rivals_and_what_to_do_next(
     lag = facts(trace)["effects"][0]["parameters"]["lag"]
     assert f"lag {lag['value']:.3g} {lag['ci_low']:.3g} to {lag['ci_high']:.3g} s" in words
     (gain,) = facts(trace)["calibrated"]
-    assert f"within the tolerance of the vehicle file: {gain['says']}" in words
+    assert f"within what the vehicle file and these runs know of it: {gain['says']}" in words
     assert "brake lag and brake dead time" in words
     assert "The run that separates them: press the brake in steps" in words
     assert "musync generate demo --vehicle out/car-grown.yaml --no-frames --out datasets/car-grown" in words

@@ -45,14 +45,14 @@ def test_an_interval_of_few_runs_is_as_wide_as_misfit_that_remembers_makes_it_up
     fitted = fit_of([np.full(4000, 2.0)])  # correlated by 0.99975 from sample to sample
     (reach,) = compute_interval_reach(fitted, replace(RULES, most_residual_correlation=most))
     by_memory = 1.96 * np.sqrt(4.0 * (1.0 + most) / (1.0 - most) / 4000)
-    by_misfit = student.ppf(0.975, 2) * np.sqrt(4.0 / 4000)
+    by_misfit = student.ppf(0.975, 1) * np.sqrt(4.0 / 4000)
     assert reach == pytest.approx(max(by_memory, by_misfit), rel=0.02)
 
 
 def test_two_channels_that_miss_alike_say_no_more_than_one():
     misfit = remembering(np.random.default_rng(2), 2000, 0.95)
-    both = fit_of([np.repeat(misfit, 2)], [np.ones((2000, 2), dtype=bool)])
-    (one,), (two,) = (compute_interval_reach(fitted, RULES) for fitted in (fit_of([misfit]), both))
+    both = fit_of([np.repeat(misfit, 2)] * 3, [np.ones((2000, 2), dtype=bool)] * 3)
+    (one,), (two,) = (compute_interval_reach(fitted, RULES) for fitted in (fit_of([misfit] * 3), both))
     assert two == pytest.approx(one, rel=0.01)  # but for the prior
 
 
@@ -61,26 +61,28 @@ def test_a_slow_channel_remembers_from_sample_to_sample():
     slow = np.zeros((5000, 1), dtype=bool)
     slow[::10] = True
     (dense,), (sparse,) = (
-        compute_interval_reach(fitted, RULES) for fitted in (fit_of([misfit]), fit_of([misfit], [slow]))
+        compute_interval_reach(fitted, RULES)
+        for fitted in (fit_of([misfit] * 3), fit_of([misfit] * 3, [slow] * 3))
     )
     assert sparse == pytest.approx(dense, rel=1e-6)
 
 
 @pytest.mark.parametrize("kept", [0.0, 0.95])
-def test_intervals_of_two_runs_hold_the_truth_whatever_the_misfit_remembers(kept: float):
+def test_intervals_of_three_runs_hold_the_truth_whatever_the_misfit_remembers(kept: float):
     """The truth is 0: a derivative of 1 in each of two channels makes the number the mean of what is left."""
     rng, held = np.random.default_rng(4), 0
     for _ in range(200):
-        runs = [np.column_stack([remembering(rng, 300, kept) for _ in range(2)]) for _ in range(2)]
+        runs = [np.column_stack([remembering(rng, 300, kept) for _ in range(2)]) for _ in range(3)]
         found = float(np.mean(runs))
-        fitted = fit_of([(run - found).ravel() for run in runs], [np.ones((300, 2), dtype=bool)] * 2)
+        fitted = fit_of([(run - found).ravel() for run in runs], [np.ones((300, 2), dtype=bool)] * 3)
         held += abs(found) < compute_interval_reach(fitted, RULES)[0]
     assert held >= 180
 
 
 def test_a_number_is_certain_from_the_chance_of_a_false_name():
+    assert certain_from(fit_of([np.zeros(100)] * 2), RULES) == pytest.approx(student.ppf(0.975, 1))
     fitted = fit_of([np.zeros(100)] * 3)
-    for chance in (RULES.false_name_chance, 0.05):
+    for chance in (RULES.false_name_chance, 0.01):
         rules = replace(RULES, false_name_chance=chance)
         limit = student.ppf(1.0 - chance, RULES.fewest_scatter_runs - 1)
         assert certain_from(fitted, rules) == pytest.approx(limit)
