@@ -56,6 +56,18 @@ def test_a_run_is_driven_in_weather_that_there_is(folder: Path, old: str, new: s
     assert words in list_problems(folder)
 
 
+def test_the_heat_of_the_discs_may_be_there_and_is_then_a_number(folder: Path) -> None:
+    assert {run.braking_heat for run in read_campaign(folder).runs} == {0.0}
+    table = folder / "runs.csv"
+    lines = table.read_text().splitlines()
+    for heat in ("450", "hot"):
+        text = "\n".join([lines[0] + ",braking_heat_j_kg", *(f"{line},{heat}" for line in lines[1:])])
+        table.write_text(text)
+        if heat == "450":
+            assert {run.braking_heat for run in read_campaign(folder).runs} == {450.0}
+    assert "run-01: braking_heat_j_kg must be a finite number; it is 'hot'" in list_problems(folder)
+
+
 def drive_off(folder: Path, standing: int, total: int = 1000) -> None:
     """Let run-01 stand for some samples, gain 20 m/s at 5 m/s2, and then brake as before."""
     braking, rng = braking_columns(0), np.random.default_rng(7)

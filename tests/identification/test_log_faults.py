@@ -35,6 +35,12 @@ def test_a_gauge_that_drifts_is_told_and_a_zero_that_was_taken_off_is_too() -> N
     assert told.startswith("the brake command rests at 0.150 while the car")
     (told,) = tell_log_faults(replace(drifting, throttle_rest=0.155), (), ())
     assert told == "the throttle rests at 0.155 while the brake is applied: counted from there"
+    # one training run does not tell a gauge's zero, and none is taken off
+    alike = [
+        replace(run, pressure=run.pressure + 0.05, held_out=k > 0) for k, run in enumerate(drifting.runs)
+    ]
+    (told,) = tell_log_faults(replace(drifting, runs=tuple(alike)), (), ())
+    assert "the model brakes with it" in told
     assert tell_log_faults(drifting, (), ()) == []
     assert tell_log_faults(replace(drifting, runs=runs, brake_signal="brake_command"), (), ()) == []
 

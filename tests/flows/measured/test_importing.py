@@ -166,6 +166,16 @@ def test_one_run_per_brake_application_every_third_held_out(tmp_path: Path) -> N
     assert heat == pytest.approx(lost, rel=0.05)
 
 
+def test_what_stands_for_the_pressure_has_no_scale_to_be_checked(tmp_path: Path) -> None:
+    content = yaml.safe_load(MAP)["channels"]
+    content["brake_pressure"] |= {"gain": {"value": 100.0, "unit": "MPa", "source": "declared"}}
+    write_csv(tmp_path / "log.csv", log_signal(braking_columns()))
+    channel_map = write_map(tmp_path, runs=[{"name": "r0", "file": "log.csv"}], channels=content)
+    import_measurements(str(tmp_path / "log.csv"), map=channel_map, out=str(tmp_path / "out"))
+    table = pd.read_parquet(tmp_path / "out" / "runs" / "r0.parquet")
+    assert table["brake_pressure"].max() > 1000.0
+
+
 def test_a_window_of_a_late_channel_is_cut_where_it_was_measured(tmp_path: Path) -> None:
     """A speed that the logger stamps 0.35 s late has its samples behind the window of a run of 3 s."""
     columns = log_signal(braking_columns(14.0))
