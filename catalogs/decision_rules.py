@@ -79,7 +79,7 @@ class DecisionRulesEntry(CatalogueEntry):
     interval_widening: Annotated[Scalar, require_quantity("1", minimum=1)]
     profile_points: Count
     profile_tolerance: Share
-    forked_misfit: Level
+    step_misfit: Level
     fewest_runs: Count
     joint: JointRulesEntry
 

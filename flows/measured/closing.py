@@ -239,7 +239,7 @@ def verdict_json(verdict: Verdict) -> dict[str, Any]:
         },
         "noise": {name: {"ar1": r, "sigma": s} for name, (r, s) in verdict.noise.items()},
         "disturbance": asdict(verdict.disturbance),
-        "runs_left_out": list(verdict.forked),
+        "runs_left_out": list(verdict.step_sensitive),
         # JSON has no infinity: an effect that this campaign cannot show at any size is null
         "minimum_detectable": {
             name: value if np.isfinite(value) else None for name, value in verdict.detectable.items()

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from catalogs.sentences import shorten
+from tasks.campaign.run_names import list_names
 
 SHARED = 3
 """Places from which a fault is told once for all of them [1]."""
-MOST_NAMES = 6
-"""Places that the sentence lists [1]."""
 NUMBER = re.compile(r"(?<![\w.^-])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?!\w)")
 """A figure of a sentence; no digit of a name (run-01, w_2) or of a unit (m/s^2)."""
 
@@ -79,10 +78,7 @@ def join_shared_problems(
 
 def _join_group(group: Sequence[PlacedProblem], total: int, kind: str) -> str:
     names = [shorten(problem.name, 60) for problem in group]
-    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-    return (
-        f"in {len(names)} of {total} {kind} ({', '.join(names[:MOST_NAMES])}{more}): {_write_ranges(group)}"
-    )
+    return f"in {len(names)} of {total} {kind} ({list_names(names)}): {_write_ranges(group)}"
 
 
 def _write_ranges(group: Sequence[PlacedProblem]) -> str:

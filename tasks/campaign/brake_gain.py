@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tasks.campaign.brake_validation import MOVING, WITHOUT_BRAKE
 from tasks.campaign.channel_validation import smooth_channel
+from tasks.campaign.run_names import list_names
 
 DECELERATION_PER_PRESSURE = (0.3, 8.0)
 """Deceleration that a road car's brake may give per pressure; the paper's vehicle has 2.4 [m/s^2 per MPa]."""
@@ -23,8 +24,6 @@ FEWEST_SAMPLES = 20
 """Samples of braking that a run needs to tell the gain [1]."""
 LEAST_VARIATION = 0.15
 """Standard deviation of the pressure over its mean from which a slope is told from an intercept [1]."""
-MOST_NAMES = 6
-"""Runs that the sentence lists [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,11 +87,10 @@ def _describe_gain(braking: Sequence[Braking]) -> str:
     low, high = DECELERATION_PER_PRESSURE
     gain = _compute_gain(_join_braking(braking), 0.0)
     names = [part.run for part in braking]
-    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
     motor = "; if a motor brakes along with it, map the motor's torque as engine_torque" if gain > low else ""
     return (
-        f"channel brake_pressure gives {gain:.3g} m/s^2 per MPa over the braking of {', '.join(names[:MOST_NAMES])}"
-        f"{more}, which must lie in {low:g} to {high:g}: correct its unit or scale{motor}"
+        f"channel brake_pressure gives {gain:.3g} m/s^2 per MPa over the braking of {list_names(names)},"
+        f" which must lie in {low:g} to {high:g}: correct its unit or scale{motor}"
     )
 
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from tasks.campaign.brake_validation import MOVING, RELEASED
 from tasks.campaign.channel_validation import smooth_channel
 from tasks.campaign.channels import BRAKE_SIGNALS
+from tasks.campaign.run_names import list_names
 
 TURNING = 4.0
 """Acceleration to the side from which the tyres of a road car brake noticeably less: by 8 % on a dry road [m/s^2]."""
@@ -15,8 +16,6 @@ LEAST_DECELERATION = 1.0
 """Deceleration above which a sample counts as braking [m/s^2]."""
 SHORTEST_TURN = 0.3
 """Time that a brake is applied in a turn from which the run is told [s]; a correction of the steering is shorter."""
-MOST_NAMES = 6
-"""Runs that the sentence lists [1]."""
 
 
 def describe_turning(runs: Mapping[str, Mapping[str, NDArray[np.float64]]], interval: float) -> list[str]:
@@ -35,9 +34,8 @@ def describe_turning(runs: Mapping[str, Mapping[str, NDArray[np.float64]]], inte
     ]
     if not turns:
         return []
-    more = f" and {len(turns) - MOST_NAMES} more" if len(turns) > MOST_NAMES else ""
     return [
-        f"the car brakes while it turns in {len(turns)} of {len(runs)} runs: {', '.join(turns[:MOST_NAMES])}{more}; the"
+        f"the car brakes while it turns in {len(turns)} of {len(runs)} runs: {list_names(turns)}; the"
         " model drives straight on, and what the tyres lose to the turn reads as a brake that is late or weak: end"
         " such a run at turn-in"
     ]

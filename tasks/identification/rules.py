@@ -107,7 +107,7 @@ class DecisionRules:
         the pressure gauge [1]
     profile_points : points of the profile likelihood tried on each side of an estimate [1]
     profile_tolerance : relative error of the root deviance at which the profile is followed no further [1]
-    forked_misfit : misfit by halving the step from which a run counts as sensitive to the step and is left out [1]
+    step_misfit : misfit by halving the step from which a run counts as sensitive to the step and is left out [1]
     fewest_runs : number of other runs below which runs that are sensitive to the step are used too [1]
     joint : of the joint fit
     """
@@ -147,7 +147,7 @@ class DecisionRules:
     interval_widening: float
     profile_points: int
     profile_tolerance: float
-    forked_misfit: float
+    step_misfit: float
     fewest_runs: int
     joint: JointRules
 

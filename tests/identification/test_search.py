@@ -1,4 +1,4 @@
-"""Parts of the search: forked runs, numerical doubt, nuisances taken over, experiments, look-alikes."""
+"""Parts of the search: runs sensitive to the step, numerical doubt, nuisances taken over, experiments, look-alikes."""
 
 import sys
 from dataclasses import replace
@@ -60,7 +60,7 @@ def evidence_of(theta: np.ndarray, *names: str) -> Evidence:
 
 def test_a_run_that_depends_on_the_step_is_told_from_sound_ones() -> None:
     """Light wheels and an anti-lock band a quarter as wide: steps of 2 ms swing the wheels through it."""
-    forked = load_decision_rules().forked_misfit
+    limit = load_decision_rules().step_misfit
     hard = replace(RICH[2], speed=12.0, peak=12.0)
     narrow = replace(VEHICLE, abs_release_width=0.05, wheel_inertia_f=0.3 * VEHICLE.wheel_inertia_f)
     sound, coarse = (
@@ -68,7 +68,7 @@ def test_a_run_that_depends_on_the_step_is_told_from_sound_ones() -> None:
          for drive in drives]
         for car, drives in ((VEHICLE, (RICH[0], RICH[2], RICH[11], RICH[19], hard)), (narrow, (hard,)))
     )  # fmt: skip
-    assert max(sound) < 0.5 * forked < 10.0 * forked < min(coarse)
+    assert max(sound) < 0.5 * limit < 10.0 * limit < min(coarse)
 
 
 def test_a_fall_counts_only_beyond_the_doubt() -> None:

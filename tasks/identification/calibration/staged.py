@@ -32,9 +32,10 @@ class StageRecord:
     Parameters
     ----------
     stage, turn : name of the stage, and number of the pass, from 1
-    before, after : loss of the stage, the sum of (RMSE / scale)^2 over its cases [1]
+    before, after : loss of the stage before and after its whole step: the sum of (RMSE / scale)^2 over its cases, with
+        weak prior and smoothness [1]
     moved : largest change of a scalar over the distance between its bounds [1]
-    at_bounds : scalars that ended on a bound
+    at_bounds : scalars that the whole step takes to a bound
     accepted : share of the stage's step that was taken [1]
     """
 

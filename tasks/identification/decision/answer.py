@@ -104,7 +104,7 @@ class Verdict:
     theta : float64 full parameter vector of the effects, without session nuisances
     slots : tables of the forms found
     experiment : planned run that separates the first effect best from its closest alternative
-    forked : names of runs left out because halving the integration step changes their prediction
+    step_sensitive : names of runs left out because halving the integration step changes their prediction
     reasons : sentences that explain the verdict
     disagreement : why single effects could not be told, or by how much nothing that is named explains the runs; else
         empty
@@ -128,7 +128,7 @@ class Verdict:
     theta: NDArray[np.float64]
     slots: tuple[Slot, ...]
     experiment: Experiment | None
-    forked: tuple[str, ...]
+    step_sensitive: tuple[str, ...]
     reasons: tuple[str, ...]
     disagreement: str = ""
     misses: bool = False

@@ -1,6 +1,6 @@
 """The decision: what is missing, how sure, and what it does to the error on runs that no fit has seen."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
@@ -71,7 +71,6 @@ def find_missing_effects(
     rules: DecisionRules,
     *,
     hardly_known: Mapping[str, tuple[float, float]] = MappingProxyType({}),
-    progress: Callable[[str], None] = lambda stage: None,
 ) -> Trace:
     """Trace the residual of a campaign to what the model lacks.
 
@@ -82,7 +81,6 @@ def find_missing_effects(
     effects : the library of candidates
     rules : by which it is decided
     hardly_known : numbers of the session that the vehicle's file hardly knows: a first value, and the prior's sigma
-    progress : called with the name of each stage as it begins
 
     Returns
     -------
@@ -93,7 +91,6 @@ def find_missing_effects(
     ForeignCarError
         If the car's equations are not the model's, so that single effects cannot be told; `judge_jointly` can.
     """
-    progress("derivatives")
     shown = [effect for effect in effects if can_show(effect, vehicle, campaign.channels)]
     evidence, null = prepare_evidence(
         campaign,
@@ -104,9 +101,7 @@ def find_missing_effects(
         hardly_known,
     )
     reasons: list[str] = []
-    progress("search")
     start, found, near_form = search_library_and_forms(evidence, null, reasons)
-    progress("rivals")
     compared = compare_with_rivals(found.evidence, found.base, found.rounds)
     while again := drop_superseded(found, compared):
         found = again
@@ -115,7 +110,6 @@ def find_missing_effects(
     if (agreed := settle_disputes(found, reasons)) is not found:
         found, near_form = agreed, None
         compared = compare_with_rivals(found.evidence, found.base, found.rounds)
-    progress("held-out error")
     error, manoeuvres = compute_held_out_errors(start.evidence, start.base, found.base)
     tried = list(found.tried)
     least = rules.joint.noticed_share if hardly_known else None
@@ -131,7 +125,6 @@ def find_missing_effects(
         error, manoeuvres = compute_held_out_errors(start.evidence, start.base, found.base)
     # before derivatives are taken anew: gains compare only about the same ones
     others = (*find_pairs(found, compared), *find_pulled_numbers(found)) if compared else ()
-    progress("intervals")
     if compared:
         here, settled, refitted = refit_named(found.evidence, found.base, [c.own for c in compared])
         found = replace(found, evidence=here, base=settled)
@@ -202,7 +195,7 @@ def find_missing_effects(
         theta=theta,
         slots=slots,
         experiment=experiment,
-        forked=evidence.forked,
+        step_sensitive=evidence.step_sensitive,
         reasons=tuple(reasons),
     )
     told = named or is_lowered(error["speed"])

@@ -23,7 +23,7 @@ class Evidence:
     tolerances, disturbance : priors of session, offsets and disturbances
     sensors : AR(1) coefficient and standard deviation of every channel's sensor, float64 [7] each
     rules : decision rules
-    forked : names of runs left out because halving the integration step changes their prediction
+    step_sensitive : names of runs left out because halving the integration step changes their prediction
     """
 
     train: tuple[RunEvidence, ...]
@@ -33,7 +33,7 @@ class Evidence:
     disturbance: Disturbance
     sensors: tuple[NDArray[np.float64], NDArray[np.float64]]
     rules: DecisionRules
-    forked: tuple[str, ...] = ()
+    step_sensitive: tuple[str, ...] = ()
 
     @property
     def session_sigma(self) -> NDArray[np.float64]:

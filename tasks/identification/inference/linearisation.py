@@ -70,7 +70,7 @@ def prepare_evidence(
     def select_models(held_out: bool) -> list[RunModel]:
         """Return the training or the held-out runs that are insensitive to the step; all if these are too few."""
         own = [m for m in models if m.run.held_out == held_out]
-        insensitive = [m for m in own if compute_step_misfit(m, rho, sigma) <= rules.forked_misfit]
+        insensitive = [m for m in own if compute_step_misfit(m, rho, sigma) <= rules.step_misfit]
         return insensitive if len(insensitive) >= rules.fewest_runs else own
 
     def differentiate_runs(own: list[RunModel], base: NDArray[np.float64]) -> tuple[RunEvidence, ...]:
@@ -90,7 +90,7 @@ def prepare_evidence(
         train=tuple(differentiate_by_library(run, base, effects) for run in runs),
         held_out=differentiate_runs(held_out, base), effects=effects,
         tolerances=tolerances, disturbance=guess, sensors=(rho, sigma), rules=rules,
-        forked=tuple(run.name for run in campaign.runs if run.name not in used),
+        step_sensitive=tuple(run.name for run in campaign.runs if run.name not in used),
     )  # fmt: skip
     return evidence, null
 

@@ -66,6 +66,11 @@ class JointFit:
     scales: NDArray[np.float64]
 
     @property
+    def earned(self) -> tuple[JointNumber, ...]:
+        """Numbers of the fit that had to earn their place."""
+        return tuple(number for number in self.numbers if number.removable)
+
+    @property
     def by_name(self) -> dict[str, float]:
         """Values of the numbers."""
         return name_values(self.numbers, self.values)

@@ -14,7 +14,6 @@ from tasks.identification.decision.words import join_phrases
 from tasks.identification.joint.elimination import Substitute, eliminate_uncertain_numbers, refit_numbers
 from tasks.identification.joint.fit import JointFit, lead_offsets
 from tasks.identification.joint.stops import Stop, predict_stop
-from tasks.identification.joint.uncertainty import certain_numbers
 from tasks.identification.rules import DecisionRules, JointRules
 
 
@@ -34,7 +33,7 @@ def drop_what_predicts_worse(
     """
     there = _held_out_misfit(held_out, fitted)
     trials = []
-    for number in certain_numbers(fitted, rules):
+    for number in fitted.earned:
         without = refit_numbers(train, fitted, tuple(n for n in fitted.numbers if n.name != number.name))
         gone = _held_out_misfit(held_out, without)
         # a number earns its name by what it does to any channel, and not against the speed

@@ -9,7 +9,6 @@ from scipy.special import ndtri, stdtrit
 
 from tasks.identification.inference.noise import correlate_with_next
 from tasks.identification.joint.fit import JointFit
-from tasks.identification.joint.numbers import JointNumber
 from tasks.identification.rules import JointRules
 
 OUTSIDE = 0.025
@@ -63,7 +62,7 @@ def compute_interval_reach(fitted: JointFit, rules: JointRules) -> NDArray[np.fl
     rules : of the joint fit
     """
     runs = len(fitted.residuals)
-    reach = _interval_quantile(runs) * standard_errors(fitted, rules)
+    reach = find_interval_quantile(runs) * standard_errors(fitted, rules)
     if runs >= rules.fewest_scatter_runs:
         return np.asarray(reach)
     score = np.diag([1.0 / n.sigma**2 for n in fitted.numbers])
@@ -74,8 +73,13 @@ def compute_interval_reach(fitted: JointFit, rules: JointRules) -> NDArray[np.fl
     return np.maximum(reach, float(ndtri(1.0 - OUTSIDE)) * remembers)
 
 
-def _interval_quantile(runs: int) -> float:
-    """Return the standard errors from the middle to the end of an interval."""
+def find_interval_quantile(runs: int) -> float:
+    """Return the standard errors from the middle to the end of an interval of 95 %.
+
+    Parameters
+    ----------
+    runs : of the fit
+    """
     return float(stdtrit(max(runs - 1, 1), 1.0 - OUTSIDE))
 
 
@@ -123,7 +127,7 @@ def certain_from(fitted: JointFit, rules: JointRules) -> float:
     """
     runs = len(fitted.residuals)
     certain = float(stdtrit(max(runs, rules.fewest_scatter_runs) - 1, 1.0 - rules.false_name_chance))
-    return max(certain, _interval_quantile(runs))
+    return max(certain, find_interval_quantile(runs))
 
 
 def count_standard_errors(fitted: JointFit, rules: JointRules) -> NDArray[np.float64]:
@@ -135,18 +139,3 @@ def count_standard_errors(fitted: JointFit, rules: JointRules) -> NDArray[np.flo
     rules : of the joint fit
     """
     return np.asarray(np.abs(fitted.values) / standard_errors(fitted, rules))
-
-
-def certain_numbers(fitted: JointFit, rules: JointRules) -> list[JointNumber]:
-    """Return the numbers that earned their place for certain.
-
-    Parameters
-    ----------
-    fitted : the fit
-    rules : of the joint fit
-    """
-    return [
-        number
-        for number, sure in zip(fitted.numbers, count_standard_errors(fitted, rules), strict=True)
-        if number.removable and sure >= certain_from(fitted, rules)
-    ]

@@ -1,6 +1,6 @@
 """The verdict on a car that the vehicle file hardly knows: calibrated, then named what earns its place."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,7 +53,6 @@ from tasks.identification.joint.numbers import (
 )
 from tasks.identification.joint.stops import FITTED, Stop, complete_numbers, make_stop
 from tasks.identification.joint.uncertainty import (
-    certain_numbers,
     compute_interval_reach,
     standard_errors,
 )
@@ -107,7 +106,6 @@ def judge_jointly(
     *,
     disagreement: str = "",
     names_numbers: bool = True,
-    progress: Callable[[str], None] = lambda stage: None,
 ) -> JointTrace:
     """Calibrate a car on its training runs, take away what does not earn its place, and name what is left.
 
@@ -119,22 +117,18 @@ def judge_jointly(
     rules : of the decision
     disagreement : why single effects could not be told; empty where they were not looked for
     names_numbers : whether numbers of the vehicle's file may be named without any other name; else they are calibrated
-    progress : called with the name of each stage as it begins
     """
     joint = rules.joint
     stops = [make_stop(run, vehicle, surface, campaign.channels, joint) for run in campaign.runs]
     train = tuple(stop for stop in stops if not stop.model.run.held_out)
     held_out = tuple(stop for stop in stops if stop.model.run.held_out)
     shown = choose_numbers(numbers, campaign, [stop.model for stop in train], joint)
-    progress("starts")
     starts = suggest_starts(train) if is_gain_unknown(campaign, joint) else [{}]
     everything = _fit_everything(train, starts, free_numbers(shown, [stop.model for stop in train], joint))
-    progress("elimination")
     settled, agreeing = _settle(train, eliminate_uncertain_numbers(train, everything, joint), starts, joint)
     # at a better fit a number may be no longer certain
     reasons = [disagreement] if disagreement else []
     fitted = drop_at_bounds(train, eliminate_uncertain_numbers(train, settled, joint), joint, reasons)
-    progress("held-out error")
     fitted = drop_what_predicts_worse(train, held_out, fitted, joint, reasons)
     retuned = refit_numbers(train, fitted, tuple(n for n in fitted.numbers if n.group in CALIBRATED))
 
@@ -146,7 +140,6 @@ def judge_jointly(
     if not makes_difference(fitted, error, joint, reasons):
         fitted = retuned
         predicted, error, manoeuvres = predict_with(fitted)
-    progress("rivals")
     tolerances = _tolerances(campaign, shown)
     named = _name_effects(fitted, joint)
     calibrated = tuple(e for e in named if is_within_tolerance(e, tolerances, joint.wrong_number_tolerances))
@@ -197,7 +190,7 @@ def judge_jointly(
         theta=build_parameter_vector(complete_numbers(fitted.by_name)),
         slots=(),
         experiment=None,
-        forked=(),
+        step_sensitive=(),
         reasons=tuple(reasons),
         disagreement=disagreement,
     )  # fmt: skip
@@ -253,7 +246,7 @@ def _settle(
 def _name_effects(fitted: JointFit, rules: JointRules) -> list[NamedEffect]:
     """Return what is named, new physics first."""
     # what every car needs anew is told whatever its size: the prediction rests on it
-    named = certain_numbers(fitted, rules)
+    named = [*fitted.earned]
     named += [n for n in fitted.numbers if not n.removable and not n.is_at_bound(fitted.by_name[n.name])]
     order = {"effect": 0, "sensor": 1, "retune": 2}
     return sorted((_named_effect(fitted, n, rules) for n in named), key=lambda e: order[e.effect_class])

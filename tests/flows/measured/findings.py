@@ -49,7 +49,7 @@ def verdict_of(*effects: NamedEffect) -> Verdict:
     return Verdict(
         verdict="FOUND", effects=effects, rivals=(), tried=(), error={}, manoeuvre_error={}, correlation={},
         session_pulls={}, noise={}, disturbance=Disturbance(), detectable={}, campaign="toy", content_hash="c" * 64,
-        split_hash="d" * 64, theta=build_parameter_vector({}), slots=(), experiment=None, forked=(), reasons=(),
+        split_hash="d" * 64, theta=build_parameter_vector({}), slots=(), experiment=None, step_sensitive=(), reasons=(),
     )  # fmt: skip
 
 

@@ -276,7 +276,7 @@ def verdict_of(*effects: NamedEffect) -> Verdict:
         manoeuvre_error={"peak_pitch": error}, correlation={},
         session_pulls=dict.fromkeys(SESSION, (0.0, 0.0)), noise=dict.fromkeys(CHANNELS, (0.0, 1.0)),
         disturbance=Disturbance(), detectable={"bump_stop": float("inf")}, campaign="toy", content_hash="c" * 64,
-        split_hash="d" * 64, theta=np.zeros(1), slots=(), experiment=None, forked=(), reasons=(),
+        split_hash="d" * 64, theta=np.zeros(1), slots=(), experiment=None, step_sensitive=(), reasons=(),
     )  # fmt: skip
 
 
