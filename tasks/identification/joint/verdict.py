@@ -23,6 +23,7 @@ from tasks.identification.inference.disturbance import Disturbance
 from tasks.identification.joint.calibration import fit_first_numbers, is_gain_unknown
 from tasks.identification.joint.elimination import (
     Substitute,
+    add_certain_numbers,
     drop_at_bounds,
     eliminate_uncertain_numbers,
     find_substitutes,
@@ -129,6 +130,7 @@ def judge_jointly(
     # at a better fit a number may be no longer certain
     reasons = [disagreement] if disagreement else []
     fitted = drop_at_bounds(train, eliminate_uncertain_numbers(train, settled, joint), joint, reasons)
+    fitted = add_certain_numbers(train, fitted, everything.numbers, joint)
     fitted = drop_what_predicts_worse(train, held_out, fitted, joint, reasons)
     retuned = refit_numbers(train, fitted, tuple(n for n in fitted.numbers if n.group in CALIBRATED))
 
