@@ -4,12 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import t as student
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.joint_numbers import load_joint_numbers
 from tasks.identification.joint import elimination
 from tasks.identification.joint.elimination import (
     FORESEEN_SHARE,
+    PROMISED,
+    add_certain_numbers,
     drop_at_bounds,
     eliminate_uncertain_numbers,
     find_substitutes,
@@ -171,6 +174,36 @@ def test_a_number_stays_that_is_certain_or_without_which_the_misfit_grows_by_a_t
     monkeypatch.setattr(elimination, "_stable_names", lambda *_: {"lag", "fade"})
     left = eliminate_uncertain_numbers((), four, RULES)
     assert ("fade" in {n.name for n in left.numbers}) is stays
+
+
+@pytest.mark.parametrize(
+    ("promised", "sure", "at", "kept", "added"),
+    [
+        (1.1, 9.3, 0.06, True, True), (0.9, 9.3, 0.06, True, False), (1.1, 9.1, 0.06, True, False),
+        (1.1, 9.3, 0.3, True, False), (1.1, 9.3, 0.06, False, False),
+    ],
+)  # fmt: skip
+def test_a_number_that_is_certain_beside_what_is_left_comes_back(
+    monkeypatch, promised: float, sure: float, at: float, kept: bool, added: bool
+):
+    """Of four stops of a race car elimination took the brake's curve away, and of four others it kept it."""
+    fade = NUMBERS["fade"]
+    left = replace(fit_of([np.zeros(10)] * 4), cost=100.0)
+    needed = PROMISED * student.ppf(1.0 - RULES.false_name_chance, 3) ** 2
+
+    def refit(_stops, fit, numbers, _start=None):
+        return replace(fit, numbers=numbers, values=np.array([0.1, at])[: len(numbers)], cost=50.0)
+
+    monkeypatch.setattr(elimination, "refit_numbers", refit)
+    monkeypatch.setattr(
+        elimination, "foresee_falls", lambda _s, _f, others: np.full(len(others), promised * needed)
+    )
+    monkeypatch.setattr(
+        elimination, "count_standard_errors", lambda fit, _r: np.array([99.0, sure])[: len(fit.numbers)]
+    )
+    monkeypatch.setattr(elimination, "eliminate_uncertain_numbers", lambda _s, fit, _r: fit if kept else left)
+    found = add_certain_numbers((), left, [LAG, fade, NUMBERS["pressure_gain"]], RULES)
+    assert ("fade" in found.by_name) is added and (found is left) is not added
 
 
 def test_a_fit_foresees_which_number_makes_good_what_another_did():
