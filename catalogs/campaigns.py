@@ -190,6 +190,11 @@ def _read_header_and_runs(
             for row in rows
             if float(row["direction"]) not in (1.0, -1.0)
         ]
+        problems += [
+            f"{row['run']}: {HEAT_COLUMN} must not be negative; it is {row[HEAT_COLUMN]}"
+            for row in rows
+            if float(row.get(HEAT_COLUMN, 0.0)) < 0.0
+        ]
     except InputError as error:
         problems += error.problems
     if problems or checked is None:
@@ -263,7 +268,7 @@ def _make_run(
         snow_accumulation_h=float(row["snow_accumulation_h"]),
         direction=int(float(row["direction"])),
         disc_rise=float(row["disc_temperature_above_ambient_c"]),
-        braking_heat=float(row.get(HEAT_COLUMN) or 0.0),
+        braking_heat=float(row.get(HEAT_COLUMN, 0.0)),
         hazard_center=float(row["hazard_center_m"]),
         hazard_length=float(row["hazard_length_m"]),
         hazard_height=float(row["hazard_height_m"]),

@@ -35,6 +35,7 @@ class JointRulesEntry(CatalogueEntry):
     false_name_chance: Share
     fewest_scatter_runs: Annotated[Scalar, require_quantity("1", minimum=2)]
     most_residual_correlation: Share
+    longest_memory: Annotated[Scalar, require_quantity("s", above=0)]
     better_prediction_share: Level
     equal_prediction_share: Level
     same_fit_errors: Level

@@ -18,7 +18,7 @@ LEDGER = Path(".musync") / "held-out-readings.jsonl"
 def record_reading(campaign: Campaign, vehicle_sha256: str) -> int:
     """Write down that a campaign has been read, and count the earlier readings of its held-out runs.
 
-    A run is known by the speed that it measured, so that neither another name, comment, tolerance, split or map of the
+    A run is known by the speed that it measured, so that neither another name, comment, tolerance or split of the
     same runs nor another way of writing them makes a reading the first one. What was fitted before is no blind test.
 
     Parameters

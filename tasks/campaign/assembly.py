@@ -39,7 +39,7 @@ class Assembled:
 
     Parameters
     ----------
-    start : the logger's time of the first sample [s]
+    start : the logger's time of the first sample, delays taken off [s]
     columns : channels by name, each float64 [N], in campaign units, NaN between the samples of a slow channel; empty
         if there are problems
     readable : channels that can be read, each float64 [N], in campaign units, with values between the

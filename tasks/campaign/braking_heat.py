@@ -2,9 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from math import exp
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.constants import g as STANDARD_GRAVITY
+from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import median_filter
 
 from tasks.campaign.campaign import Campaign
@@ -20,7 +22,9 @@ APPLIED = 0.05
 RESTING = 0.05
 """Quantile of a brake signal that counts as its rest: no car brakes for so much of a drive [1]."""
 SPIKE = 5
-"""Samples of which the middle value counts, so that two wrong ones in a row are no energy."""
+"""Samples of which the middle value counts, so that two wrong ones in a row are no energy [1]."""
+SPIKE_TIME = 0.2
+"""Time between samples up to which five of them are less than a stop [s]."""
 COOLING_SPEED = 14.0
 """Speed at which the air takes what `DISC_COOLING` says [m/s]: half of the speed from which a stop begins."""
 COOLING_EXPONENT = 0.8
@@ -38,18 +42,25 @@ def measure_braking_heat(
     ----------
     signals : logged signals by name
     rules : the channel map
-    instants : in the logger's time [s]
+    instants : in the logger's time, delays taken off [s]
     """
     brake, by_channel = find_brake_rule(rules), {rule.channel: rule for rule in rules}
     if brake is None or "speed" not in by_channel:
         return [0.0] * len(instants)
-    taken = {name: take_samples(rule.channel, signals[name]) for rule in rules for name in rule.sources}
-    speed, applied = (_drop_gaps(average_sources(taken, rule)) for rule in (by_channel["speed"], brake))
+
+    def take(rule: ChannelRule) -> Signal:
+        taken = {name: take_samples(rule.channel, signals[name]) for name in rule.sources}
+        return _drop_gaps(average_sources(taken, rule))
+
+    speed, applied = take(by_channel["speed"]), take(brake)
     if not len(speed.time) or not len(applied.time):
         return [0.0] * len(instants)
-    pressure = replace(applied, values=BRAKE_SIGNALS[brake.channel] * applied.values)
-    heat = compute_braking_heat(speed, pressure)
-    return np.interp(instants, heat.time, heat.values).tolist()
+    slope = np.zeros(len(speed.time))
+    if "road_slope" in by_channel and len((road := take(by_channel["road_slope"])).time):
+        slope = np.radians(np.interp(speed.time, road.time, road.values))
+    pressure = np.interp(speed.time, applied.time, BRAKE_SIGNALS[brake.channel] * _hide_spikes(applied))
+    clean = replace(speed, values=_hide_spikes(speed))
+    return compute_braking_heat(clean, pressure, slope, np.asarray(instants)).tolist()
 
 
 def _drop_gaps(signal: Signal) -> Signal:
@@ -58,33 +69,49 @@ def _drop_gaps(signal: Signal) -> Signal:
     return replace(signal, time=signal.time[finite], values=signal.values[finite])
 
 
-def compute_braking_heat(speed: Signal, pressure: Signal) -> Signal:
-    """Return the heat in the discs over a drive that begins with cold ones, per mass of the car [J/kg].
+def _hide_spikes(signal: Signal) -> NDArray[np.float64]:
+    """Return the values with the middle one of `SPIKE` in the place of each, where a stop has many."""
+    if float(np.median(np.diff(signal.time))) > SPIKE_TIME:
+        return signal.values
+    return np.asarray(median_filter(signal.values, SPIKE, mode="nearest"))
 
-    While the brake is applied, what the car loses of its kinetic energy heats the discs, which the air cools.
+
+def compute_braking_heat(
+    speed: Signal, pressure: NDArray[np.float64], slope: NDArray[np.float64], instants: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the heat in the discs at some instants of a drive that begins with cold ones, float64 [I] [J/kg].
+
+    What the car loses of its kinetic and potential energy while the brake is applied heats the discs, which cool from
+    then on. Resistances and a motor that brakes beside them are not taken off.
 
     Parameters
     ----------
-    speed : of the whole drive [m/s]
-    pressure : of the brake over the same drive, or what stands for it [MPa]
+    speed : of the whole drive [m/s], N samples
+    pressure : of the brake, or what stands for it, float64 [N] [MPa]
+    slope : of the road, uphill positive, float64 [N] [rad]
+    instants : float64 [I] [s]
     """
-    pressed = median_filter(pressure.values, SPIKE, mode="nearest")
-    rest, hardest = float(np.quantile(pressed, RESTING)), float(np.max(pressed))
-    threshold = rest + max(APPLIED * (hardest - rest), RELEASED_PRESSURE)
-    applied = np.interp(speed.time, pressure.time, pressed) > threshold
-    energy = 0.5 * median_filter(speed.values, SPIKE, mode="nearest") ** 2
-    gained = np.where(applied, -np.diff(energy, prepend=energy[0]), 0.0)
-    cooling = 2.0 * DISC_COOLING / (DISC_CAPACITY_F + DISC_CAPACITY_R)
-    relative = np.maximum((np.abs(speed.values) / COOLING_SPEED) ** COOLING_EXPONENT, STANDING)
-    lost = cooling * relative * np.maximum(np.diff(speed.time, prepend=speed.time[0]), 0.0)
-    heat = np.zeros(len(speed.time))
-    for i in range(1, len(heat)):
-        heat[i] = heat[i - 1] * exp(-lost[i]) + gained[i]
-    return Signal(time=speed.time, values=np.maximum(heat, 0.0))
+    time, v = speed.time, speed.values
+    rest, hardest = float(np.quantile(pressure, RESTING)), float(np.max(pressure))
+    applied = pressure > rest + max(APPLIED * (hardest - rest), RELEASED_PRESSURE)
+    edges = np.flatnonzero(np.diff(applied.astype(np.int8), prepend=0, append=0))
+    before, last = np.maximum(edges[::2] - 1, 0), edges[1::2] - 1
+    energy = 0.5 * v**2 + STANDARD_GRAVITY * cumulative_trapezoid(v * np.sin(slope), time, initial=0.0)
+    gained = np.maximum(energy[before] - energy[last], 0.0)
+    rate = 2.0 * DISC_COOLING / (DISC_CAPACITY_F + DISC_CAPACITY_R)
+    relative = np.maximum((np.abs(v) / COOLING_SPEED) ** COOLING_EXPONENT, STANDING)
+    cooled = cumulative_trapezoid(rate * relative, time, initial=0.0)
+    since = np.interp(instants, time, cooled)[:, np.newaxis] - cooled[last]
+    at = instants[:, np.newaxis]
+    so_far = np.maximum(energy[before] - np.interp(instants, time, energy)[:, np.newaxis], 0.0)
+    under_way = np.where((time[before] <= at) & (at < time[last]), so_far, 0.0)
+    return np.asarray(np.where(time[last] <= at, np.exp(-since), 0.0) @ gained + under_way.sum(axis=1))
 
 
 def estimate_disc_temperatures(campaign: Campaign, mass: float) -> Campaign:
     """Return a campaign whose runs begin with discs as hot as the braking before them made those of the model.
+
+    A run whose temperature is known keeps it.
 
     Parameters
     ----------
@@ -93,6 +120,6 @@ def estimate_disc_temperatures(campaign: Campaign, mass: float) -> Campaign:
     """
     capacity = DISC_CAPACITY_F + DISC_CAPACITY_R
     runs = (
-        replace(run, disc_rise=run.disc_rise + run.braking_heat * mass / capacity) for run in campaign.runs
+        replace(run, disc_rise=run.disc_rise or run.braking_heat * mass / capacity) for run in campaign.runs
     )
     return replace(campaign, runs=tuple(runs))

@@ -28,6 +28,7 @@ class JointRules:
     closed_throttle : share of the throttle up to which it is closed [1]
     false_name_chance : chance that a number which is 0 is named for one sign [1]
     fewest_scatter_runs : runs from which their scatter says how certain a number is [1]
+    longest_memory : time over which misfit of a joint fit remembers at most [s]
     most_residual_correlation : correlation of residuals from sample to sample beyond which more is not told apart [1]
     better_prediction_share : share of the held-out speed error below which a fit without a number predicts better [1]
     equal_prediction_share : share of the held-out misfit of all channels up to which a fit without a number is as
@@ -55,6 +56,7 @@ class JointRules:
     false_name_chance: float
     fewest_scatter_runs: int
     most_residual_correlation: float
+    longest_memory: float
     better_prediction_share: float
     equal_prediction_share: float
     same_fit_errors: float
@@ -99,8 +101,8 @@ class DecisionRules:
     retune_widening : factor on the session's tolerances when a model is re-tuned without any new effect [1]
     error_resamples : bootstrap resamples of the held-out errors [1]
     worse_limit : ratio of held-out errors from which a channel is worse than under the frozen model [1]
-    retuned_limit : error of any channel of the held-out runs, over that of the re-tuned model, beyond which nothing is
-        named [1]
+    retuned_limit : error of the held-out runs, of a channel along the road or of all, over that of the re-tuned model,
+        beyond which nothing is named [1]
     noticed_share : share of a held-out error below which an effect makes a noticeable difference to it [1]
     longest_lag : longest lag at which residual and brake pressure are correlated [s]
     interval_widening : factor on the length of intervals for what the likelihood does not hold, such as the noise of

@@ -60,12 +60,14 @@ def test_the_heat_of_the_discs_may_be_there_and_is_then_a_number(folder: Path) -
     assert {run.braking_heat for run in read_campaign(folder).runs} == {0.0}
     table = folder / "runs.csv"
     lines = table.read_text().splitlines()
-    for heat in ("450", "hot"):
+    for heat in ("450", "hot", "-3"):
         text = "\n".join([lines[0] + ",braking_heat_j_kg", *(f"{line},{heat}" for line in lines[1:])])
         table.write_text(text)
         if heat == "450":
             assert {run.braking_heat for run in read_campaign(folder).runs} == {450.0}
-    assert "run-01: braking_heat_j_kg must be a finite number; it is 'hot'" in list_problems(folder)
+        if heat == "hot":
+            assert "run-01: braking_heat_j_kg must be a finite number; it is 'hot'" in list_problems(folder)
+    assert "run-01: braking_heat_j_kg must not be negative; it is -3" in list_problems(folder)
 
 
 def drive_off(folder: Path, standing: int, total: int = 1000) -> None:

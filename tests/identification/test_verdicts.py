@@ -158,6 +158,15 @@ def test_a_number_beats_retuning_unless_retuning_moves_it_and_no_name_is_much_wo
     assert is_named or "re-tuning alone" in str(objected)
 
 
+def test_no_name_stands_where_the_body_is_missed_by_far_for_it() -> None:
+    body = {name: replace(make_error(0.9)["speed"], retuned=0.1) for name in ("pitch", "pitch_rate")}
+    error = {**make_error(1.0), **body}
+    objected = object_to_last(
+        found_last("rolling_coefficient", "effect", "constant", 0.047), None, error, None
+    )
+    assert objected is not None and "re-tuning alone predicts the held-out runs better" in objected
+
+
 def test_no_name_stands_where_one_channel_is_missed_for_it() -> None:
     """Rolling resistance of 4.7 % of the weight stood against a slope, which an accelerometer felt as 0.5 m/s2."""
     error = {name: make_error(0.5)["speed"] for name in ("speed", "wheel_speed_front", "wheel_speed_rear")}

@@ -168,7 +168,7 @@ def make_estimate(effect: Effect, parameter: Parameter, error: float) -> NamedEf
 
 
 def is_within_tolerance(effect: NamedEffect, tolerances: Mapping[str, float], limit: float) -> bool:
-    """Whether a number of the file is off by no more than its tolerance and a quarter of its interval allow.
+    """Whether a number of the file is off by no more than its tolerance and half of its interval allow.
 
     Parameters
     ----------
@@ -179,8 +179,8 @@ def is_within_tolerance(effect: NamedEffect, tolerances: Mapping[str, float], li
     number = effect.parameters[0]
     if number.name not in tolerances:
         return False
-    error = 0.25 * (number.ci_high - number.ci_low)
-    return abs(number.value) < limit * float(np.hypot(tolerances[number.name], error))
+    reach = 0.5 * (number.ci_high - number.ci_low)
+    return abs(number.value) < float(np.hypot(limit * tolerances[number.name], reach))
 
 
 def make_named_effect(candidate: Candidate, share: float, interval: Bounds) -> NamedEffect:

@@ -12,8 +12,8 @@ from tasks.identification.joint.numbers import FRICTION, JointNumber
 from tasks.identification.joint.stops import Stop
 from tasks.identification.joint.uncertainty import (
     certain_from,
-    count_standard_errors,
-    find_interval_quantile,
+    compute_interval_reach,
+    measure_certainty,
     measure_worst_misfit,
     soften,
     standard_errors,
@@ -25,6 +25,8 @@ MOST_ADDED = 2
 PROMISED = 0.05
 """Fall of the cost that they must promise, over the square of the standard errors that a name needs [1]: a tenth of
 what such a number makes good, for a brake's curve makes good four times what its derivatives foresee."""
+NEEDED_COST = 0.75
+"""Cost of a fit over that without a number below which the number stays though it is not certain [1]."""
 GRIPS = (0.0, 0.2, 0.5)
 """Friction from which fits start, where runs saturate the tyres [1]."""
 KNOWN_SHARE = 0.5
@@ -55,9 +57,9 @@ def eliminate_uncertain_numbers(stops: Sequence[Stop], fitted: JointFit, rules: 
 
     What is named must not hang on one run: from `fewest_scatter_runs` runs on, a number goes that elimination about the
     same fit would take away without any one of them (stability selection, Meinshausen and Buehlmann 2010,
-    doi:10.1111/j.1467-9868.2010.00740.x). A number stays, too, whose interval of 95 % does not hold 0 and without which
-    the misfit grows by a third: fade that rests on estimated temperatures scatters over the runs, and makes good half
-    of what they miss. A friction of which the runs say little more than its prior may go.
+    doi:10.1111/j.1467-9868.2010.00740.x). Of what that leaves, a number stays, too, whose interval of 95 % does not
+    hold 0 and which takes a quarter off the cost: fade that rests on estimated temperatures scatters over the runs, and
+    makes good half of what they miss. A friction of which the runs say little more than its prior may go.
 
     Parameters
     ----------
@@ -75,21 +77,26 @@ def eliminate_uncertain_numbers(stops: Sequence[Stop], fitted: JointFit, rules: 
     fitted = _drop_unknown_frictions(stops, fitted, rules)
     needed: set[str] = set()
     while True:
-        sure = count_standard_errors(fitted, rules)
+        certainty = measure_certainty(fitted, rules)
         weak = [
             (float(here), n.name)
-            for n, here in zip(fitted.numbers, sure, strict=True)
+            for n, here in zip(fitted.numbers, certainty, strict=True)
             if n.removable and n.name not in needed
         ]
-        if not weak or min(weak)[0] >= certain_from(fitted, rules):
+        if not weak or min(weak)[0] >= 1.0:
             return _drop_unknown_frictions(stops, fitted, rules)
-        least, name = min(weak)
+        name = min(weak)[1]
         without = refit_numbers(stops, fitted, tuple(n for n in fitted.numbers if n.name != name))
-        much = fitted.cost < rules.better_prediction_share**2 * without.cost
-        if much and least >= find_interval_quantile(len(fitted.residuals)):
+        if fitted.cost < NEEDED_COST * without.cost and not _holds_nothing(fitted, name, rules):
             needed.add(name)
         else:
-            fitted = without
+            fitted, needed = without, set()
+
+
+def _holds_nothing(fitted: JointFit, name: str, rules: JointRules) -> bool:
+    """Whether the 95 % interval of a number holds 0."""
+    place = [n.name for n in fitted.numbers].index(name)
+    return bool(abs(fitted.values[place]) <= compute_interval_reach(fitted, rules)[place])
 
 
 def _drop_unknown_frictions(stops: Sequence[Stop], fitted: JointFit, rules: JointRules) -> JointFit:
@@ -102,7 +109,7 @@ def _drop_unknown_frictions(stops: Sequence[Stop], fitted: JointFit, rules: Join
     for number, error in zip(fitted.numbers, errors, strict=True):
         if number.group == FRICTION and error > KNOWN_SHARE * number.sigma:
             without = refit_numbers(stops, fitted, tuple(n for n in fitted.numbers if n is not number))
-            if without.cost - fitted.cost < 0.5 * certain_from(fitted, rules) ** 2:
+            if without.cost - fitted.cost < 0.5 * certain_from(len(stops), rules) ** 2:
                 return _drop_unknown_frictions(stops, without, rules)
     return fitted
 
@@ -144,7 +151,7 @@ def drop_at_bounds(
 def add_certain_numbers(
     stops: Sequence[Stop], fitted: JointFit, everything: Sequence[JointNumber], rules: JointRules
 ) -> JointFit:
-    """Return the fit with every other number that is certain beside what is left, the one that explains most first.
+    """Return the fit with those numbers that are certain beside what is left, of the few that promise most.
 
     Where all numbers are free, those that stand in for each other are uncertain, and elimination may take the wrong one
     away: of four stops of a race car it took the brake's curve, of four others it kept it.
@@ -161,12 +168,10 @@ def add_certain_numbers(
     falls = foresee_falls(stops, fitted, others) if others else np.empty(0)
     for place in np.argsort(-falls)[:MOST_ADDED]:
         number = others[place]
-        if falls[place] < PROMISED * certain_from(fitted, rules) ** 2:
+        if falls[place] < PROMISED * certain_from(len(stops), rules) ** 2:
             break
         wider = refit_numbers(stops, fitted, (*fitted.numbers, number), {number.name: 0.5 * number.sigma})
-        if count_standard_errors(wider, rules)[-1] < certain_from(wider, rules) or number.is_at_bound(
-            wider.by_name[number.name]
-        ):
+        if measure_certainty(wider, rules)[-1] < 1.0 or number.is_at_bound(wider.by_name[number.name]):
             continue
         wider = eliminate_uncertain_numbers(stops, wider, rules)
         if number.name in wider.by_name and wider.cost < fitted.cost:
@@ -194,14 +199,14 @@ def _kept_linearly(fitted: JointFit, runs: tuple[int, ...], rules: JointRules) -
         information @ fitted.values - sum(a.T @ r for a, r in zip(slopes, residual, strict=True))
     )
     right -= prior * fitted.values
-    wide = measure_worst_misfit(residual)
+    wide = measure_worst_misfit([fitted.residuals[i] for i in runs])
     left = list(range(len(fitted.numbers)))
     while True:
         inverse = np.linalg.inv(information[np.ix_(left, left)])
         values = inverse @ right[left]
         sure = np.abs(values) / np.sqrt(np.diag(inverse) * wide)
         weak = [(float(s), j) for s, j in zip(sure, left, strict=True) if fitted.numbers[j].removable]
-        if not weak or min(weak)[0] >= certain_from(fitted, rules):
+        if not weak or min(weak)[0] >= certain_from(len(fitted.residuals), rules):
             return {fitted.numbers[j].name for j in left if fitted.numbers[j].removable}
         left.remove(min(weak)[1])
 

@@ -51,6 +51,7 @@ class JointFit:
     residuals : weighted, one float64 [M] a run, the channels of an instant together
     slopes : derivatives by the numbers, the run's own offsets taken out, one float64 [M, K] a run
     grids : where each channel was compared, one bool [N, C] a run with M of them true
+    interval : between the instants of a run [s]
     information : float64 [K, K] of the numbers, offsets taken out, priors included
     scales : size of a misfit that counts one, by place in `CHANNELS` [the channel's unit]
     """
@@ -62,6 +63,7 @@ class JointFit:
     residuals: tuple[NDArray[np.float64], ...]
     slopes: tuple[NDArray[np.float64], ...]
     grids: tuple[NDArray[np.bool_], ...]
+    interval: float
     information: NDArray[np.float64]
     scales: NDArray[np.float64]
 
@@ -236,7 +238,8 @@ def describe_fit(
     information = np.diag([1.0 / n.sigma**2 for n in numbers]) + sum(a.T @ a for a in slopes)
     return JointFit(
         numbers=numbers, values=values, offsets=offsets, cost=cost, residuals=tuple(left for left, _ in runs),
-        slopes=slopes, grids=tuple(stop.grid for stop in stops), information=np.asarray(information), scales=scales,
+        slopes=slopes, grids=tuple(stop.grid for stop in stops),
+        interval=stops[0].model.run.interval, information=np.asarray(information), scales=scales,
     )  # fmt: skip
 
 

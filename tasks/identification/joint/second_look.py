@@ -6,6 +6,7 @@ from dataclasses import replace
 from tasks.campaign.campaign import Campaign
 from tasks.identification.decision.disputes import ForeignCarError, moves_body_alone
 from tasks.identification.decision.held_out import (
+    compare_with_retuned,
     compute_held_out_errors,
     find_missed_channels,
     find_worse_channels,
@@ -102,8 +103,10 @@ def _look_along_road(
     )
     error, manoeuvres = compute_held_out_errors(whole, null, found)
     moved = any(moves_speed(part.effect_class, part.variable) for part in found.parts)
-    if find_worse_channels(error, rules.worse_limit, speed_decides=moved) or find_missed_channels(
-        error, rules.retuned_limit
+    if (
+        find_worse_channels(error, rules.worse_limit, speed_decides=moved)
+        or find_missed_channels(error, rules.retuned_limit)
+        or compare_with_retuned(error) > rules.retuned_limit
     ):
         return None
     alone = join_phrases(name.replace("_", " ") for name in kept)

@@ -1,6 +1,7 @@
 """How well the runs tell each number of a joint fit: by what their misfit remembers, and by how they scatter."""
 
 from collections.abc import Sequence
+from math import exp
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,10 +32,13 @@ def standard_errors(fitted: JointFit, rules: JointRules) -> NDArray[np.float64]:
     error = np.sqrt(np.diag(np.linalg.inv(fitted.information)) * measure_worst_misfit(fitted.residuals))
     if runs < rules.fewest_scatter_runs:
         return np.asarray(error)
-    moves = []
-    for residual, slope in zip(fitted.residuals, fitted.slopes, strict=True):
-        rest = fitted.information - slope.T @ slope
-        moves.append(np.linalg.solve(rest, slope.T @ soften(residual)))
+    pairs = list(zip(fitted.residuals, fitted.slopes, strict=True))
+    shares = [(slope.T * _weigh_curvature(residual)) @ slope for residual, slope in pairs]
+    whole = np.diag([1.0 / n.sigma**2 for n in fitted.numbers]) + sum(shares)
+    moves = [
+        np.linalg.solve(whole - share, slope.T @ soften(residual))
+        for share, (residual, slope) in zip(shares, pairs, strict=True)
+    ]
     spread = np.array(moves) - np.mean(moves, axis=0)
     return np.maximum(error, np.sqrt((runs - 1) / runs * np.sum(spread**2, axis=0)))
 
@@ -47,6 +51,11 @@ def measure_worst_misfit(residuals: Sequence[NDArray[np.float64]]) -> float:
     residuals : weighted, one float64 [M] a run
     """
     return max(1.0, *(float(np.mean(residual**2)) for residual in residuals))
+
+
+def _weigh_curvature(residual: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the curvature of the robust loss at residuals, over that of squares, float64 [M] [1]."""
+    return (1.0 + residual**2) ** -1.5
 
 
 def compute_interval_reach(fitted: JointFit, rules: JointRules) -> NDArray[np.float64]:
@@ -67,7 +76,7 @@ def compute_interval_reach(fitted: JointFit, rules: JointRules) -> NDArray[np.fl
         return np.asarray(reach)
     score = np.diag([1.0 / n.sigma**2 for n in fitted.numbers])
     for residual, slope, grid in zip(fitted.residuals, fitted.slopes, fitted.grids, strict=True):
-        score = score + _compute_score_covariance(residual, slope, grid, rules)
+        score = score + _compute_score_covariance(residual, slope, grid, fitted.interval, rules)
     inverse = np.linalg.inv(fitted.information)
     remembers = np.sqrt(np.diag(inverse @ score @ inverse))
     return np.maximum(reach, float(ndtri(1.0 - OUTSIDE)) * remembers)
@@ -84,7 +93,11 @@ def find_interval_quantile(runs: int) -> float:
 
 
 def _compute_score_covariance(
-    residual: NDArray[np.float64], slope: NDArray[np.float64], grid: NDArray[np.bool_], rules: JointRules
+    residual: NDArray[np.float64],
+    slope: NDArray[np.float64],
+    grid: NDArray[np.bool_],
+    interval: float,
+    rules: JointRules,
 ) -> NDArray[np.float64]:
     """Return the covariance of the gradient of a run, float64 [K, K].
 
@@ -96,7 +109,8 @@ def _compute_score_covariance(
     for c in range(grid.shape[1]):
         rows = np.flatnonzero(grid[:, c])
         apart = float(np.median(np.diff(rows))) if len(rows) > 1 else 1.0
-        kept = correlate_with_next(left[rows, c], rules.most_residual_correlation) ** (1.0 / apart)
+        most = exp(-apart * interval / rules.longest_memory)
+        kept = correlate_with_next(left[rows, c], most) ** (1.0 / apart)
         # the transpose of the filter that makes such misfit of white noise, run backwards over the derivatives
         sums = lfilter([1.0], [1.0, -kept], columns[::-1, c], axis=0)[::-1]
         sums[1:] *= np.sqrt(1.0 - kept**2)
@@ -115,27 +129,26 @@ def soften(residual: NDArray[np.float64]) -> NDArray[np.float64]:
     return residual / np.sqrt(1.0 + residual**2)
 
 
-def certain_from(fitted: JointFit, rules: JointRules) -> float:
+def certain_from(runs: int, rules: JointRules) -> float:
     """Return the standard errors from 0 from which a number is named: Student's t, for few runs tell their scatter ill.
 
-    No interval of a named number holds 0 by that t.
+    Parameters
+    ----------
+    runs : of the fit
+    rules : of the joint fit
+    """
+    return float(stdtrit(max(runs, rules.fewest_scatter_runs) - 1, 1.0 - rules.false_name_chance))
+
+
+def measure_certainty(fitted: JointFit, rules: JointRules) -> NDArray[np.float64]:
+    """Return how far each number is from the vehicle file's, over how far a name must be, float64 [K] [1].
+
+    That is the chance of a false name, and never less than what a 95 % interval holds.
 
     Parameters
     ----------
     fitted : the fit
     rules : of the joint fit
     """
-    runs = len(fitted.residuals)
-    certain = float(stdtrit(max(runs, rules.fewest_scatter_runs) - 1, 1.0 - rules.false_name_chance))
-    return max(certain, find_interval_quantile(runs))
-
-
-def count_standard_errors(fitted: JointFit, rules: JointRules) -> NDArray[np.float64]:
-    """Return by how many standard errors each number differs from the vehicle file's, float64 [K].
-
-    Parameters
-    ----------
-    fitted : the fit
-    rules : of the joint fit
-    """
-    return np.asarray(np.abs(fitted.values) / standard_errors(fitted, rules))
+    needed = certain_from(len(fitted.residuals), rules) * standard_errors(fitted, rules)
+    return np.asarray(np.abs(fitted.values) / np.maximum(needed, compute_interval_reach(fitted, rules)))

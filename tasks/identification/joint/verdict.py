@@ -129,8 +129,9 @@ def judge_jointly(
     settled, agreeing = _settle(train, eliminate_uncertain_numbers(train, everything, joint), starts, joint)
     # at a better fit a number may be no longer certain
     reasons = [disagreement] if disagreement else []
-    fitted = drop_at_bounds(train, eliminate_uncertain_numbers(train, settled, joint), joint, reasons)
+    fitted = eliminate_uncertain_numbers(train, settled, joint)
     fitted = add_certain_numbers(train, fitted, everything.numbers, joint)
+    fitted = drop_at_bounds(train, fitted, joint, reasons)
     fitted = drop_what_predicts_worse(train, held_out, fitted, joint, reasons)
     retuned = refit_numbers(train, fitted, tuple(n for n in fitted.numbers if n.group in CALIBRATED))
 

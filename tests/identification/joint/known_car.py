@@ -70,13 +70,16 @@ def judge_car(
 
 
 def fit_of(residuals: Sequence[np.ndarray], grids: Sequence[np.ndarray] | None = None) -> JointFit:
-    """Return a fit of a lag whose derivative is 1 in every sample, of one channel where no grids are given."""
-    (lag,) = (n for n in NUMBERS if n.name == "lag")
+    """Return a fit of a lag whose derivative is 1 in every sample, of one channel where no grids are given.
+
+    Nothing is known of it before.
+    """
+    (lag,) = (replace(n, sigma=1e6) for n in NUMBERS if n.name == "lag")
     return JointFit(
         numbers=(lag,), values=np.array([0.1]), offsets=np.zeros((len(residuals), 3)), cost=0.0,
         residuals=tuple(residuals), slopes=tuple(np.ones((len(r), 1)) for r in residuals),
         grids=tuple(grids or [np.ones((len(r), 1), dtype=bool) for r in residuals]),
-        information=np.array([[sum(len(r) for r in residuals) + 1e-9]]), scales=np.ones(7),
+        information=np.array([[sum(len(r) for r in residuals) + 1e-9]]), scales=np.ones(7), interval=0.01,
     )  # fmt: skip
 
 

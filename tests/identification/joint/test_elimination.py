@@ -133,15 +133,15 @@ def test_a_friction_that_nobody_needs_takes_no_other_number_away(monkeypatch):
         refits.append([n.name for n in numbers])
         return replace(fitted, numbers=numbers, values=fitted.values[-len(numbers) :])
 
-    def count(fitted, _rules):
-        sure = {"friction": 0.3, "lag": 1.0 if len(fitted.numbers) > 1 else 99.0}
-        return np.array([sure[n.name] for n in fitted.numbers])
+    def measure(fitted, _rules):
+        certainty = {"friction": 0.3, "lag": 0.1 if len(fitted.numbers) > 1 else 9.0}
+        return np.array([certainty[n.name] for n in fitted.numbers])
 
     def errors(fitted, _rules):
         return np.array([9.0 if n.name == "friction" else 1e-3 for n in fitted.numbers])
 
     monkeypatch.setattr(elimination, "refit_numbers", refit)
-    monkeypatch.setattr(elimination, "count_standard_errors", count)
+    monkeypatch.setattr(elimination, "measure_certainty", measure)
     monkeypatch.setattr(elimination, "standard_errors", errors)
     monkeypatch.setattr(elimination, "_stable_names", lambda *_: {"lag"})
     left = eliminate_uncertain_numbers((), both, RULES)
@@ -149,38 +149,72 @@ def test_a_friction_that_nobody_needs_takes_no_other_number_away(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("sure", "without", "stays"),
-    [(4.0, 18.0, True), (4.0, 17.5, False), (3.1, 1e6, False), (9.3, 10.0, True)],
+    ("certainty", "reach", "without", "stays"),
+    [(0.9, 0.03, 13.5, True), (0.9, 0.03, 13.0, False), (0.9, 0.05, 1e6, False), (1.1, 0.03, 10.0, True)],
 )
-def test_a_number_stays_that_is_certain_or_without_which_the_misfit_grows_by_a_third(
-    monkeypatch, sure: float, without: float, stays: bool
+def test_a_number_stays_that_is_certain_or_that_takes_a_quarter_off_the_cost(
+    monkeypatch, certainty: float, reach: float, without: float, stays: bool
 ):
     """Fade by estimated temperatures was 3.4 errors from 0, where 4.5 were needed, and made good half of the misfit."""
     four = replace(
         fit_of([np.zeros(10)] * 4), numbers=(LAG, NUMBERS["fade"]), values=np.array([0.1, 0.04]), cost=10.0
     )
-    errors = {"lag": 99.0, "fade": sure}
-    monkeypatch.setattr(
-        elimination,
-        "refit_numbers",
-        lambda _s, fit, numbers, _start=None: replace(fit, numbers=numbers, cost=without),
-    )
-    monkeypatch.setattr(
-        elimination,
-        "count_standard_errors",
-        lambda fit, _rules: np.array([errors[n.name] for n in fit.numbers]),
-    )
+
+    def refit(_stops, fit, numbers, _start=None):
+        return replace(fit, numbers=numbers, cost=without)
+
+    def measure(fit, _rules):
+        return np.array([{"lag": 99.0, "fade": certainty}[n.name] for n in fit.numbers])
+
+    monkeypatch.setattr(elimination, "refit_numbers", refit)
+    monkeypatch.setattr(elimination, "measure_certainty", measure)
+    monkeypatch.setattr(elimination, "compute_interval_reach", lambda *_: np.array([0.01, reach]))
     monkeypatch.setattr(elimination, "standard_errors", lambda fit, _rules: np.zeros(len(fit.numbers)))
     monkeypatch.setattr(elimination, "_stable_names", lambda *_: {"lag", "fade"})
     left = eliminate_uncertain_numbers((), four, RULES)
     assert ("fade" in {n.name for n in left.numbers}) is stays
 
 
+def test_what_was_needed_beside_a_number_is_asked_again_without_it(monkeypatch):
+    names = ("fade", "pressure_curve")
+    both = replace(
+        fit_of([np.zeros(10)] * 4),
+        numbers=tuple(NUMBERS[n] for n in names),
+        values=np.array([0.04, 0.03]),
+        cost=10.0,
+    )
+
+    def refit(_stops, fit, numbers, _start=None):
+        gone = set(names) - {n.name for n in numbers}
+        return replace(fit, numbers=numbers, cost=100.0 if gone == {"fade"} else 11.0)
+
+    def measure(fit, _rules):
+        return np.array([0.1 if n.name == "fade" else 0.2 for n in fit.numbers])
+
+    def reach(fit, _rules):  # beside the curve the interval of the fade does not hold 0; without it does
+        return np.array([0.03 if len(fit.numbers) > 1 else 0.05, 0.05][: len(fit.numbers)])
+
+    monkeypatch.setattr(elimination, "refit_numbers", refit)
+    monkeypatch.setattr(elimination, "measure_certainty", measure)
+    monkeypatch.setattr(elimination, "compute_interval_reach", reach)
+    monkeypatch.setattr(elimination, "standard_errors", lambda fit, _rules: np.zeros(len(fit.numbers)))
+    monkeypatch.setattr(elimination, "_stable_names", lambda *_: set(names))
+    assert eliminate_uncertain_numbers((), both, RULES).numbers == ()
+
+
+def test_the_stability_of_a_number_counts_how_badly_a_run_is_followed():
+    rng = np.random.default_rng(8)
+    for size, stable in ((1.0, {"lag"}), (12.0, set())):
+        noise = [size * rng.standard_normal(100) for _ in range(4)]
+        fitted = replace(fit_of([x - np.mean(noise) for x in noise]), values=np.array([0.8]))
+        assert elimination._stable_names(fitted, RULES) == stable
+
+
 @pytest.mark.parametrize(
     ("promised", "sure", "at", "kept", "added"),
     [
-        (1.1, 9.3, 0.06, True, True), (0.9, 9.3, 0.06, True, False), (1.1, 9.1, 0.06, True, False),
-        (1.1, 9.3, 0.3, True, False), (1.1, 9.3, 0.06, False, False),
+        (1.1, 1.01, 0.06, True, True), (0.9, 1.01, 0.06, True, False), (1.1, 0.99, 0.06, True, False),
+        (1.1, 1.01, 0.3, True, False), (1.1, 1.01, 0.06, False, False),
     ],
 )  # fmt: skip
 def test_a_number_that_is_certain_beside_what_is_left_comes_back(
@@ -199,7 +233,7 @@ def test_a_number_that_is_certain_beside_what_is_left_comes_back(
         elimination, "foresee_falls", lambda _s, _f, others: np.full(len(others), promised * needed)
     )
     monkeypatch.setattr(
-        elimination, "count_standard_errors", lambda fit, _r: np.array([99.0, sure])[: len(fit.numbers)]
+        elimination, "measure_certainty", lambda fit, _r: np.array([99.0, sure])[: len(fit.numbers)]
     )
     monkeypatch.setattr(elimination, "eliminate_uncertain_numbers", lambda _s, fit, _r: fit if kept else left)
     found = add_certain_numbers((), left, [LAG, fade, NUMBERS["pressure_gain"]], RULES)

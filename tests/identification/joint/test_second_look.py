@@ -152,6 +152,11 @@ def test_a_second_look_holds_unless_the_retuned_model_predicts_a_channel_much_be
         found = ({**error, "wheel_speed_front": wheels}, {})
         monkeypatch.setattr(second_look, "compute_held_out_errors", lambda *_, found=found: found)
         assert bool(look_twice(campaign).verdict.effects) is is_named
+        body = replace(error["speed"], after=share**1.5 * error["speed"].retuned)
+        found = ({"speed": replace(body, after=body.retuned), "pitch": body, "pitch_rate": body}, {})
+        answer_searches(monkeypatch, no_name, lag_found)
+        monkeypatch.setattr(second_look, "compute_held_out_errors", lambda *_, found=found: found)
+        assert bool(look_twice(campaign).verdict.effects) is is_named
 
 
 def test_whether_runs_disagree_is_read_from_four_training_runs_on(campaign, lag_found, no_name, monkeypatch):

