@@ -25,6 +25,8 @@ MOST_ADDED = 2
 PROMISED = 0.05
 """Fall of the cost that they must promise, over the square of the standard errors that a name needs [1]: a tenth of
 what such a number makes good, for a brake's curve makes good four times what its derivatives foresee."""
+LOST_WAY = 1.2
+"""Cost of a fit over that with the numbers that went from which other starts are tried [1]."""
 NEEDED_COST = 0.75
 """Cost of a fit over that without a number below which the number stays though it is not certain [1]."""
 GRIPS = (0.0, 0.2, 0.5)
@@ -69,10 +71,7 @@ def eliminate_uncertain_numbers(stops: Sequence[Stop], fitted: JointFit, rules: 
     """
     unstable = {n.name for n in fitted.numbers if n.removable} - _stable_names(fitted, rules)
     if unstable:
-        left = tuple(n for n in fitted.numbers if n.name not in unstable)
-        # without much of what moved the car, tyres that grip less may hide a brake's curve: the best of several starts
-        grips = [{}, *vary_grip(fitted)]
-        fitted = min((refit_numbers(stops, fitted, left, grip) for grip in grips), key=lambda fit: fit.cost)
+        fitted = _refit_without(stops, fitted, unstable)
     # a friction that nobody needs makes the certain uncertain
     fitted = _drop_unknown_frictions(stops, fitted, rules)
     needed: set[str] = set()
@@ -86,11 +85,24 @@ def eliminate_uncertain_numbers(stops: Sequence[Stop], fitted: JointFit, rules: 
         if not weak or min(weak)[0] >= 1.0:
             return _drop_unknown_frictions(stops, fitted, rules)
         name = min(weak)[1]
-        without = refit_numbers(stops, fitted, tuple(n for n in fitted.numbers if n.name != name))
+        without = _refit_without(stops, fitted, {name})
         if fitted.cost < NEEDED_COST * without.cost and not _holds_nothing(fitted, name, rules):
             needed.add(name)
         else:
             fitted, needed = without, set()
+
+
+def _refit_without(stops: Sequence[Stop], fitted: JointFit, gone: Collection[str]) -> JointFit:
+    """Return the fit without some numbers, from several starts where the first loses the way.
+
+    Without much of what moved the car, tyres that grip less may hide a brake's curve, and a fit ends far from the best.
+    """
+    left = tuple(n for n in fitted.numbers if n.name not in gone)
+    first = refit_numbers(stops, fitted, left)
+    if first.cost < LOST_WAY * fitted.cost:
+        return first
+    others = (refit_numbers(stops, fitted, left, grip) for grip in vary_grip(fitted))
+    return min((first, *others), key=lambda fit: fit.cost)
 
 
 def _holds_nothing(fitted: JointFit, name: str, rules: JointRules) -> bool:

@@ -202,6 +202,29 @@ def test_what_was_needed_beside_a_number_is_asked_again_without_it(monkeypatch):
     assert eliminate_uncertain_numbers((), both, RULES).numbers == ()
 
 
+@pytest.mark.parametrize(("first", "starts", "reached"), [(119.0, 1, 119.0), (121.0, 4, 103.0)])
+def test_a_fit_that_loses_its_way_without_a_number_begins_anew(
+    monkeypatch, first: float, starts: int, reached: float
+):
+    """Of five stops of a race car one order of elimination ended at four times the cost of another."""
+    both = replace(
+        fit_of([np.zeros(10)] * 4),
+        numbers=(LAG, NUMBERS["friction"]),
+        values=np.array([0.1, 0.2]),
+        cost=100.0,
+    )
+    begun = []
+
+    def refit(_stops, fit, numbers, start=None):
+        begun.append(start)
+        return replace(fit, numbers=numbers, cost=first if start is None else 103.0 + start["friction"])
+
+    monkeypatch.setattr(elimination, "refit_numbers", refit)
+    found = elimination._refit_without((), both, {"lag"})
+    assert len(begun) == starts and found.cost == reached
+    assert [n.name for n in found.numbers] == ["friction"]
+
+
 def test_the_stability_of_a_number_counts_how_badly_a_run_is_followed():
     rng = np.random.default_rng(8)
     for size, stable in ((1.0, {"lag"}), (12.0, set())):
