@@ -6,8 +6,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.constants import g as STANDARD_GRAVITY
-from scipy.integrate import cumulative_trapezoid
-from scipy.ndimage import median_filter
 
 from tasks.campaign.campaign import Campaign
 from tasks.campaign.channels import BRAKE_SIGNALS
@@ -71,9 +69,10 @@ def _drop_gaps(signal: Signal) -> Signal:
 
 def _hide_spikes(signal: Signal) -> NDArray[np.float64]:
     """Return the values with the middle one of `SPIKE` in the place of each, where a stop has many."""
-    if float(np.median(np.diff(signal.time))) > SPIKE_TIME:
+    if len(signal.time) < SPIKE or float(np.median(np.diff(signal.time))) > SPIKE_TIME:
         return signal.values
-    return np.asarray(median_filter(signal.values, SPIKE, mode="nearest"))
+    padded = np.pad(signal.values, SPIKE // 2, mode="edge")
+    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, SPIKE), axis=-1))
 
 
 def compute_braking_heat(
@@ -96,16 +95,21 @@ def compute_braking_heat(
     applied = pressure > rest + max(APPLIED * (hardest - rest), RELEASED_PRESSURE)
     edges = np.flatnonzero(np.diff(applied.astype(np.int8), prepend=0, append=0))
     before, last = np.maximum(edges[::2] - 1, 0), edges[1::2] - 1
-    energy = 0.5 * v**2 + STANDARD_GRAVITY * cumulative_trapezoid(v * np.sin(slope), time, initial=0.0)
+    energy = 0.5 * v**2 + STANDARD_GRAVITY * _integrate(v * np.sin(slope), time)
     gained = np.maximum(energy[before] - energy[last], 0.0)
     rate = 2.0 * DISC_COOLING / (DISC_CAPACITY_F + DISC_CAPACITY_R)
     relative = np.maximum((np.abs(v) / COOLING_SPEED) ** COOLING_EXPONENT, STANDING)
-    cooled = cumulative_trapezoid(rate * relative, time, initial=0.0)
+    cooled = _integrate(rate * relative, time)
     since = np.interp(instants, time, cooled)[:, np.newaxis] - cooled[last]
     at = instants[:, np.newaxis]
     so_far = np.maximum(energy[before] - np.interp(instants, time, energy)[:, np.newaxis], 0.0)
     under_way = np.where((time[before] <= at) & (at < time[last]), so_far, 0.0)
     return np.asarray(np.where(time[last] <= at, np.exp(-since), 0.0) @ gained + under_way.sum(axis=1))
+
+
+def _integrate(rate: NDArray[np.float64], time: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the integral of a rate from the first instant on, float64 [N]."""
+    return np.concatenate(([0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(time))))
 
 
 def estimate_disc_temperatures(campaign: Campaign, mass: float) -> Campaign:

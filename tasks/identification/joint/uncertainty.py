@@ -5,7 +5,7 @@ from math import exp
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
+from scipy.linalg import solve_banded
 from scipy.special import ndtri, stdtrit
 
 from tasks.identification.inference.noise import correlate_with_next
@@ -111,8 +111,9 @@ def _compute_score_covariance(
         apart = float(np.median(np.diff(rows))) if len(rows) > 1 else 1.0
         most = exp(-apart * interval / rules.longest_memory)
         kept = correlate_with_next(left[rows, c], most) ** (1.0 / apart)
-        # the transpose of the filter that makes such misfit of white noise, run backwards over the derivatives
-        sums = lfilter([1.0], [1.0, -kept], columns[::-1, c], axis=0)[::-1]
+        # the transpose of the filter that makes such misfit of white noise: each row and what is kept of those after it
+        after = np.vstack((np.full(len(grid), -kept), np.ones(len(grid))))
+        sums = solve_banded((0, 1), after, columns[:, c])
         sums[1:] *= np.sqrt(1.0 - kept**2)
         columns[:, c] = sums
     common = np.maximum(grid.T.astype(np.float64) @ grid, 1.0)
