@@ -5,10 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.constants import g as STANDARD_GRAVITY
 
 from tasks.campaign.campaign import Campaign
-from tasks.campaign.channels import BRAKE_SIGNALS
+from tasks.campaign.channels import BRAKE_SIGNALS, GRAVITY
 from tasks.campaign.held_inputs import take_samples
 from tasks.campaign.segments import find_brake_rule
 from tasks.campaign.signals import ChannelRule, Signal, average_sources
@@ -18,7 +17,7 @@ from tasks.vehicle.effects.brake_line import DISC_CAPACITY_F, DISC_CAPACITY_R, D
 APPLIED = 0.05
 """Share of the range of a brake signal, above its rest, from which the brake is applied [1]."""
 RESTING = 0.05
-"""Quantile of a brake signal that counts as its rest: no car brakes for so much of a drive [1]."""
+"""Quantile of a brake signal that counts as its rest: for a twentieth of a drive at least no car brakes [1]."""
 SPIKE = 5
 """Samples of which the middle value counts, so that two wrong ones in a row are no energy [1]."""
 SPIKE_TIME = 0.2
@@ -95,7 +94,7 @@ def compute_braking_heat(
     applied = pressure > rest + max(APPLIED * (hardest - rest), RELEASED_PRESSURE)
     edges = np.flatnonzero(np.diff(applied.astype(np.int8), prepend=0, append=0))
     before, last = np.maximum(edges[::2] - 1, 0), edges[1::2] - 1
-    energy = 0.5 * v**2 + STANDARD_GRAVITY * _integrate(v * np.sin(slope), time)
+    energy = 0.5 * v**2 + GRAVITY * _integrate(v * np.sin(slope), time)
     gained = np.maximum(energy[before] - energy[last], 0.0)
     rate = 2.0 * DISC_COOLING / (DISC_CAPACITY_F + DISC_CAPACITY_R)
     relative = np.maximum((np.abs(v) / COOLING_SPEED) ** COOLING_EXPONENT, STANDING)

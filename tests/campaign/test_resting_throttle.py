@@ -1,4 +1,4 @@
-"""What a throttle reads while the brake is applied is its rest, where it rests."""
+"""A throttle rests at the value that it reads while the brake is applied, where that value is steady."""
 
 from dataclasses import replace
 

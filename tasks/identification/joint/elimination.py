@@ -15,8 +15,8 @@ from tasks.identification.joint.uncertainty import (
     compute_interval_reach,
     measure_certainty,
     measure_worst_misfit,
-    soften,
     standard_errors,
+    weigh_robustly,
 )
 from tasks.identification.rules import JointRules
 
@@ -25,7 +25,7 @@ MOST_ADDED = 2
 PROMISED = 0.05
 """Fall of the cost that they must promise, over the square of the standard errors that a name needs [1]: a tenth of
 what such a number makes good, for a brake's curve makes good four times what its derivatives foresee."""
-LOST_WAY = 1.2
+RESTART_COST = 1.2
 """Cost of a fit over that with the numbers that went from which other starts are tried [1]."""
 NEEDED_COST = 0.75
 """Cost of a fit over that without a number below which the number stays though it is not certain [1]."""
@@ -86,26 +86,26 @@ def eliminate_uncertain_numbers(stops: Sequence[Stop], fitted: JointFit, rules: 
             return _drop_unknown_frictions(stops, fitted, rules)
         name = min(weak)[1]
         without = _refit_without(stops, fitted, {name})
-        if fitted.cost < NEEDED_COST * without.cost and not _holds_nothing(fitted, name, rules):
+        if fitted.cost < NEEDED_COST * without.cost and not _interval_holds_zero(fitted, name, rules):
             needed.add(name)
         else:
             fitted, needed = without, set()
 
 
 def _refit_without(stops: Sequence[Stop], fitted: JointFit, gone: Collection[str]) -> JointFit:
-    """Return the fit without some numbers, from several starts where the first loses the way.
+    """Return the fit without some numbers, from several starts where the first ends much worse.
 
     Without much of what moved the car, tyres that grip less may hide a brake's curve, and a fit ends far from the best.
     """
     left = tuple(n for n in fitted.numbers if n.name not in gone)
     first = refit_numbers(stops, fitted, left)
-    if first.cost < LOST_WAY * fitted.cost:
+    if first.cost < RESTART_COST * fitted.cost:
         return first
     others = (refit_numbers(stops, fitted, left, grip) for grip in vary_grip(fitted))
     return min((first, *others), key=lambda fit: fit.cost)
 
 
-def _holds_nothing(fitted: JointFit, name: str, rules: JointRules) -> bool:
+def _interval_holds_zero(fitted: JointFit, name: str, rules: JointRules) -> bool:
     """Whether the 95 % interval of a number holds 0."""
     place = [n.name for n in fitted.numbers].index(name)
     return bool(abs(fitted.values[place]) <= compute_interval_reach(fitted, rules)[place])
@@ -202,7 +202,7 @@ def _stable_names(fitted: JointFit, rules: JointRules) -> set[str]:
 
 def _kept_linearly(fitted: JointFit, runs: tuple[int, ...], rules: JointRules) -> set[str]:
     """Return the removable numbers that backward elimination keeps on some runs, linear about the fit."""
-    residual = [soften(fitted.residuals[i]) for i in runs]
+    residual = [weigh_robustly(fitted.residuals[i]) for i in runs]
     slopes = [fitted.slopes[i] for i in runs]
     prior = np.array([1.0 / n.sigma**2 for n in fitted.numbers])
     information = np.asarray(np.diag(prior) + sum(a.T @ a for a in slopes))

@@ -68,7 +68,7 @@ class JointFit:
     scales: NDArray[np.float64]
 
     @property
-    def earned(self) -> tuple[JointNumber, ...]:
+    def removable_numbers(self) -> tuple[JointNumber, ...]:
         """Numbers of the fit that had to earn their place."""
         return tuple(number for number in self.numbers if number.removable)
 

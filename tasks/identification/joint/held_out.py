@@ -33,7 +33,7 @@ def drop_what_predicts_worse(
     """
     there = _held_out_misfit(held_out, fitted)
     trials = []
-    for number in fitted.earned:
+    for number in fitted.removable_numbers:
         without = refit_numbers(train, fitted, tuple(n for n in fitted.numbers if n.name != number.name))
         gone = _held_out_misfit(held_out, without)
         # a number earns its name by what it does to any channel, and not against the speed

@@ -36,7 +36,7 @@ def standard_errors(fitted: JointFit, rules: JointRules) -> NDArray[np.float64]:
     shares = [(slope.T * _weigh_curvature(residual)) @ slope for residual, slope in pairs]
     whole = np.diag([1.0 / n.sigma**2 for n in fitted.numbers]) + sum(shares)
     moves = [
-        np.linalg.solve(whole - share, slope.T @ soften(residual))
+        np.linalg.solve(whole - share, slope.T @ weigh_robustly(residual))
         for share, (residual, slope) in zip(shares, pairs, strict=True)
     ]
     spread = np.array(moves) - np.mean(moves, axis=0)
@@ -120,7 +120,7 @@ def _compute_score_covariance(
     return np.asarray(np.einsum("cd,nck,ndl->kl", left.T @ left / common, columns, columns, optimize=True))
 
 
-def soften(residual: NDArray[np.float64]) -> NDArray[np.float64]:
+def weigh_robustly(residual: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return residuals with the weight that the robust loss gives them.
 
     Parameters

@@ -249,7 +249,7 @@ def _settle(
 def _name_effects(fitted: JointFit, rules: JointRules) -> list[NamedEffect]:
     """Return what is named, new physics first."""
     # what every car needs anew is told whatever its size: the prediction rests on it
-    named = [*fitted.earned]
+    named = [*fitted.removable_numbers]
     named += [n for n in fitted.numbers if not n.removable and not n.is_at_bound(fitted.by_name[n.name])]
     order = {"effect": 0, "sensor": 1, "retune": 2}
     return sorted((_named_effect(fitted, n, rules) for n in named), key=lambda e: order[e.effect_class])

@@ -1,4 +1,4 @@
-"""What is not certain goes, and what explains nearly as much in the place of what stays is its rival."""
+"""Elimination takes away numbers that are not certain, and finds the rivals of those that stay."""
 
 from dataclasses import replace
 

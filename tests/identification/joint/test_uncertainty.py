@@ -12,15 +12,15 @@ from tasks.identification.joint.uncertainty import (
     certain_from,
     compute_interval_reach,
     measure_certainty,
-    soften,
     standard_errors,
+    weigh_robustly,
 )
 from tests.identification.joint.known_car import fit_of
 
 RULES = load_decision_rules().joint
 
 
-def remembering(rng: np.random.Generator, count: int, kept: float) -> np.ndarray:
+def make_correlated_noise(rng: np.random.Generator, count: int, kept: float) -> np.ndarray:
     """Return first-order autoregressive noise of variance 1, float64 [N]."""
     white = rng.standard_normal(count)
     return np.asarray(lfilter([np.sqrt(1.0 - kept**2)], [1.0, -kept], white))
@@ -51,14 +51,14 @@ def test_an_interval_of_few_runs_is_as_wide_as_misfit_that_remembers_makes_it_up
 
 
 def test_two_channels_that_miss_alike_say_no_more_than_one():
-    misfit = remembering(np.random.default_rng(2), 2000, 0.95)
+    misfit = make_correlated_noise(np.random.default_rng(2), 2000, 0.95)
     both = fit_of([np.repeat(misfit, 2)] * 3, [np.ones((2000, 2), dtype=bool)] * 3)
     (one,), (two,) = (compute_interval_reach(fitted, RULES) for fitted in (fit_of([misfit] * 3), both))
     assert two == pytest.approx(one, rel=1e-6)
 
 
 def test_a_slow_channel_remembers_from_sample_to_sample():
-    misfit = remembering(np.random.default_rng(3), 500, 0.9)
+    misfit = make_correlated_noise(np.random.default_rng(3), 500, 0.9)
     slow = np.zeros((5000, 1), dtype=bool)
     slow[::10] = True
     (dense,), (sparse,) = (
@@ -73,7 +73,7 @@ def test_intervals_of_three_runs_hold_the_truth_whatever_the_misfit_remembers(ke
     """The truth is 0: a derivative of 1 in each of two channels makes the number the mean of what is left."""
     rng, held = np.random.default_rng(4), 0
     for _ in range(200):
-        runs = [np.column_stack([remembering(rng, 300, kept) for _ in range(2)]) for _ in range(3)]
+        runs = [np.column_stack([make_correlated_noise(rng, 300, kept) for _ in range(2)]) for _ in range(3)]
         found = float(np.mean(runs))
         fitted = fit_of([(run - found).ravel() for run in runs], [np.ones((300, 2), dtype=bool)] * 3)
         held += abs(found) < compute_interval_reach(fitted, RULES)[0]
@@ -87,10 +87,12 @@ def test_intervals_of_many_runs_hold_the_truth_however_large_the_robust_misfit_i
     """The truth is 0: a robust fit of a derivative of 1, whose loss weighs large misfit less."""
     rng, held = np.random.default_rng(5), 0
     for _ in range(150):
-        runs = [size * remembering(rng, 200, 0.95) for _ in range(count)]
+        runs = [size * make_correlated_noise(rng, 200, 0.95) for _ in range(count)]
         every, found = np.concatenate(runs), 0.0
         for _ in range(20):
-            found += float(np.sum(soften(every - found)) / np.sum((1.0 + (every - found) ** 2) ** -0.5))
+            found += float(
+                np.sum(weigh_robustly(every - found)) / np.sum((1.0 + (every - found) ** 2) ** -0.5)
+            )
         fitted = fit_of([run - found for run in runs])
         held += abs(found) < compute_interval_reach(fitted, RULES)[0]
     assert held >= 134  # of 150; 0.95 less three standard errors
@@ -105,7 +107,7 @@ def test_a_number_is_certain_from_the_chance_of_a_false_name():
 
 @pytest.mark.parametrize(("runs", "kept"), [(2, 0.0), (3, 0.98), (5, 0.0)])
 def test_no_number_is_certain_whose_interval_holds_0(runs: int, kept: float):
-    misfit = remembering(np.random.default_rng(6), 400, kept)
+    misfit = make_correlated_noise(np.random.default_rng(6), 400, kept)
     fitted = fit_of([misfit] * runs)
     (reach,) = compute_interval_reach(fitted, RULES)
     (error,) = standard_errors(fitted, RULES)
