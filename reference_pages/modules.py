@@ -90,8 +90,7 @@ PAGES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     ),
     "measured-runs": (
         "Measured runs and verdicts",
-        "Campaigns, and how `close-loop` reaches a verdict:"
-        " [closing the loop](../../explanation/closing-the-loop.md).",
+        "Campaigns, and how `close-loop` reaches a verdict: [rules of a verdict](../verdict-rules.md).",
         (
             "tasks.campaign.campaign",
             "tasks.campaign.channels",

@@ -31,17 +31,23 @@ SIZE_SEEDS = 5
 """Campaigns of each size of the power table."""
 JUDGES = (
     "tasks/campaign/",
+    "tasks/conventions",
     "tasks/identification/",
     "tasks/vehicle/",
     "tasks/surface/",
     "catalogs/effects/",
     "catalogs/decision_rules",
     "catalogs/joint_numbers",
-    "catalogs/studies/closing.yaml",
+    "catalogs/studies/closing",
     "catalogs/surfaces/",
     "catalogs/tyre_families",
+    "catalogs/tyres/__init__",
     "catalogs/vehicles/__init__",
+    "catalogs/vehicles/inherited",
+    "catalogs/vehicles/numbers",
     "catalogs/vehicles/paper",
+    "catalogs/weather/",
+    "flows/measured/searches",
 )
 """Sources that a verdict depends on: campaigns judged by the same ones belong to one table."""
 

@@ -193,12 +193,15 @@ def _estimate_heat(
     made: list[tuple[PlannedRun, Assembled]],
     recordings: dict[Path, dict[str, Signal]],
 ) -> dict[str, float]:
-    """Return the heat with which each run begins, by its name [J/kg]; 0 where the map declares a disc temperature."""
+    """Return the heat with which each run begins, by its name [J/kg]; 0 where the map declares its disc temperature."""
     heat = dict.fromkeys((run.name for run, _ in made), 0.0)
-    if any("disc_temperature_above_ambient_c" in run.conditions.model_fields_set for run, _ in made):
-        return heat
+    unknown = [
+        (run, found)
+        for run, found in made
+        if "disc_temperature_above_ambient_c" not in run.conditions.model_fields_set
+    ]
     for file, signals in recordings.items():
-        starts = {run.name: found.start for run, found in made if run.file == file}
+        starts = {run.name: found.start for run, found in unknown if run.file == file}
         heat |= zip(
             starts, measure_braking_heat(signals, channel_map.rules, list(starts.values())), strict=True
         )

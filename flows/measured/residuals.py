@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from tasks.campaign.campaign import CHANNELS
 from tasks.identification.decision.verdict import Trace
 from tasks.identification.inference.forward import RunModel, predict_channels
-from tasks.identification.inference.hypothesis import compose_parameters
 from tasks.identification.joint.fit import lead_offsets
 from tasks.identification.joint.stops import predict_stop
 from tasks.identification.joint.verdict import JointTrace
@@ -44,7 +43,6 @@ def predict_runs(trace: Trace | JointTrace) -> tuple[tuple[RunPrediction, ...], 
     """
     if isinstance(trace, JointTrace):
         return _predict_stops(trace)
-    theta, slots = compose_parameters(trace.end.base.parts, trace.end.base.values, trace.end.base.session)
     evidence = trace.start.evidence
     train, held_out = (
         tuple(
@@ -53,10 +51,10 @@ def predict_runs(trace: Trace | JointTrace) -> tuple[tuple[RunPrediction, ...], 
                 channels=tuple(np.flatnonzero(np.isfinite(run.sigma)).tolist()),
                 predicted={
                     "frozen": predict_channels(run.model, np.zeros(len(EFFECT_TABLE))),
-                    "after": predict_channels(run.model, theta, slots=slots),
+                    "after": after,
                 },
             )
-            for run in runs
+            for run, after in zip(runs, trace.predict(runs), strict=True)
         )
         for runs in (evidence.train, evidence.held_out)
     )

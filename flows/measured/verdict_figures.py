@@ -41,7 +41,7 @@ def make_residual_figures(runs: Sequence[RunPrediction]) -> list[dict[str, Any]]
         {
             "name": run.model.run.name,
             "time_s": _plain(np.arange(run.model.samples) * run.model.run.interval),
-            "pressure_mpa": _plain(run.model.run.pressure[: run.model.samples]),
+            "pressure_mpa": _plain(run.model.pressure),
             "models": [name for name in MODELS if name in run.predicted],
             "channels": [
                 {"name": CHANNELS[c], "unit": format_plain_unit(CHANNEL_UNITS[c])}

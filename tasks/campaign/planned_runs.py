@@ -52,27 +52,44 @@ RICH: tuple[RunPlan, ...] = (
 """An experiment design that excites every port, 14 training runs first."""
 TRAINING = 14
 
-EXPERIMENTS: tuple[tuple[str, RunPlan], ...] = (
-    ("coast down from 36 m/s for 12 s", RunPlan(speed=36.0, peak=0.0, duration=12.0)),
-    ("coast down from 12 m/s for 12 s", RunPlan(speed=12.0, peak=0.0, duration=12.0)),
-    ("hard stop from 33 m/s with cold discs, 2.4 MPa", RunPlan(speed=33.0, peak=2.4, duration=7.0)),
-    (
-        "hard stop from 33 m/s with hot discs, 2.4 MPa",
-        RunPlan(speed=33.0, peak=2.4, duration=7.0, disc_rise=350.0),
-    ),
-    ("gentle stop from 14 m/s, 0.6 MPa", RunPlan(speed=14.0, peak=0.6, duration=9.0)),
-    ("pulsed braking from 28 m/s, 2.4 MPa", RunPlan(speed=28.0, peak=-2.4, duration=7.0)),
-    (
-        "ABS stop from 22 m/s in rain of 10 mm/h, 2.6 MPa",
-        RunPlan(weather="rain", rate=10.0, speed=22.0, peak=2.6),
-    ),
-    ("ABS stop from 14 m/s on snow, 2.0 MPa", RunPlan(weather="snow", rate=2.0, speed=14.0, peak=2.0)),
-    (
-        "roll over a hump of 3.7 m and 75 mm at 11 m/s",
-        RunPlan(speed=11.0, peak=0.0, duration=5.0, hazard=(15.0, 3.7, 0.075)),
-    ),
-)
-"""Runs that any proving ground allows, from which one is chosen to separate two hypotheses."""
+GENTLE, SNOW_STOP, HARD, ABS_STOP = 1.4, 4.8, 5.7, 6.2
+"""Decelerations that the brakes of planned runs would give if no tyre reached its limit [m/s2]."""
+
+
+def plan_experiments(gain: float) -> tuple[tuple[str, RunPlan], ...]:
+    """Return runs that any proving ground allows, each with its words, from which one separates two hypotheses.
+
+    Parameters
+    ----------
+    gain : deceleration of the car per brake pressure [m/s2/MPa]
+    """
+    gentle, snow, hard, limit = (round(d / gain, 1) for d in (GENTLE, SNOW_STOP, HARD, ABS_STOP))
+    return (
+        ("coast down from 36 m/s for 12 s", RunPlan(speed=36.0, peak=0.0, duration=12.0)),
+        ("coast down from 12 m/s for 12 s", RunPlan(speed=12.0, peak=0.0, duration=12.0)),
+        (
+            f"hard stop from 33 m/s with cold discs, {hard} MPa",
+            RunPlan(speed=33.0, peak=hard, duration=7.0),
+        ),
+        (
+            f"hard stop from 33 m/s with hot discs, {hard} MPa",
+            RunPlan(speed=33.0, peak=hard, duration=7.0, disc_rise=350.0),
+        ),
+        (f"gentle stop from 14 m/s, {gentle} MPa", RunPlan(speed=14.0, peak=gentle, duration=9.0)),
+        (f"pulsed braking from 28 m/s, {hard} MPa", RunPlan(speed=28.0, peak=-hard, duration=7.0)),
+        (
+            f"ABS stop from 22 m/s in rain of 10 mm/h, {limit} MPa",
+            RunPlan(weather="rain", rate=10.0, speed=22.0, peak=limit),
+        ),
+        (
+            f"ABS stop from 14 m/s on snow, {snow} MPa",
+            RunPlan(weather="snow", rate=2.0, speed=14.0, peak=snow),
+        ),
+        (
+            "roll over a hump of 3.7 m and 75 mm at 11 m/s",
+            RunPlan(speed=11.0, peak=0.0, duration=5.0, hazard=(15.0, 3.7, 0.075)),
+        ),
+    )
 
 
 def make_planned_run(

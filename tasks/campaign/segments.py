@@ -104,14 +104,14 @@ def _judge_segment(
 ) -> Segment:
     """Return a segment from where the car moves, or with its fault."""
     if speed is not None:
-        lead = speed.cut_window(segment.start, episode.onset_time)
-        slow = np.flatnonzero(lead.values < MOVING)
-        if slow.size and slow[-1] == len(lead.time) - 1:
+        lead = np.flatnonzero((speed.time >= segment.start) & (speed.time <= episode.onset_time))
+        slow = lead[speed.values[lead] < MOVING]
+        if slow.size and slow[-1] == lead[-1]:
             return replace(
                 segment, fault=f"the car stands, or is slower than {MOVING:g} m/s, where the brake is applied"
             )
         if slow.size:
-            segment = replace(segment, start=float(lead.time[slow[-1] + 1]))
+            segment = replace(segment, start=float(speed.time[slow[-1] + 1]))
     for channel, signal in parts:
         inside = signal.cut_window(segment.start, segment.end)
         if len(inside.time) < 2:

@@ -28,8 +28,8 @@ class Signal:
     unit: str = ""
 
     def cut_window(self, start: float, end: float) -> "Signal":
-        """Return the samples from ``start`` to ``end`` [s], both included."""
-        inside = (self.time >= start) & (self.time <= end)
+        """Return the samples from ``start`` on and before ``end`` [s], so that windows that touch share none."""
+        inside = (self.time >= start) & (self.time < end)
         return Signal(time=self.time[inside], values=self.values[inside], unit=self.unit)
 
 

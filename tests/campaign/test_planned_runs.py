@@ -1,10 +1,15 @@
 """The words of an experiment that a verdict proposes are those of the run that it plans."""
 
 import re
+from dataclasses import replace
 
 import pytest
 
-from tasks.campaign.planned_runs import EXPERIMENTS, RunPlan, make_planned_run
+from tasks.campaign.planned_runs import RunPlan, make_planned_run, plan_experiments
+
+GAIN = 2.389
+"""Deceleration per brake pressure of the paper's car [m/s2/MPa]."""
+EXPERIMENTS = plan_experiments(GAIN)
 
 
 @pytest.mark.parametrize(("words", "plan"), EXPERIMENTS, ids=[words for words, _ in EXPERIMENTS])
@@ -16,6 +21,13 @@ def test_every_number_of_an_experiments_words_is_one_of_its_run(words: str, plan
     assert {plan.speed, abs(plan.peak)} - {0.0} <= said
     assert ("hot" in words) == (plan.disc_rise > RunPlan(speed=1.0, peak=0.0).disc_rise)
     assert plan.weather == next((kind for kind in ("rain", "snow") if kind in words), "dry")
+
+
+def test_a_car_with_weaker_brakes_is_asked_for_more_pressure_and_the_same_stops() -> None:
+    for (words, plan), (_, weak) in zip(EXPERIMENTS, plan_experiments(0.3 * GAIN), strict=True):
+        assert weak.peak == pytest.approx(plan.peak / 0.3, abs=0.2)
+        assert replace(weak, peak=plan.peak) == plan, words
+    assert [abs(plan.peak) for _, plan in EXPERIMENTS] == [0.0, 0.0, 2.4, 2.4, 0.6, 2.4, 2.6, 2.0, 0.0]
 
 
 @pytest.mark.parametrize("interval", [0.01, 0.05])

@@ -1,15 +1,10 @@
 """Effects are recovered where they are, and nothing is found where nothing is."""
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
-from synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
@@ -27,6 +22,7 @@ from tasks.identification.inference.linearisation_points import linearise_at
 from tasks.identification.inference.noise import whiten_channels
 from tasks.vehicle.effects.table import EFFECT_TABLE, build_parameter_vector
 from tasks.vehicle.model.simulation import Simulation
+from tests.identification.synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
 WANTED = (
     "aerodynamic_drag",

@@ -1,14 +1,9 @@
 """Intervals stay within bounds and say of 'no effect' what the likelihood says."""
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
-from synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, plain_run
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
@@ -28,6 +23,7 @@ from tasks.identification.inference.forward import predict_channels, prepare_run
 from tasks.identification.inference.hypothesis import make_library_hypothesis
 from tasks.identification.inference.linearisation import prepare_evidence
 from tasks.vehicle.effects.table import EFFECT_TABLE, build_parameter_vector
+from tests.identification.synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, plain_run
 
 LIBRARY = tuple(
     e for e in load_effects() if e.name in ("wet_friction_speed", "rolling_resistance", "brake_lag")

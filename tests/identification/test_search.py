@@ -1,20 +1,16 @@
 """Parts of the search: runs sensitive to the step, numerical doubt, nuisances taken over, experiments, look-alikes."""
 
-import sys
+from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-from synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, measured, plain_run
-
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from tasks.campaign.campaign import SESSION
-from tasks.campaign.planned_runs import EXPERIMENTS, RICH, make_planned_run
+from tasks.campaign.planned_runs import RICH, RunPlan, make_planned_run, plan_experiments
 from tasks.identification.decision import experiment, search
 from tasks.identification.decision.attribution import Candidate, refine_candidates
 from tasks.identification.decision.experiment import plan_next_experiment
@@ -32,6 +28,7 @@ from tasks.identification.inference.forward import prepare_run
 from tasks.identification.inference.hypothesis import make_library_hypothesis
 from tasks.identification.inference.linearisation import compute_step_misfit
 from tasks.vehicle.effects.table import EFFECT_TABLE, build_parameter_vector
+from tests.identification.synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
 QUIET = Disturbance(scale=(5.0, 0.001, 5.0), time=(1.0, 0.3, 0.3))
 LIBRARY = {e.name: e for e in load_effects()}
@@ -138,11 +135,20 @@ def test_the_next_experiment_excites_what_tells_the_two_apart(monkeypatch: pytes
     faded = fit_hypotheses(
         evidence.train, (make_library_hypothesis(LIBRARY["brake_fade"], 0.06),), evidence.session_sigma
     )
-    drives = (*EXPERIMENTS[2:5], EXPERIMENTS[-1])  # hard stops with cold and hot discs, a gentle one, a hump
-    monkeypatch.setattr(experiment, "EXPERIMENTS", drives)
+
+    def offer(choose: Callable[[str], bool], order: int = 1) -> None:
+        def plan(gain: float) -> tuple[tuple[str, RunPlan], ...]:
+            return tuple(drive for drive in plan_experiments(gain) if choose(drive[0]))[::order]
+
+        monkeypatch.setattr(experiment, "plan_experiments", plan)
+
+    def is_offered(words: str) -> bool:
+        return words.startswith(("hard", "gentle", "roll"))
+
+    offer(is_offered)
     plan = plan_next_experiment(evidence, faded, null, VEHICLE, SURFACE)
     assert plan is not None
-    assert plan.plan in {words for words, _ in drives} and "hot discs" in plan.plan
+    assert plan.plan == "hard stop from 33 m/s with hot discs, 2.4 MPa"
     assert plan.expected_d2 > 20.0
     # a slower log has fewer samples of the same run, each with the noise that the campaign says
     slow = [
@@ -151,11 +157,14 @@ def test_the_next_experiment_excites_what_tells_the_two_apart(monkeypatch: pytes
     ]
     slower = plan_next_experiment(replace(evidence, train=slow), faded, null, VEHICLE, SURFACE)
     assert slower is not None and slower.expected_d2 < 0.7 * plan.expected_d2
+    # its noise is that of the sensors, and not of the run whose noise was widened most
+    wide = [replace(run, sigma=5.0 * run.sigma) for run in evidence.train]
+    assert plan_next_experiment(replace(evidence, train=wide), faded, null, VEHICLE, SURFACE) == plan
     # of two that are alike, the run that told the others apart best is refused too
     # runs that cannot be better are not differentiated, and any order gives the same one
-    monkeypatch.setattr(experiment, "EXPERIMENTS", drives[::-1])
+    offer(is_offered, -1)
     assert plan_next_experiment(evidence, faded, null, VEHICLE, SURFACE) == plan
-    monkeypatch.setattr(experiment, "EXPERIMENTS", [drive for drive in drives if drive[0] == plan.plan])
+    offer(plan.plan.__eq__)
     assert plan_next_experiment(evidence, faded, faded, VEHICLE, SURFACE) is None
 
 

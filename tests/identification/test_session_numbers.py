@@ -1,16 +1,11 @@
 """Numbers of the vehicle that the runs can hardly tell apart: pulled together, and rivals of each other."""
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
-from synthetic import NOISE, TOLERANCES, measured, plain_run
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
@@ -30,6 +25,7 @@ from tasks.identification.inference.fit import fit_hypotheses
 from tasks.identification.inference.hypothesis import Hypothesis
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.table import EFFECT_TABLE, build_parameter_vector
+from tests.identification.synthetic import NOISE, TOLERANCES, measured, plain_run
 
 QUIET = Disturbance(scale=(5.0, 0.001, 5.0), time=(1.0, 0.3, 0.3))
 NUMBERS = tuple(e for e in load_effects() if e.name in ("retuned_pressure_gain", "retuned_mass"))

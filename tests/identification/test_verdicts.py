@@ -13,9 +13,9 @@ from catalogs.studies.closing import load_closing_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from tasks.campaign.campaign import CHANNELS
-from tasks.campaign.planned_runs import EXPERIMENTS, RICH, RunPlan, make_planned_run
+from tasks.campaign.planned_runs import RICH, RunPlan, make_planned_run, plan_experiments
 from tasks.identification.benchmark import make_synthetic_campaign
-from tasks.identification.decision import discovery, objection
+from tasks.identification.decision import discovery, experiment, objection
 from tasks.identification.decision.answer import ChannelError, Verdict
 from tasks.identification.decision.disputes import ForeignCarError
 from tasks.identification.decision.objection import object_to_last
@@ -67,7 +67,7 @@ def judged(
     outside: str | None = None,
     design: tuple[RunPlan, ...] = LEAN,
     rules: DecisionRules = RULES,
-    experiments: tuple[tuple[str, RunPlan], ...] = EXPERIMENTS[-1:],
+    first_experiment: int = -1,
     hardly_known: dict[str, tuple[float, float]] | None = None,
     brake_rest: float = 0.0,
 ) -> Verdict:
@@ -77,7 +77,7 @@ def judged(
     last = 3 * len(design) // 4
     runs = tuple(replace(run, held_out=number >= last) for number, run in enumerate(campaign.runs))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tasks.identification.decision.experiment.EXPERIMENTS", experiments)
+        patch.setattr(experiment, "plan_experiments", lambda gain: plan_experiments(gain)[first_experiment:])
         return find_missing_effects(
             replace(campaign, runs=runs, brake_rest=brake_rest), vehicle, SURFACE, tuple(LIBRARY.values()), rules,
             hardly_known=hardly_known or {},
@@ -265,7 +265,7 @@ def test_two_effects_at_once_are_both_named() -> None:
 
 @pytest.mark.minutes
 def test_what_stops_of_one_kind_cannot_tell_apart_is_a_set_with_the_run_that_can() -> None:
-    verdict = judged({"pad_drag": 40.0}, design=load_closing_study().drives(), experiments=EXPERIMENTS)
+    verdict = judged({"pad_drag": 40.0}, design=load_closing_study().drives(), first_experiment=0)
     told = {*names(verdict), *(rival.name for _, rival in verdict.rivals)}
     assert verdict.verdict == "SET" and "pad_drag" in told
     assert verdict.experiment is not None and verdict.experiment.expected_d2 > 10.0

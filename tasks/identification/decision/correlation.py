@@ -71,7 +71,7 @@ def _correlate_channel(
     powers, pressed, count = np.zeros(2), 0.0, 0
     for i, run in enumerate(runs):
         rho, sigma = run.rho[channel : channel + 1], run.sigma[channel : channel + 1]
-        u = _whiten_channel(run.model.run.pressure[: run.model.samples, None], rho, sigma)
+        u = _whiten_channel(run.model.pressure[:, None], rho, sigma)
         own = None if run.model.sampled is None else run.model.sampled[:, channel : channel + 1]
         pressed += float(u @ u)
         count += len(u)

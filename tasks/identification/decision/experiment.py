@@ -4,14 +4,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tasks.campaign.planned_runs import EXPERIMENTS, make_planned_run
+from tasks.campaign.planned_runs import make_planned_run, plan_experiments
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.derivatives import differentiate_run
 from tasks.identification.inference.fit import Fit
 from tasks.identification.inference.forward import predict_channels, prepare_run
-from tasks.identification.inference.hypothesis import compose_parameters
 from tasks.identification.inference.noise import whiten_channels
 from tasks.surface.state import SurfaceParameters
+from tasks.vehicle.effects.table import PARAMETER_INDEX
 from tasks.vehicle.parameters import Vehicle
 
 
@@ -39,15 +39,16 @@ def plan_next_experiment(
 
     Parameters
     ----------
-    evidence : the runs, which give noise and priors
+    evidence : the runs, and the noise of their sensors and the priors of the planned one
     first, second : fitted explanations
     vehicle, surface : the judged model
     """
-    rho, sigma = evidence.train[0].rho, evidence.train[0].sigma
-    theta, slots = compose_parameters(first.parts, first.values, first.session)
-    other, other_slots = compose_parameters(second.parts, second.values, second.session)
+    rho, sigma = evidence.sensors
+    theta, slots = first.compose()
+    other, other_slots = second.compose()
     planned = []
-    for plan, drive in EXPERIMENTS:
+    brake_gain = vehicle.brake_gain * (1.0 + theta[PARAMETER_INDEX["pressure_gain"]])
+    for plan, drive in plan_experiments(brake_gain / (vehicle.wheel_radius * vehicle.mass)):
         run = make_planned_run(drive, plan, interval=evidence.train[0].model.run.interval)
         if (sampled := evidence.train[0].model.sampled) is not None:
             run = replace(run, sampled=np.resize(sampled, run.response.shape))

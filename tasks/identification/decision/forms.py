@@ -11,7 +11,7 @@ from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.evidence import RunEvidence
 from tasks.identification.inference.fit import Fit
 from tasks.identification.inference.forward import predict_channels
-from tasks.identification.inference.hypothesis import Hypothesis, compose_parameters
+from tasks.identification.inference.hypothesis import Hypothesis
 from tasks.identification.inference.noise import unwhiten_channels, whiten_channels
 from tasks.vehicle.effects.forms import SHAPES, Form, name_form
 from tasks.vehicle.effects.ports import PORT_UNITS
@@ -125,7 +125,7 @@ def differentiate_by_splines(evidence: Evidence, at: Fit) -> tuple[NDArray[np.fl
     evidence : the runs
     at : fit about which the derivatives are taken
     """
-    theta, slots = compose_parameters(at.parts, at.values, at.session)
+    theta, slots = at.compose()
     return tuple(_differentiate_run(run, theta, slots) for run in evidence.train)
 
 

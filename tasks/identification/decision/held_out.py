@@ -41,7 +41,7 @@ def compute_held_out_errors(
     models = (
         (np.zeros(len(EFFECT_TABLE)), ()),
         compose_parameters((), np.empty(0), retuned.session),
-        compose_parameters(base.parts, base.values, base.session),
+        base.compose(),
     )
     names, square, braked, manoeuvres = [], [], [], []
     measured = np.isfinite(evidence.train[0].sigma)
@@ -50,8 +50,7 @@ def compute_held_out_errors(
         y = np.array([predict_channels(model, theta, slots=slots) for theta, slots in models])
         names.append(model.run.name)
         square.append(model.compute_square_error(y))
-        pressure = model.run.pressure[: model.samples]
-        errors = manoeuvre_errors(model.measured, y, pressure, model.run.interval)
+        errors = manoeuvre_errors(model.measured, y, model.pressure, model.run.interval)
         if errors is not None:
             braked.append(model.run.name)
             manoeuvres.append(errors**2)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
 from tasks.identification.decision.alternatives import find_pairs, find_pulled_numbers
@@ -34,7 +35,9 @@ from tasks.identification.decision.screening import can_show, find_detectable_si
 from tasks.identification.decision.search import SearchState
 from tasks.identification.decision.superseded import drop_superseded, is_named
 from tasks.identification.decision.words import say_confirmation, say_rejection
+from tasks.identification.inference.evidence import RunEvidence
 from tasks.identification.inference.fit import Fit
+from tasks.identification.inference.forward import predict_channels
 from tasks.identification.inference.hypothesis import compose_parameters
 from tasks.identification.inference.linearisation import prepare_evidence
 from tasks.identification.rules import DecisionRules
@@ -61,6 +64,16 @@ class Trace:
     end: SearchState
     compared: tuple[RivalComparison, ...]
     calibrated: tuple[NamedEffect, ...] = ()
+
+    def predict(self, runs: Sequence[RunEvidence]) -> list[NDArray[np.float64]]:
+        """Return the readings of runs by the grown model, float64 [N, 7] each [units of the channels].
+
+        Parameters
+        ----------
+        runs : training or held-out runs
+        """
+        theta, slots = self.end.base.compose()
+        return [predict_channels(run.model, theta, slots=slots) for run in runs]
 
 
 def find_missing_effects(
@@ -170,8 +183,7 @@ def find_missing_effects(
     if pair is not None:
         experiment = plan_next_experiment(start.evidence, *pair, vehicle, surface)
     theta, slots = compose_parameters(found.base.parts, found.base.values, np.zeros(len(SESSION)))
-    grown = compose_parameters(found.base.parts, found.base.values, found.base.session)
-    sigma, lead = np.array(campaign.tolerances.session), evidence.train[0]
+    sigma, sensors = np.array(campaign.tolerances.session), zip(CHANNELS, *evidence.sensors, strict=True)
     pulls = zip(SESSION, start.base.session / sigma, found.base.session / sigma, strict=True)
     verdict = Verdict(
         verdict=kind,
@@ -180,13 +192,11 @@ def find_missing_effects(
         tried=tuple(make_named_effect(c, 0.0, compute_curvature_interval(c)) for c in tried[:6]),
         error=error,
         manoeuvre_error=manoeuvres,
-        correlation=correlate_residual_with_pressure(start.evidence.held_out, *grown, rules.longest_lag),
+        correlation=correlate_residual_with_pressure(
+            start.evidence.held_out, *found.base.compose(), rules.longest_lag
+        ),
         session_pulls={name: (float(a), float(b)) for name, a, b in pulls},
-        noise={
-            name: (float(r), float(s))
-            for name, r, s in zip(CHANNELS, lead.rho, lead.sigma, strict=True)
-            if np.isfinite(s)
-        },
+        noise={name: (float(r), float(s)) for name, r, s in sensors if np.isfinite(s)},
         disturbance=start.evidence.disturbance,
         detectable=find_detectable_sizes(start.evidence, start.base),
         campaign=campaign.name,

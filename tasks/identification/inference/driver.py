@@ -29,7 +29,7 @@ def find_brake_onset(model: RunModel, share: float) -> int:
     model : the run
     share : of the run's largest pressure from which he brakes [1]
     """
-    pressure = model.run.pressure[: model.samples]
+    pressure = model.pressure
     pressed = np.flatnonzero(pressure > share * pressure.max())
     return int(pressed[0]) if pressed.size else model.samples
 

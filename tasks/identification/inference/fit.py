@@ -15,6 +15,7 @@ from tasks.identification.inference.linearisation_points import (
     linearise_runs,
     move_linearisation_points,
 )
+from tasks.vehicle.effects.slots import Slot
 
 HELD = 1e18
 """Prior precision that holds a nuisance at 0."""
@@ -58,6 +59,10 @@ class Fit:
     session_error: NDArray[np.float64]
     residuals: tuple[NDArray[np.float64], ...]
     offsets: tuple[NDArray[np.float64], ...]
+
+    def compose(self) -> tuple[NDArray[np.float64], tuple[Slot, ...]]:
+        """Return the full vector theta and the slots of all parts, with the session's nuisances added."""
+        return compose_parameters(self.parts, self.values, self.session)
 
     @property
     def pulls(self) -> NDArray[np.float64]:

@@ -68,6 +68,11 @@ class RunModel:
         """Return where the used channels have samples, bool [samples, 7]; None where all have one at every instant."""
         return None if self.run.sampled is None else self.run.sampled[: self.samples]
 
+    @property
+    def pressure(self) -> NDArray[np.float64]:
+        """Return the brake pressure at the instants that are used, float64 [samples] [MPa]."""
+        return self.run.pressure[: self.samples]
+
     def find_samples(self, channel: int) -> NDArray[np.int64]:
         """Return the used instants at which a channel has a sample, int64 [M].
 

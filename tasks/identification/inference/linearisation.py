@@ -130,7 +130,7 @@ def differentiate_at(evidence: Evidence, at: Fit, *, library: bool) -> Evidence:
     at : fit, the new linearisation point
     library : take the library's derivatives anew too; else the old ones are kept
     """
-    theta, slots = compose_parameters(at.parts, at.values, at.session)
+    theta, slots = at.compose()
 
     def differentiate_again(run: RunEvidence, effects: tuple[Effect, ...]) -> RunEvidence:
         fresh = differentiate_run(
@@ -193,7 +193,7 @@ def differentiate_about_fit(evidence: Evidence, at: Fit) -> Evidence:
     evidence : the runs; the derivatives by the library and those of the held-out runs are kept
     at : fit, the new linearisation point
     """
-    theta, slots = compose_parameters(at.parts, at.values, at.session)
+    theta, slots = at.compose()
     here = evidence.tolerances, evidence.disturbance
     return replace(
         evidence,
@@ -230,7 +230,7 @@ def compute_whitened_residuals(evidence: Evidence, at: Fit) -> list[NDArray[np.f
     evidence : the runs
     at : fit
     """
-    theta, slots = compose_parameters(at.parts, at.values, at.session)
+    theta, slots = at.compose()
     return [run.compute_residual(theta, slots) for run in evidence.train]
 
 

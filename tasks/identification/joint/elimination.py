@@ -247,6 +247,8 @@ def foresee_falls(
 ) -> NDArray[np.float64]:
     """Return by how much the cost of a fit would fall with each other number free beside it, linearly, float64 [O].
 
+    A number moves no further than its bounds.
+
     Parameters
     ----------
     stops : its runs
@@ -270,8 +272,8 @@ def foresee_falls(
     for i, other in enumerate(others):
         free = [*range(len(fitted.numbers)), len(fitted.numbers) + i]
         variance = np.linalg.inv(information[np.ix_(free, free)])[-1, -1]
-        if -variance * gradient[free[-1]] > other.lower:
-            falls[i] = 0.5 * variance * gradient[free[-1]] ** 2
+        move = np.clip(-variance * gradient[free[-1]], other.lower, other.upper)
+        falls[i] = -move * (gradient[free[-1]] + 0.5 * move / variance)
     return falls
 
 

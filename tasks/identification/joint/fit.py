@@ -113,7 +113,7 @@ def suggest_starts(stops: Sequence[Stop]) -> list[dict[str, float]]:
         if stop.onset + 5 >= stop.model.samples:
             continue
         speed = stop.model.measured[stop.onset :, CHANNELS.index("speed")]
-        pressure = stop.model.run.pressure[stop.onset : stop.model.samples]
+        pressure = stop.model.pressure[stop.onset :]
         impulse = float(pressure.sum()) * stop.model.run.interval
         slopes.append(float(speed[0] - speed[-1]) / max(impulse, 1e-9))
     if not slopes:

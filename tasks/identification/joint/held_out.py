@@ -42,7 +42,7 @@ def drop_what_predicts_worse(
             trials.append((gone, number, without))
     if not trials:
         return fitted
-    gone, number, without = min(trials, key=lambda trial: trial[0][0] + trial[0][1])
+    gone, number, without = min(trials, key=lambda trial: trial[0][0] / there[0] + trial[0][1] / there[1])
     reasons.append(
         f"the training runs suggest that {number.say(fitted.by_name[number.name])}, but the held-out runs are predicted"
         f" as well or better without that (speed {gone[0]:.3g} against {there[0]:.3g} m/s, all channels {gone[1]:.3g}"
@@ -147,8 +147,7 @@ def summarise_held_out(
     channels = summarise_errors(square, names, units, rules.error_resamples)
     braked, distances = [], []
     for stop, y in zip(held_out, predicted, strict=True):
-        pressure = stop.model.run.pressure[: stop.model.samples]
-        figures = manoeuvre_errors(stop.model.measured, y, pressure, stop.model.run.interval)
+        figures = manoeuvre_errors(stop.model.measured, y, stop.model.pressure, stop.model.run.interval)
         if figures is not None:
             braked.append(stop.model.run.name)
             distances.append(figures[:, :1] ** 2)

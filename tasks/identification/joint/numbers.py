@@ -111,7 +111,7 @@ def choose_numbers(
         ):
             continue
         if number.of_pressure:
-            largest = max(float(model.run.pressure.max()) for model in models)
+            largest = max(float(model.pressure.max()) for model in models)
             number = replace(
                 number, sigma=number.sigma * max(largest, rules.least_pressure_range), of_pressure=False
             )
@@ -158,9 +158,9 @@ def coasts_down(model: RunModel, rules: JointRules) -> bool:
     rules : of the joint fit
     """
     run, speed = model.run, model.measured[:, CHANNELS.index("speed")]
-    driven = run.throttle is not None and bool(np.max(run.throttle) > rules.closed_throttle)
+    driven = run.throttle is not None and bool(np.max(run.throttle[: model.samples]) > rules.closed_throttle)
     lost = float(speed[0] - speed[-1]) > rules.coasted_share * float(speed[0])
-    return not run.pressure.any() and not driven and lost
+    return not model.pressure.any() and not driven and lost
 
 
 def shows_brake_curve(model: RunModel, rules: JointRules) -> bool:

@@ -12,7 +12,6 @@ from tasks.identification.decision.missed import compare_with_noise
 from tasks.identification.decision.verdict import Trace, find_missing_effects
 from tasks.identification.inference.driver import begin_at_brake, measure_drive
 from tasks.identification.inference.forward import prepare_run
-from tasks.identification.inference.hypothesis import compose_parameters
 from tasks.identification.joint.calibration import calibrate_gain
 from tasks.identification.joint.numbers import JointNumber
 from tasks.identification.rules import DecisionRules, JointRules
@@ -57,7 +56,7 @@ def find_single_effects(
 
     def measure_drive_beside(trace: Trace) -> float:
         found = trace.end.base
-        return measure_drive(train, *compose_parameters(found.parts, found.values, found.session), share)
+        return measure_drive(train, *found.compose(), share)
 
     drive = measure_drive(train, np.zeros(len(EFFECT_TABLE)), (), share)
     whole, foreign = None, ForeignCarError()

@@ -1,16 +1,19 @@
 """Two searches for what a model lacks: which of them judges a campaign, and where both do, the better prediction."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from math import inf
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tasks.campaign.campaign import Campaign
 from tasks.identification.decision.disputes import ForeignCarError
 from tasks.identification.decision.missed import compare_with_noise, tell_miss
 from tasks.identification.decision.verdict import Trace
 from tasks.identification.decision.words import join_phrases
-from tasks.identification.inference.driver import LIFT, SPEED
+from tasks.identification.inference.driver import LIFT, SPEED, find_brake_onset
+from tasks.identification.inference.forward import RunModel
 from tasks.identification.joint.calibration import needs_joint_fit
 from tasks.identification.joint.numbers import JointNumber
 from tasks.identification.joint.second_look import find_effects_in_two_looks
@@ -62,7 +65,11 @@ def judge_by_two_searches(
     if compare_with_noise(campaign, left) <= followed:
         return single
     fitted = fit_all(names_numbers=False)
-    before, now = left["speed"].after, measure_error_from_brake(fitted)
+    share, judged = joint.brake_onset_share, single.start.evidence.held_out
+    before = measure_error_from_brake([run.model for run in judged], single.predict(judged), share)
+    now = measure_error_from_brake(
+        [stop.model for stop in fitted.held_out], [y[-1] for y in fitted.predicted], share
+    )
     if now >= joint.better_prediction_share * before:
         reason = (
             f"a joint fit of all numbers leaves an error of {now:.3g} m/s in the speed of these stops, and counts only"
@@ -72,27 +79,31 @@ def judge_by_two_searches(
     found_by_one = join_phrases(names or ["nothing"])
     reason = (
         f"a search of single effects names {found_by_one} and leaves an error of {before:.3g} m/s in the speed of"
-        f" held-out stops, and a joint fit of all numbers one of {now:.3g} m/s from the brake on"
+        f" held-out stops, and a joint fit of all numbers one of {now:.3g} m/s, from the brake on"
     )
     return replace(fitted, verdict=replace(fitted.verdict, reasons=(reason, *fitted.verdict.reasons)))
 
 
-def measure_error_from_brake(trace: JointTrace) -> float:
-    """Return the error of the speed of held-out runs from the brake on; infinite without a sample there [m/s].
+def measure_error_from_brake(
+    models: Sequence[RunModel], readings: Sequence[NDArray[np.float64]], share: float
+) -> float:
+    """Return the error of the speed of runs from the brake on; infinite without a sample there [m/s].
 
     A joint fit fits the beginning of each run, and a single search may judge a stop from its brake on alone: what both
     predict is the stop.
 
     Parameters
     ----------
-    trace : of a joint fit
+    models : the runs
+    readings : predicted, float64 [N, 7] each
+    share : of a run's largest pressure from which its driver brakes [1]
     """
     square = []
-    for stop, predicted in zip(trace.held_out, trace.predicted, strict=True):
-        model, brakes = stop.model, stop.onset < stop.model.samples
-        begin = max(stop.onset - round(0.5 * LIFT / model.run.interval), 0) if brakes else 0
+    for model, predicted in zip(models, readings, strict=True):
+        onset = find_brake_onset(model, share)
+        begin = max(onset - round(0.5 * LIFT / model.run.interval), 0) if onset < model.samples else 0
         rows = model.find_samples(SPEED)
         rows = rows[rows >= begin]
         if rows.size:
-            square.append(float(np.mean((model.measured[rows, SPEED] - predicted[-1, rows, SPEED]) ** 2)))
+            square.append(float(np.mean((model.measured[rows, SPEED] - predicted[rows, SPEED]) ** 2)))
     return float(np.sqrt(np.mean(square))) if square else inf

@@ -41,7 +41,7 @@ def tell_what_was_used(
     inputs += ["throttle"] if any(run.throttle is not None for run in runs) else []
     inputs += ["road slope"] if any(run.road_slope is not None for run in runs) else []
     speeds = np.concatenate([stop.model.measured[:, 0] for stop in train])
-    pressure = max(float(stop.model.run.pressure.max()) for stop in train)
+    pressure = max(float(stop.model.pressure.max()) for stop in train)
     seen = [CHANNELS[c].replace("_", " ") for c in train[0].channels]
     if any(run.speed_of_wheels for run in runs):
         seen[0] = "speed of the wheels"

@@ -39,7 +39,9 @@ def test_what_judges_a_fit_shares_no_sample_with_what_is_fitted(
     ]
     out, channel_map = tmp_path / "campaign", write_map(tmp_path, runs=runs)
     if not shared:
-        assert len(import_measurements(str(tmp_path), map=channel_map, out=str(out))["runs"]) == 2
+        first, second = import_measurements(str(tmp_path), map=channel_map, out=str(out))["runs"]
+        if train and first["file"] == second["file"]:  # windows that touch
+            assert first["start_s"] + first["duration_s"] < second["start_s"]
         return
     with pytest.raises(InputError, match="run b is held out and must share no sample with a training run"):
         import_measurements(str(tmp_path), map=channel_map, out=str(out))

@@ -43,7 +43,7 @@ def test_one_run_per_brake_application_every_third_held_out(tmp_path: Path) -> N
     assert heat == pytest.approx(lost, rel=0.05)
 
 
-def test_no_heat_is_estimated_where_a_disc_temperature_is_declared(tmp_path: Path) -> None:
+def test_no_heat_is_estimated_for_a_run_whose_disc_temperature_is_declared(tmp_path: Path) -> None:
     columns = braking_columns(14.0)
     columns["speed"] = 20.0 - np.cumsum(columns["brake_pressure"]) / 100
     for name in ("wheel_speed_front", "wheel_speed_rear"):
@@ -53,16 +53,19 @@ def test_no_heat_is_estimated_where_a_disc_temperature_is_declared(tmp_path: Pat
     for name, conditions in (
         ("unknown", {}), ("cold", {"disc_temperature_above_ambient_c": 0.0}),
         ("hot", {"disc_temperature_above_ambient_c": 270.0}),
+        ("first", {"disc_temperature_above_ambient_c": 90.0}),
     ):  # fmt: skip
         runs = [
             {"name": f"r{i}", "from_s": float(i), "to_s": i + 3.0, "file": "log.csv", "part": part,
-             "conditions": conditions}
+             "conditions": conditions if name != "first" or i == 0 else {}}
             for i, part in ((0, "train"), (9, "held_out"))
         ]  # fmt: skip
         out = tmp_path / name
         import_measurements(str(tmp_path / "log.csv"), map=write_map(tmp_path, runs=runs), out=str(out))
         found.append([(run.disc_rise, run.braking_heat > 0.0) for run in read_campaign(out).runs])
-    assert found == [[(0.0, False), (0.0, True)], [(0.0, False)] * 2, [(270.0, False)] * 2]
+    assert found == [
+        [(0.0, False), (0.0, True)], [(0.0, False)] * 2, [(270.0, False)] * 2, [(90.0, False), (0.0, True)],
+    ]  # fmt: skip
 
 
 def test_a_segment_that_is_no_run_is_listed_and_the_others_come_in(tmp_path: Path) -> None:

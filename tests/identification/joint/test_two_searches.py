@@ -1,6 +1,7 @@
 """Which search judges a campaign: by what is known of the car, whether its runs agree, and what predicts better."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -40,8 +41,23 @@ def off_by(error: float, verdict: Verdict, before: float = 0.0) -> JointTrace:
     return replace(told, verdict=verdict, predicted=tuple(predicted))
 
 
+@dataclass(frozen=True, kw_only=True)
+class SingleTrace(Trace):
+    """A verdict on single effects whose speed is off by an error [m/s]."""
+
+    off: float
+
+    def predict(self, runs):
+        return [run.model.measured + self.off for run in runs]
+
+
 def judge_answers(
-    monkeypatch, single: Verdict | Exception, joint: Verdict, *, says_little: bool = False
+    monkeypatch,
+    single: Verdict | Exception,
+    joint: Verdict,
+    *,
+    says_little: bool = False,
+    stops_off: float | None = None,
 ) -> tuple[Trace | JointTrace, list[tuple[str, bool]]]:
     """The verdict where both searches answer so; why joint fits were asked for, and if numbers alone may be named."""
     asked: list[tuple[str, bool]] = []
@@ -49,7 +65,10 @@ def judge_answers(
     def find_one(*_: object) -> Trace:
         if isinstance(single, Exception):
             raise single
-        return Trace(verdict=single, start=None, end=None, compared=())
+        judged = [SimpleNamespace(model=stop.model) for stop in slow_brakes().held_out]
+        start = SimpleNamespace(evidence=SimpleNamespace(held_out=judged))
+        off = single.error["speed"].after if stops_off is None else stops_off
+        return SingleTrace(verdict=single, start=start, end=start, compared=(), off=off)
 
     def fit_all(*_: object, disagreement: str, names_numbers: bool) -> JointTrace:
         asked.append((disagreement, names_numbers))
@@ -102,17 +121,26 @@ def test_where_nothing_is_named_and_stops_are_missed_the_better_prediction_count
         assert f"leaves an error of {share * missed:.3g} m/s" in trace.verdict.reasons[-1]
 
 
-def test_what_a_joint_fit_predicts_is_compared_from_the_brake_on():
-    """It fits what precedes the brake; a stop that is judged from its brake on has nothing before it."""
-    verdict = slow_brakes().verdict
+def test_a_quiet_second_before_the_brake_makes_no_prediction_better(monkeypatch):
+    """A joint fit fits what precedes the brake, so that a single search would have a smaller error by that alone."""
+    missed = 2.0 * LIMIT * NOISE
+    trace, _ = judge_answers(
+        monkeypatch, make_verdict(0.7 * missed), make_verdict(0.72 * missed, names=True), stops_off=missed
+    )
+    assert (
+        isinstance(trace, JointTrace) and f"leaves an error of {missed:.3g} m/s" in trace.verdict.reasons[0]
+    )
+
+
+def test_errors_are_measured_from_the_brake_on_and_where_the_speed_was_sampled():
+    models, share = [stop.model for stop in slow_brakes().held_out], RULES.joint.brake_onset_share
     for before in (0.0, 5.0):
-        assert measure_error_from_brake(off_by(0.2, verdict, before)) == pytest.approx(0.2)
-    assert measure_error_from_brake(slow_brakes()) < 0.2
+        readings = [y[-1] for y in off_by(0.2, slow_brakes().verdict, before).predicted]
+        assert measure_error_from_brake(models, readings, share) == pytest.approx(0.2)
     (stop,) = slow_brakes().held_out
     sampled = np.arange(stop.model.samples)[:, np.newaxis] < np.full(7, stop.onset - 20)
-    run = replace(stop.model.run, sampled=sampled)
-    silent = replace(stop, model=replace(stop.model, run=run))
-    assert measure_error_from_brake(replace(slow_brakes(), held_out=(silent,))) == np.inf
+    silent = replace(stop.model, run=replace(stop.model.run, sampled=sampled))
+    assert measure_error_from_brake([silent], readings, share) == np.inf
 
 
 def test_a_miss_is_told_beside_a_name_too(monkeypatch):
