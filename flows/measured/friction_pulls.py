@@ -5,9 +5,8 @@ from typing import Any
 
 from tasks.identification.decision.verdict import Trace
 from tasks.identification.decision.words import join_phrases
+from tasks.identification.inference.disturbance import FRICTION
 
-FRICTION_OFFSET = 1
-"""Place of friction among a run's own offsets (`tasks.identification.inference.evidence.move_by_offsets`)."""
 TOLD_PULL = 2.5
 """Pull of a run's friction from which it is told, in tolerances: one such run in 80 has it by chance [1]."""
 
@@ -23,7 +22,7 @@ def compute_friction_pulls(trace: Trace) -> dict[str, float]:
     """
     runs, tolerance = trace.end.evidence.train, trace.end.evidence.tolerances.friction
     return {
-        run.model.run.name: float(offsets[FRICTION_OFFSET] / tolerance)
+        run.model.run.name: float(offsets[FRICTION] / tolerance)
         for run, offsets in zip(runs, trace.end.base.offsets, strict=True)
     }
 

@@ -11,6 +11,7 @@ from flows.measured.residuals import MODELS, RunPrediction
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
 from tasks.identification.decision.forms import ResidualSpline, fit_residual_splines
 from tasks.identification.decision.verdict import Trace
+from tasks.identification.inference.quantiles import NORMAL_QUANTILE
 from tasks.identification.joint.fit import JointFit
 from tasks.identification.joint.numbers import SMOOTHED
 from tasks.identification.joint.words import find_separating_run
@@ -120,7 +121,7 @@ def make_spline_figures(trace: Trace) -> dict[str, Any]:
 
 
 def _make_band(spline: ResidualSpline) -> dict[str, list[float | None]]:
-    reach = 1.96 * np.sqrt(np.maximum(np.diag(spline.covariance), 0.0))
+    reach = NORMAL_QUANTILE * np.sqrt(np.maximum(np.diag(spline.covariance), 0.0))
     return {
         "values": _plain(spline.values),
         "low": _plain(spline.values - reach),

@@ -1,5 +1,8 @@
 """The generator of known truths, and the interval that its counts are given with."""
 
+import subprocess
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,6 +15,7 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from flows.measured import closing_benchmark
 from flows.measured.closing_benchmark_summary import pair_outcome, summarise_benchmark
+from manifests.provenance import source_hashes
 from tasks.campaign.planned_runs import TRAINING
 from tasks.identification.benchmark import (
     classify_outcome,
@@ -20,6 +24,7 @@ from tasks.identification.benchmark import (
     measure_interval_miss,
 )
 
+ROOT = Path(closing_benchmark.__file__).parents[2]
 VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
 
 
@@ -190,3 +195,29 @@ def test_a_later_first_seed_makes_other_campaigns_of_the_same_truths_and_the_sam
     moved = {p.kind for p, q in zip(first, later, strict=True) if p.seed != q.seed}
     assert moved == {"library", "outside", "size"}
     assert {q.seed - p.seed for p, q in zip(first, later, strict=True) if p.kind in moved} == {5}
+
+
+NO_JUDGE = (
+    "catalogs/__init__", "catalogs/citations", "catalogs/documents", "catalogs/entries", "catalogs/names",
+    "catalogs/physical_limits", "catalogs/quantities", "catalogs/sentences", "catalogs/studies/__init__",
+    "catalogs/variants", "catalogs/vehicles/added", "catalogs/vehicles/frozen", "catalogs/yaml_text", "flows/__init__",
+    "flows/measured/__init__", "manifests/", "tasks/__init__", "tasks/errors", "tasks/kernel_cache",
+)  # fmt: skip
+"""Sources that a verdict imports and that decide nothing in it: reading, checking, naming and writing of files."""
+
+
+def test_every_source_that_a_verdict_imports_counts_in_its_hash_or_is_known_to_decide_nothing() -> None:
+    """Readers of the rules and of the grip in the weather stood in no hash: two engines shared one table."""
+    program = (
+        "import sys, flows.measured.searches, catalogs.vehicles, catalogs.surfaces, catalogs.effects\n"
+        "print(*(module.__file__ for module in list(sys.modules.values()) if getattr(module, '__file__', None)))"
+    )
+    out = subprocess.run(
+        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    own = [file[len(f"{ROOT}/") :] for file in out.stdout.split() if file.startswith(f"{ROOT}/")]
+    own = [file for file in own if "site-packages" not in file]
+    assert len(own) > 100
+    untold = [file for file in own if not file.startswith((*closing_benchmark.JUDGES, *NO_JUDGE))]
+    assert untold == []
+    assert all(any(file.startswith(place) for file in source_hashes()) for place in closing_benchmark.JUDGES)

@@ -7,11 +7,15 @@ import pytest
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
+from tasks.errors import InputError
 from tasks.identification.decision.forms import (
+    RANGE,
     RIDGE,
     differentiate_by_splines,
+    find_scanned_ranges,
     fit_residual_splines,
     make_form_hypotheses,
+    make_form_in_range,
 )
 from tasks.identification.decision.screening import screen_library
 from tasks.identification.inference.campaign_evidence import Evidence
@@ -30,6 +34,7 @@ from tasks.identification.inference.linearisation import (
     differentiate_about_fit,
     fit_disturbance,
 )
+from tasks.vehicle.effects.forms import SHAPES, Form, count_coefficients, name_form
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.slots import Slot
 from tasks.vehicle.effects.table import EFFECT_TABLE, build_parameter_vector
@@ -212,3 +217,56 @@ def test_what_a_stop_at_the_limit_of_friction_tells_of_the_brake_does_not_hang_o
         widths.append(np.sqrt(fitted.covariance[0, 0]))
         assert abs(fitted.values[0] - 0.04) < 3.0 * widths[-1]
     assert widths[0] == pytest.approx(widths[1], rel=0.05)
+
+
+def test_a_form_over_pressure_is_found_as_far_as_weak_brakes_are_pressed() -> None:
+    """Brakes with 0.3 of the gain need 8 MPa for what 2.4 does, and a form is constant beyond its range."""
+    weak = replace(VEHICLE, brake_gain=0.3 * VEHICLE.brake_gain)
+    bump = Form(
+        port="brake_torque", variable="pressure", shape="a exp(-(4x - 3)^2)", coefficients=(0.25,), scale=8.0,
+        low=0.0, high=8.0,
+    )  # fmt: skip
+    models = []
+    for i, (speed, peak) in enumerate(((30.0, 8.0), (20.0, 3.0), (26.0, 7.0), (15.0, 5.5))):
+        model = prepare_run(plain_run(speed, peak), weak, SURFACE)
+        clean = predict_channels(model, PLAIN, slots=(bump.slot,), refinement=4)
+        noise = NOISE * np.random.default_rng(i).standard_normal(clean.shape)
+        models.append(prepare_run(replace(model.run, response=clean + noise), weak, SURFACE))
+    evidence = evidence_of(models, (LIBRARY["brake_fade"],))
+    assert find_scanned_ranges(evidence.train) == RANGE | {
+        "pressure": (0.0, 8.0),
+        "pressure_rate": (-26.7, 26.7),
+    }
+    best = fit_residual_splines(evidence, fit_hypotheses(evidence.train, (), evidence.session_sigma))[0]
+    assert (best.port, best.variable, best.grid[-1]) == ("brake_torque", "pressure", 8.0)
+    assert make_form_hypotheses(best, evidence.samples)[0].name == bump.name
+
+
+def test_the_noise_of_a_pressure_at_the_end_of_its_range_makes_no_other_scale() -> None:
+    runs = evidence_of([measured(plain_run(30.0, 3.6), PLAIN, 0)], ()).train
+    noisy = [
+        replace(
+            run, model=replace(run.model, run=replace(run.model.run, pressure=1.04 * run.model.run.pressure))
+        )
+        for run in runs
+    ]
+    assert find_scanned_ranges(noisy) == RANGE
+
+
+def test_a_form_is_made_again_from_its_name() -> None:
+    for shape in SHAPES:
+        for port, variable, scale in (
+            ("brake_torque", "pressure", 8.1),
+            ("pitch_moment", "pressure_rate", 27.0),
+        ):
+            name = name_form(port, variable, shape, scale)
+            form = make_form_in_range(name, (0.1,) * count_coefficients(shape), -40.0, 40.0)
+            assert (form.port, form.variable, form.shape, form.scale) == (port, variable, shape, scale)
+            assert (form.low, form.high) == (0.0 if variable == "pressure" else -27.0, scale)
+    for wrong in (
+        "brake_torque ~ a x, x = pressure/8.1 m",
+        "brakes ~ a x, x = pressure/8.1 MPa",
+        "brake_lag",
+    ):
+        with pytest.raises(InputError, match="no port, variable and shape of the grammar"):
+            make_form_in_range(wrong, (0.1,), 0.0, 1.0)

@@ -12,7 +12,6 @@ from tasks.identification.decision.attribution import Candidate, judge_hypothesi
 from tasks.identification.decision.intervals import (
     compute_curvature_interval,
     compute_profile_interval,
-    compute_student_quantile,
     refit_named,
 )
 from tasks.identification.inference.campaign_evidence import Evidence
@@ -22,6 +21,7 @@ from tasks.identification.inference.fit import compute_misfit_by_run, fit_hypoth
 from tasks.identification.inference.forward import predict_channels, prepare_run
 from tasks.identification.inference.hypothesis import make_library_hypothesis
 from tasks.identification.inference.linearisation import prepare_evidence
+from tasks.identification.inference.quantiles import compute_student_quantile
 from tasks.vehicle.effects.table import EFFECT_TABLE, build_parameter_vector
 from tests.identification.synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, plain_run
 
@@ -74,7 +74,9 @@ def test_an_effect_whose_score_excludes_zero_has_an_interval_that_does(
 ) -> None:
     evidence, candidate, none = valley
     root = np.sqrt(none - candidate.fitted.objective)
-    wanted = compute_student_quantile(candidate) * candidate.rules.interval_widening * candidate.inflation
+    wanted = (
+        compute_student_quantile(candidate.informed) * candidate.rules.interval_widening * candidate.inflation
+    )
     assert candidate.passes and root > wanted
     low, high = compute_profile_interval(candidate, evidence)
     assert low[0] > 0.0
@@ -102,7 +104,9 @@ def test_at_an_end_of_the_interval_the_best_fit_is_worse_by_the_quantile(
                     fit_hypotheses(evidence.train, (held,), evidence.session_sigma, iterations=1).objective
                 )
             root = np.sqrt(min(rises) - best)
-            wanted = compute_student_quantile(candidate) * candidate.rules.interval_widening * inflation
+            wanted = (
+                compute_student_quantile(candidate.informed) * candidate.rules.interval_widening * inflation
+            )
             assert root == pytest.approx(wanted, rel=0.15), (j, ends[j])
 
 

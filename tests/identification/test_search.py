@@ -214,8 +214,13 @@ def test_what_could_be_seen_is_what_the_score_asks_for_and_nothing_beyond_the_bo
     assert 0.0 < sizes["rolling_resistance"] < 0.05
     rolling = LIBRARY["rolling_resistance"]
     found = fit_hypotheses(evidence.train, (make_library_hypothesis(rolling),), evidence.session_sigma)
-    one = 2.0 * (25.0 + np.log(evidence.samples)) * compute_inflation(evidence, null, None)
-    assert sizes["rolling_resistance"] == pytest.approx(np.sqrt(one * found.covariance[0, 0]), rel=0.3)
+    inflation, tried = compute_inflation(evidence, null, None), {}
+    for score in (evidence.rules.accept_score, 45.0):
+        asked = replace(evidence, rules=replace(evidence.rules, accept_score=score))
+        tried[score] = find_detectable_sizes(asked, null)["rolling_resistance"]
+        needed = 2.0 * (score + np.log(evidence.samples)) * inflation
+        assert tried[score] == pytest.approx(np.sqrt(needed * found.covariance[0, 0]), rel=0.05)
+    assert tried[evidence.rules.accept_score] == sizes["rolling_resistance"]
     (first,) = rolling.parameters
     tight = replace(rolling, parameters=(replace(first, bounds=(0.0, 0.9 * sizes["rolling_resistance"])),))
     bounded = replace(evidence, effects=(tight, *evidence.effects[1:]))

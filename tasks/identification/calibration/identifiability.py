@@ -12,7 +12,12 @@ from tasks.identification.calibration.jacobian import (
     compute_stage_jacobian,
 )
 from tasks.identification.calibration.procedure import Procedure, Stage
-from tasks.identification.calibration.residual import CalibrationCase, compute_residuals, simulate_case
+from tasks.identification.calibration.residual import (
+    EVERY_RESPONSE,
+    CalibrationCase,
+    compute_residuals,
+    simulate_case,
+)
 from tasks.identification.calibration.scalars import (
     CalibrationScalar,
     list_calibration_scalars,
@@ -231,8 +236,8 @@ def _compute_joint_rows(
 ) -> list[Floats]:
     """Return the derivatives of every response in every case by scalars, one array of shape (m, n) [1 / unit]."""
     everything = Stage(
-        name="all", groups=procedure.groups, responses=("speed", "pitch", "slip", "wheel_load", "stop"),
-        kinds=("flat", "hump", "depression"), phase="event",
+        name="all", groups=procedure.groups, responses=EVERY_RESPONSE, kinds=("flat", "hump", "depression"),
+        phase="event",
     )  # fmt: skip
     x = np.array([read_scalar(vehicle, s) for s in scalars])
     coasting = replace(everything, responses=("speed_drop",), phase="start")

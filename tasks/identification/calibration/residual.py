@@ -14,6 +14,8 @@ from tasks.vehicle.rollout import Controls, Mode, Rollout, simulate_scenario
 
 Floats = NDArray[np.float64]
 Response = Literal["speed", "speed_drop", "pitch", "slip", "wheel_load", "stop"]
+EVERY_RESPONSE: tuple[Response, ...] = ("speed", "pitch", "slip", "wheel_load", "stop")
+"""Responses that are examined jointly after each stage (paper, Appendix C.1, e_cal)."""
 Phase = Literal["start", "braking", "tail", "event"]
 WHEELS = {"fl": "f", "fr": "f", "rl": "r", "rr": "r"}
 

@@ -13,14 +13,12 @@ from tasks.identification.calibration.jacobian import (
     compute_stage_jacobian,
 )
 from tasks.identification.calibration.procedure import Procedure, Stage
-from tasks.identification.calibration.residual import CalibrationCase, Response
+from tasks.identification.calibration.residual import EVERY_RESPONSE, CalibrationCase
 from tasks.identification.calibration.scalars import list_calibration_scalars, read_scalar, set_scalars
 from tasks.vehicle.effects.table import EFFECT_UNITS
 from tasks.vehicle.parameters import Vehicle
 
 Floats = NDArray[np.float64]
-EVERY_RESPONSE: tuple[Response, ...] = ("speed", "pitch", "slip", "wheel_load", "stop")
-"""Responses that are examined jointly after each stage (paper, Appendix C.1, e_cal)."""
 STEP_SHARES = (1.0, 0.5, 0.25, 0.125)
 """Shares of a stage's step that are tried until all cases together are no worse [1]."""
 

@@ -91,16 +91,19 @@ def judge_hypothesis(
     foreseen : gain by the linear screen; a first fit that reaches it needs no other start [1]
     """
     rules = evidence.rules
-    first = np.arange(len(hypothesis.names)) == 0
-    if hypothesis.names[0] in SESSION:
+    of_session = hypothesis.names[0] in SESSION
+    if of_session:
         # the session already carries the same number under a prior: hand it over to the free parameter
         hypothesis = replace(hypothesis, start=base.session[[SESSION.index(hypothesis.names[0])]])
     # Two starts: the accepted fit, which the hypothesis extends; and the linear estimate with offsets of 0, which
     # have not absorbed the effect yet.
-    free = hypothesis.names[0] in SESSION
-    none = hypothesis.start * (~first if hypothesis.effect_class != "form" and not free else free)
-    starts = [(none, base.offsets, base.session), (hypothesis.start, None, base.session)]
-    if not free and np.max(base.pulls) > rules.retune_pull:
+    absent = hypothesis.start.copy()
+    if hypothesis.effect_class == "form":
+        absent[:] = 0.0
+    elif not of_session:
+        absent[0] = 0.0  # a threshold or a wind is no effect by itself
+    starts = [(absent, base.offsets, base.session), (hypothesis.start, None, base.session)]
+    if not of_session and np.max(base.pulls) > rules.retune_pull:
         # a session that bends to make up for what is missing holds the fit in a valley of its own
         starts.insert(0, (hypothesis.start, None, np.zeros_like(base.session)))
     trials: list[Fit] = []

@@ -7,11 +7,9 @@ import numpy as np
 from tasks.campaign.campaign import SESSION, Tolerances
 from tasks.identification.decision.answer import NamedEffect, Parameter, is_within_tolerance, make_estimate
 from tasks.identification.inference.fit import Fit
+from tasks.identification.inference.quantiles import NORMAL_QUANTILE
 from tasks.identification.rules import DecisionRules
 from tasks.vehicle.effects.library import Effect
-
-NORMAL_95 = 1.96
-"""Standard deviations on either side of the mean that hold 95 % of a normal distribution [1]."""
 
 
 def tell_calibrated(
@@ -46,7 +44,7 @@ def tell_calibrated(
         value = float(fitted.session[place])
         # what was held may be off by its own tolerance, and the gain makes up for it
         error = float(np.hypot(fitted.session_error[place], (1.0 + value) * held))
-        low, high = value - NORMAL_95 * error, value + NORMAL_95 * error
+        low, high = value - NORMAL_QUANTILE * error, value + NORMAL_QUANTILE * error
         estimate = Parameter(
             name=row.name,
             value=value,

@@ -13,6 +13,7 @@ from tasks.campaign.campaign import CHANNELS
 from tasks.identification.inference.evidence import RunEvidence
 from tasks.identification.inference.forward import predict_channels
 from tasks.identification.inference.noise import whiten_channels
+from tasks.identification.inference.quantiles import NORMAL_QUANTILE
 from tasks.vehicle.effects.slots import Slot
 
 CORRELATED = ("longitudinal_acceleration", "pitch")
@@ -85,7 +86,7 @@ def _correlate_channel(
         lags=interval * np.arange(-most, most + 1, dtype=np.float64),
         frozen=frozen,
         after=after,
-        band=float(1.96 / np.sqrt(max(count, 1))),
+        band=float(NORMAL_QUANTILE / np.sqrt(max(count, 1))),
     )
 
 

@@ -183,7 +183,8 @@ def find_best_form(
     # the linear gain of a spline is a hint: friction that no wheel reaches yet has no derivative
     needed = evidence.rules.accept_score + float(np.log(evidence.samples))
     enough = max(evidence.rules.hopeful_share * needed, least / compute_inflation(evidence, base, None))
-    leftovers = [x for x in fit_residual_splines(evidence, base, splines)[: 1 + gated] if x.gain > enough]
+    most = 2 if gated else 1
+    leftovers = [x for x in fit_residual_splines(evidence, base, splines)[:most] if x.gain > enough]
     if not leftovers:
         return None
     held_out = compute_misfit_by_run(evidence.held_out, base) if gated else None

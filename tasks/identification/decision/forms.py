@@ -1,19 +1,21 @@
 """Forms outside the library: splines of the residual over pairs of port and variable, and simple shapes for them."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.errors import InputError
+from tasks.campaign.campaign import CHANNELS
 from tasks.identification.decision.screening import compute_inflation
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.evidence import RunEvidence
 from tasks.identification.inference.fit import Fit
 from tasks.identification.inference.forward import predict_channels
 from tasks.identification.inference.hypothesis import Hypothesis
-from tasks.identification.inference.noise import unwhiten_channels, whiten_channels
-from tasks.vehicle.effects.forms import SHAPES, Form, name_form
+from tasks.identification.inference.noise import rewhiten_channels, whiten_channels
+from tasks.vehicle.effects.forms import SHAPES, Form, name_form, read_form_name
 from tasks.vehicle.effects.ports import PORT_UNITS
 from tasks.vehicle.effects.slots import Slot
 from tasks.vehicle.effects.table import EFFECT_TABLE
@@ -40,6 +42,11 @@ RANGE = {
     "pressure_rate": (-12.0, 12.0), "load_ratio": (0.4, 1.6), "suspension_travel": (-0.06, 0.06),
     "suspension_speed": (-0.6, 0.6),
 }  # fmt: skip
+"""Range over which a variable is scanned, where no run of a campaign goes further [unit of the variable]."""
+FURTHER = 1.05
+"""Share of a range beyond which a variable goes further, and not only its noise [1]."""
+SHAPES_TRIED = 2
+"""Shapes of the grammar that are fitted through the simulation for a spline [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,6 +77,29 @@ RIDGE = np.repeat([(20.0 * PORT_STEP[port]) ** -2 for port, _ in KEYS], KNOTS)
 """Precision of the broad priors of all knots, in the order of `KEYS`."""
 
 
+def find_scanned_ranges(runs: Sequence[RunEvidence]) -> dict[str, tuple[float, float]]:
+    """Return the range of every variable: `RANGE`, or as far as runs at a higher speed or brake pressure go.
+
+    Brakes with a smaller gain need more pressure for the same stop, and change it faster.
+
+    Parameters
+    ----------
+    runs : training runs
+    """
+    ranges: dict[str, tuple[float, float]] = dict(RANGE)
+    reached = {
+        "speed": max(float(run.model.measured[:, CHANNELS.index("speed")].max()) for run in runs),
+        "pressure": max(float(run.model.pressure.max()) for run in runs),
+    }
+    for variable, value in reached.items():
+        low, high = RANGE[variable]
+        if value > FURTHER * high:
+            ranges[variable] = (low, ceil(10.0 * value) / 10.0)
+    fastest = round(RANGE["pressure_rate"][1] * ranges["pressure"][1] / RANGE["pressure"][1], 1)
+    ranges["pressure_rate"] = (-fastest, fastest)
+    return ranges
+
+
 def fit_residual_splines(
     evidence: Evidence, at: Fit, splines: tuple[NDArray[np.float64], ...] | None = None
 ) -> list[ResidualSpline]:
@@ -97,7 +127,7 @@ def fit_residual_splines(
     gram -= cross @ inverse @ cross.T
     right = right - cross @ inverse @ pull
     level = compute_inflation(evidence, at, None)
-    found = []
+    ranges, found = find_scanned_ranges(evidence.train), []
     for i, (port, variable) in enumerate(KEYS):
         block = slice(KNOTS * i, KNOTS * (i + 1))
         covariance = np.asarray(np.linalg.inv(gram[block, block] + np.diag(RIDGE[block])), dtype=np.float64)
@@ -107,7 +137,7 @@ def fit_residual_splines(
             ResidualSpline(
                 port=port,
                 variable=variable,
-                grid=np.linspace(*RANGE[variable], KNOTS),
+                grid=np.linspace(*ranges[variable], KNOTS),
                 values=values,
                 covariance=level * covariance,
                 gain=gain,
@@ -126,7 +156,8 @@ def differentiate_by_splines(evidence: Evidence, at: Fit) -> tuple[NDArray[np.fl
     at : fit about which the derivatives are taken
     """
     theta, slots = at.compose()
-    return tuple(_differentiate_run(run, theta, slots) for run in evidence.train)
+    ranges = find_scanned_ranges(evidence.train)
+    return tuple(_differentiate_run(run, theta, slots, ranges) for run in evidence.train)
 
 
 def rewhiten_splines(
@@ -140,24 +171,22 @@ def rewhiten_splines(
     before, after : the runs under either noise
     """
     return tuple(
-        whiten_channels(
-            unwhiten_channels(columns, old.rho, old.sigma, old.model.sampled),
-            new.rho,
-            new.sigma,
-            new.model.sampled,
-        )
+        rewhiten_channels(columns, (old.rho, old.sigma), (new.rho, new.sigma), new.model.sampled)
         for columns, old, new in zip(splines, before.train, after.train, strict=True)
     )
 
 
 def _differentiate_run(
-    run: RunEvidence, theta: NDArray[np.float64], slots: tuple[Slot, ...]
+    run: RunEvidence,
+    theta: NDArray[np.float64],
+    slots: tuple[Slot, ...],
+    ranges: Mapping[str, tuple[float, float]],
 ) -> NDArray[np.float64]:
     """Return the whitened derivatives of one run by all knots, float64 [M, K]."""
     y = predict_channels(run.model, theta, slots=slots)
     columns = []
     for port, variable in KEYS:
-        low, high = RANGE[variable]
+        low, high = ranges[variable]
         for k in range(KNOTS):
             hat = np.zeros(KNOTS)
             hat[k] = PORT_STEP[port]
@@ -169,14 +198,13 @@ def _differentiate_run(
     return whiten_channels(np.stack(columns, axis=-1), run.rho, run.sigma, run.model.sampled)
 
 
-def make_form_hypotheses(leftover: ResidualSpline, samples: int, count: int = 2) -> list[Hypothesis]:
+def make_form_hypotheses(leftover: ResidualSpline, samples: int) -> list[Hypothesis]:
     """Return the grammar's shapes that fit a spline best, as hypotheses for the simulation.
 
     Parameters
     ----------
     leftover : spline of the residual
     samples : N of the score's penalty
-    count : number of shapes to return
     """
     scale = float(np.max(np.abs(leftover.grid)))
     precision = np.linalg.inv(leftover.covariance)
@@ -190,7 +218,8 @@ def make_form_hypotheses(leftover: ResidualSpline, samples: int, count: int = 2)
         ranked.append((cost, name, np.asarray(coefficients, dtype=np.float64)))
     ranked.sort(key=lambda entry: entry[0])
     return [
-        _make_form_hypothesis(leftover, name, coefficients, scale) for _, name, coefficients in ranked[:count]
+        _make_form_hypothesis(leftover, name, coefficients, scale)
+        for _, name, coefficients in ranked[:SHAPES_TRIED]
     ]
 
 
@@ -217,19 +246,14 @@ def make_form_in_range(name: str, coefficients: tuple[float, ...], low: float, h
     Raises
     ------
     InputError
-        If no hypothesis of the grammar has that name.
+        If no form of the grammar has that name.
     """
-    for port, variables in SCANNED.items():
-        for variable in variables:
-            first, last = RANGE[variable]
-            scale = max(abs(first), abs(last))
-            for shape in SHAPES:
-                if name_form(port, variable, shape, scale) == name:
-                    return Form(
-                        port=port, variable=variable, shape=shape, coefficients=coefficients, scale=scale,
-                        low=max(first, low), high=min(last, high),
-                    )  # fmt: skip
-    raise InputError(f"form {name}: no port, variable and shape of the grammar have that name")
+    port, variable, shape, scale = read_form_name(name)
+    first = RANGE[variable][0] if RANGE[variable][0] >= 0.0 else -scale
+    return Form(
+        port=port, variable=variable, shape=shape, coefficients=coefficients, scale=scale, low=max(first, low),
+        high=min(scale, high),
+    )  # fmt: skip
 
 
 def is_session_number(form: Hypothesis) -> bool:
@@ -261,7 +285,7 @@ def _make_form_hypothesis(
 ) -> Hypothesis:
     """Return one shape of the grammar as a hypothesis with broad bounds."""
     port, variable = leftover.port, leftover.variable
-    low, high = RANGE[variable]
+    low, high = float(leftover.grid[0]), float(leftover.grid[-1])
 
     def build_slots(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[Slot, ...]]:
         form = Form(

@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from tasks.campaign.campaign import SESSION
 from tasks.identification.decision.attribution import Candidate
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.fit import Fit, fit_hypotheses
 from tasks.identification.inference.linearisation import differentiate_about_fit
+from tasks.identification.inference.quantiles import compute_student_quantile
 
 Bounds = tuple[NDArray[np.float64], NDArray[np.float64]]
 
@@ -55,16 +55,6 @@ def refit_named(
     return here, settled, refitted
 
 
-def compute_student_quantile(candidate: Candidate) -> float:
-    """Return Student's t at 97.5 % with the runs that inform the parameter, less one, as degrees of freedom [1].
-
-    Parameters
-    ----------
-    candidate : refined and judged candidate
-    """
-    return float(stdtrit(max(candidate.informed - 1, 1), 0.975))
-
-
 def compute_widening(candidate: Candidate) -> float:
     """Return the factor on standard errors for what the likelihood does not hold [1].
 
@@ -96,7 +86,7 @@ def compute_curvature_interval(candidate: Candidate) -> Bounds:
     variance = np.maximum(np.diag(candidate.fitted.covariance)[-k:], 0.0) * compute_widening(candidate) ** 2
     # the session's tolerance of the same number adds to the uncertainty of the vehicle's
     tolerance = [candidate.fitted.session_sigma[SESSION.index(n)] if n in SESSION else 0.0 for n in h.names]
-    reach = np.sqrt(variance + np.square(tolerance)) * compute_student_quantile(candidate)
+    reach = np.sqrt(variance + np.square(tolerance)) * compute_student_quantile(candidate.informed)
     return np.clip(values - reach, h.lower, h.upper), np.clip(values + reach, h.lower, h.upper)
 
 
@@ -138,7 +128,7 @@ def _find_limit(
 ) -> float:
     """Return the value between estimate and bound where the root deviance reaches the quantile, by false position."""
     k = len(candidate.hypothesis.names)
-    wanted = compute_student_quantile(candidate) * compute_widening(candidate)
+    wanted = compute_student_quantile(candidate.informed) * compute_widening(candidate)
     inside, outside = float(centre.values[place - k]), float(bound)
     if inside == outside:
         return outside

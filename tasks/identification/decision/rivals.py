@@ -82,22 +82,25 @@ def compare_with_rivals(evidence: Evidence, base: Fit, rounds: tuple[Round, ...]
         unseen = compute_misfit_by_run(evidence.held_out, rest)
         share = compute_win_share([own, *others], rest)
         shares = [compute_win_share([c, own, *[o for o in others if o is not c]], rest) for c in others]
-        near = tuple(
-            (c, wins)
-            for c, wins in zip(others, shares, strict=True)
+        near = []
+        for c, wins in zip(others, shares, strict=True):
+            if c.hypothesis.names[0] in alike:
+                explains = _is_as_wrong(c)
+            else:
+                enough = _is_as_wrong(c) if c.hypothesis.name in instruments else c.score > 0.0
+                explains = enough and is_close(own, share, c, wins)
             if (
-                _is_as_wrong(c)
-                if c.hypothesis.names[0] in alike
-                else (_is_as_wrong(c) if c.hypothesis.name in instruments else c.score > 0.0)
-                and is_close(own, share, c, wins)
-            )
-            and not is_nested(own.hypothesis, c.hypothesis)
-            # an explanation that bends the session beyond belief is none beside one that does not
-            and (own.pulls_session or not c.pulls_session)
-            and is_close_on_unseen_runs(evidence, unseen, own, c)
-        )
+                explains
+                and not is_nested(own.hypothesis, c.hypothesis)
+                # an explanation that bends the session beyond belief is none beside one that does not
+                and (own.pulls_session or not c.pulls_session)
+                and is_close_on_unseen_runs(evidence, unseen, own, c)
+            ):
+                near.append((c, wins))
         compared.append(
-            RivalComparison(own=own, share=share, others=tuple(zip(others, shares, strict=True)), near=near)
+            RivalComparison(
+                own=own, share=share, others=tuple(zip(others, shares, strict=True)), near=tuple(near)
+            )
         )
     return compared
 

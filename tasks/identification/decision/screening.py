@@ -89,7 +89,7 @@ def compute_inflation(evidence: Evidence, at: Fit, own: NDArray[np.float64] | No
 
     Under a correct model every run's score z in any direction is standard normal, and Q, the sum of z^2 over runs,
     equals their number on average (Cochran 1954, doi:10.2307/3001666). The null's level is the median over the
-    library's directions; the direction's own Q is combined with it.
+    library's directions that at least four runs inform; the direction's own Q is drawn towards it as by six more runs.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.campaign import CHANNELS, Tolerances
-from tasks.identification.inference.disturbance import DISTURBED, KNOT_SPACING, Disturbance
+from tasks.identification.inference.disturbance import DISTURBED, INITIAL_SPEED, KNOT_SPACING, Disturbance
 from tasks.identification.inference.evidence import (
     SESSION_INDEX,
     RunEvidence,
@@ -193,7 +193,7 @@ def differentiate_about_offsets(
     tolerances, disturbance : prior of its offsets and disturbances
     """
     moved, forms = move_by_offsets(base, slots, offsets, run.knots)
-    faster = offsets[0] * (1.0 + float(base[PARAMETER_INDEX["speed_scale"]]))
+    faster = offsets[INITIAL_SPEED] * (1.0 + float(base[PARAMETER_INDEX["speed_scale"]]))
     model = replace(run.model, initial_speed=run.model.initial_speed + faster)
     fresh = differentiate_run(model, run.rho, run.sigma, moved, (), tolerances, disturbance, forms)
     kept = replace(fresh, model=run.model, library=run.library, others=run.others, origin=offsets)

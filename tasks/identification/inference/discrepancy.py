@@ -15,7 +15,12 @@ from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.evidence import RunEvidence, set_disturbance_prior
 from tasks.identification.inference.fit import Fit
 from tasks.identification.inference.linearisation_points import LinearisedRun, linearise_at, linearise_runs
-from tasks.identification.inference.noise import correlate_with_next, unwhiten_channels, whiten_channels
+from tasks.identification.inference.noise import (
+    correlate_with_next,
+    rewhiten_channels,
+    unwhiten_channels,
+    whiten_channels,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,12 +71,7 @@ def set_run_noise(evidence: Evidence, noise: Mapping[str, RunNoise]) -> Evidence
         if np.array_equal(own.rho, run.rho) and np.array_equal(own.sigma, run.sigma):
             return run
         nuisance, session, library, others = (
-            whiten_channels(
-                unwhiten_channels(columns, run.rho, run.sigma, run.model.sampled),
-                own.rho,
-                own.sigma,
-                run.model.sampled,
-            )
+            rewhiten_channels(columns, (run.rho, run.sigma), (own.rho, own.sigma), run.model.sampled)
             for columns in (run.nuisance, run.session, run.library, run.others)
         )
         changed = replace(

@@ -11,6 +11,8 @@ DISTURBED = ("longitudinal_force", "friction", "pitch_moment")
 KNOT_SPACING = (0.15, 0.25, 0.1)
 """Spacing of the disturbance's knots at each port: finer than any disturbance seen in brake tests [s]."""
 N_OFFSETS = 4
+INITIAL_SPEED, FRICTION, ACCELERATION_BIAS, PITCH_OFFSET = range(N_OFFSETS)
+"""Places of a run's own offsets, which precede its disturbances [m/s, 1, m/s2, deg]."""
 
 
 @dataclass(frozen=True, kw_only=True)

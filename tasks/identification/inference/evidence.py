@@ -13,9 +13,13 @@ from scipy.linalg import cholesky, solve_triangular
 
 from tasks.campaign.campaign import CHANNELS, SESSION, Tolerances
 from tasks.identification.inference.disturbance import (
+    ACCELERATION_BIAS,
     DISTURBED,
+    FRICTION,
+    INITIAL_SPEED,
     KNOT_SPACING,
     N_OFFSETS,
+    PITCH_OFFSET,
     Disturbance,
     compute_prior_precision,
 )
@@ -94,13 +98,13 @@ class RunEvidence:
                 return np.full(len(self.nuisance), BROKEN)
             return whiten_channels(self.model.measured - y, self.rho, self.sigma, self.model.sampled)
         moved, slots = move_by_offsets(theta, slots, offsets, self.knots)
-        speed = compute_starting_speed(self.model, theta) + offsets[0]
+        speed = compute_starting_speed(self.model, theta) + offsets[INITIAL_SPEED]
         simulated = simulate_run(self.model, moved, slots=slots, initial_speed=speed)
         y = compute_instrument_readings(self.model, moved, simulated)
         if not np.isfinite(y).all():
             return np.full(len(self.nuisance), BROKEN)
-        y[:, CHANNELS.index("longitudinal_acceleration")] += offsets[2]
-        y[:, CHANNELS.index("pitch")] += offsets[3]
+        y[:, CHANNELS.index("longitudinal_acceleration")] += offsets[ACCELERATION_BIAS]
+        y[:, CHANNELS.index("pitch")] += offsets[PITCH_OFFSET]
         return whiten_channels(self.model.measured - y, self.rho, self.sigma, self.model.sampled)
 
     def add_offsets(self, residual: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -154,7 +158,7 @@ def move_by_offsets(
     knots : number of knots at each disturbed port
     """
     moved = theta.copy()
-    moved[PARAMETER_INDEX["friction"]] += offsets[1]
+    moved[PARAMETER_INDEX["friction"]] += offsets[FRICTION]
     at = N_OFFSETS
     for port, count, spacing in zip(DISTURBED, knots, KNOT_SPACING, strict=True):
         own = Slot(port=port, variable="time", origin=0.0, spacing=spacing, values=offsets[at : at + count])

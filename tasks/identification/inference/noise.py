@@ -223,6 +223,23 @@ def unwhiten_channels(
     return x
 
 
+def rewhiten_channels(
+    white: NDArray[np.float64],
+    before: tuple[NDArray[np.float64], NDArray[np.float64]],
+    after: tuple[NDArray[np.float64], NDArray[np.float64]],
+    sampled: NDArray[np.bool_] | None = None,
+) -> NDArray[np.float64]:
+    """Return what was whitened with one noise as it is with another, float64 [7 N] or [7 N, P].
+
+    Parameters
+    ----------
+    white : float64 [7 N] or [7 N, P]
+    before, after : rho and sigma of either noise, float64 [7] each
+    sampled : that it was whitened with
+    """
+    return whiten_channels(unwhiten_channels(white, *before, sampled), *after, sampled)
+
+
 def correlate_with_next(x: NDArray[np.float64], most: float) -> float:
     """Return the correlation of each sample with the next, from 0 to ``most`` [1].
 

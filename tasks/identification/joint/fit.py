@@ -9,7 +9,6 @@ from scipy.optimize import least_squares
 
 from tasks.campaign.campaign import CHANNELS
 from tasks.identification.joint.derivatives import (
-    OFFSET_STEP,
     differentiate_run,
     name_values,
     weigh_misfit,
@@ -92,7 +91,7 @@ def fit_jointly(
     ----------
     stops : training runs
     numbers : that are free
-    starts : values by name; others start at 0
+    starts : values by name; others start at 0, those that end there at 0.3 of their sigma
     scales : float64 [7] size of a misfit that counts one; None takes the first guess
     offsets : float64 [R, 3] where the runs' own numbers start
     """
@@ -141,9 +140,7 @@ def lead_offsets(
         return np.concatenate((weigh_misfit(stop, numbers, x, scales, end), x / OFFSET_SIGMA))
 
     limit = OFFSET_LIMIT
-    found = least_squares(
-        residual, np.zeros(len(OFFSETS)), bounds=(-limit, limit), diff_step=OFFSET_STEP, max_nfev=15
-    )
+    found = least_squares(residual, np.zeros(len(OFFSETS)), bounds=(-limit, limit), max_nfev=15)
     return np.asarray(found.x)
 
 

@@ -94,7 +94,7 @@ def _prefer_from_brake(
     A speed that is held looks like that of a car which nothing holds back, and hides all resistance from a model that
     has none either. A log of throttle or engine would say so.
     """
-    logged = any(run.throttle is not None or run.drive_torque is not None for run in campaign.runs)
+    logged = any(run.drive_torque is not None for run in campaign.runs)
     if logged or compare_with_noise(campaign, whole.verdict.error) <= rules.foreign_misfit:
         return whole
     try:

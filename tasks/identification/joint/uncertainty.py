@@ -6,14 +6,12 @@ from math import exp
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_banded
-from scipy.special import ndtri, stdtrit
+from scipy.special import stdtrit
 
 from tasks.identification.inference.noise import correlate_with_next
+from tasks.identification.inference.quantiles import NORMAL_QUANTILE, compute_student_quantile
 from tasks.identification.joint.fit import JointFit
 from tasks.identification.rules import JointRules
-
-OUTSIDE = 0.025
-"""Share beyond either end of an interval of 95 % [1]."""
 
 
 def standard_errors(fitted: JointFit, rules: JointRules) -> NDArray[np.float64]:
@@ -71,7 +69,7 @@ def compute_interval_reach(fitted: JointFit, rules: JointRules) -> NDArray[np.fl
     rules : of the joint fit
     """
     runs = len(fitted.residuals)
-    reach = find_interval_quantile(runs) * standard_errors(fitted, rules)
+    reach = compute_student_quantile(runs) * standard_errors(fitted, rules)
     if runs >= rules.fewest_scatter_runs:
         return np.asarray(reach)
     score = np.diag([1.0 / n.sigma**2 for n in fitted.numbers])
@@ -79,17 +77,7 @@ def compute_interval_reach(fitted: JointFit, rules: JointRules) -> NDArray[np.fl
         score = score + _compute_score_covariance(residual, slope, grid, fitted.interval, rules)
     inverse = np.linalg.inv(fitted.information)
     remembers = np.sqrt(np.diag(inverse @ score @ inverse))
-    return np.maximum(reach, float(ndtri(1.0 - OUTSIDE)) * remembers)
-
-
-def find_interval_quantile(runs: int) -> float:
-    """Return the standard errors from the middle to the end of an interval of 95 %.
-
-    Parameters
-    ----------
-    runs : of the fit
-    """
-    return float(stdtrit(max(runs - 1, 1), 1.0 - OUTSIDE))
+    return np.maximum(reach, NORMAL_QUANTILE * remembers)
 
 
 def _compute_score_covariance(

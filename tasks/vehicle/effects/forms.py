@@ -1,12 +1,14 @@
 """Forms outside the library of effects: a simple shape of one variable at one port."""
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.vehicle.effects.ports import VARIABLE_UNITS, format_unit
+from tasks.errors import InputError
+from tasks.vehicle.effects.ports import PORTS, VARIABLE_UNITS, VARIABLES, format_unit
 from tasks.vehicle.effects.slots import Slot
 
 TABLE = 65
@@ -89,3 +91,25 @@ def name_form(port: str, variable: str, shape: str, scale: float) -> str:
     scale : magnitude of the variable at which x is 1 [unit of the variable]
     """
     return f"{port} ~ {shape}, x = {variable}/{scale:g} {format_unit(VARIABLE_UNITS[variable])}"
+
+
+def read_form_name(name: str) -> tuple[str, str, str, float]:
+    """Return port, variable, shape and scale of a form from the name that `name_form` gave it.
+
+    Parameters
+    ----------
+    name : of the form
+
+    Raises
+    ------
+    InputError
+        If no form of the grammar has that name.
+    """
+    found = re.fullmatch(
+        r"(?P<port>\w+) ~ (?P<shape>.+), x = (?P<variable>\w+)/(?P<scale>[\d.e+-]+) (?P<unit>.+)", name
+    )
+    if found and found["port"] in PORTS and found["shape"] in SHAPES and found["variable"] in VARIABLES:
+        port, shape, variable, scale = found["port"], found["shape"], found["variable"], float(found["scale"])
+        if name_form(port, variable, shape, scale) == name:
+            return port, variable, shape, scale
+    raise InputError(f"form {name}: no port, variable and shape of the grammar have that name")

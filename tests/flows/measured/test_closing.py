@@ -18,15 +18,13 @@ from flows.cli import app
 from flows.making.plan import make_plan
 from flows.measured.closing import close_loop, find_unused_tolerances, verdict_json
 from flows.measured.closing_ledger import record_reading
-from flows.measured.friction_pulls import FRICTION_OFFSET, find_pulled_runs, tell_friction_pulls
+from flows.measured.friction_pulls import find_pulled_runs, tell_friction_pulls
 from flows.measured.grown_vehicle import grown_vehicle
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS, SESSION, Campaign
 from tasks.campaign.planned_runs import RunPlan
 from tasks.identification.benchmark import TOLERANCES, make_synthetic_campaign
 from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter, Verdict
-from tasks.identification.inference.disturbance import N_OFFSETS, Disturbance
-from tasks.identification.inference.evidence import move_by_offsets
-from tasks.vehicle.effects.table import EFFECT_TABLE, PARAMETER_INDEX
+from tasks.identification.inference.disturbance import Disturbance
 
 VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
 HOSTILE = "lagging <img src=x onerror=alert(1)>"
@@ -147,13 +145,6 @@ def test_runs_that_grip_less_than_the_mapping_says_are_told_beside_the_verdict(
         and "(3.0% each): run-2 by -3.8 and run-3 by +2.6;" in told["reasons"][1]
     )
     assert tell_friction_pulls({"verdict": kind}, 0.03) == {"verdict": kind}
-
-
-def test_the_friction_that_is_told_is_the_one_that_a_run_moves_by() -> None:
-    offsets = np.zeros(N_OFFSETS)
-    offsets[FRICTION_OFFSET] = -0.06
-    moved, _ = move_by_offsets(np.zeros(len(EFFECT_TABLE)), (), offsets, (0, 0, 0))
-    assert moved[PARAMETER_INDEX["friction"]] == -0.06
 
 
 def test_a_lag_leaves_a_residual_that_goes_with_the_pressure_until_it_is_named(closed: Path) -> None:

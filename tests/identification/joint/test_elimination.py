@@ -1,6 +1,7 @@
 """Elimination takes away numbers that are not certain, and finds the rivals of those that stay."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -276,3 +277,27 @@ def test_a_fit_foresees_which_number_makes_good_what_another_did():
     least = FORESEEN_SHARE * reached["lag"]
     assert min(foreseen["lag"], foreseen["dead_time"]) > 2.0 * least
     assert foreseen["acceleration_scale"] < least and reached["acceleration_scale"] < 0.1 * reached["lag"]
+
+
+def test_a_foreseen_move_ends_at_the_bounds_of_a_number(monkeypatch):
+    """A brake's curve beyond its bound foresaw no fall at all, though the way to the bound makes good most of it."""
+    curve = next(n for n in load_joint_numbers() if n.name == "pressure_curve")
+    slope = np.full((400, 1), 8.0)
+    monkeypatch.setattr(elimination, "differentiate_run", lambda *_: None)
+    none = SimpleNamespace(numbers=(), values=np.zeros(0), offsets=np.zeros((1, 3)), scales=None, cost=0.0)
+    for optimum in (0.9 * curve.lower, 1.1 * curve.lower, 1.1 * curve.upper, 2.0 * curve.lower):
+        residual = -optimum * slope[:, 0]
+        runs = SimpleNamespace(residuals=(residual,), slopes=(slope,))
+        monkeypatch.setattr(elimination, "describe_fit", lambda *_, runs=runs: runs)
+        move = np.clip(optimum, curve.lower, curve.upper)
+        weight = 1.0 / np.sqrt(1.0 + residual**2)
+        fall = 0.5 * float(weight @ (residual**2 - (residual + move * slope[:, 0]) ** 2))
+        assert foresee_falls([None], none, [curve]) == pytest.approx([fall], rel=0.05)
+    for number in load_joint_numbers():
+        if number.lower == 0.0:
+            monkeypatch.setattr(
+                elimination,
+                "describe_fit",
+                lambda *_: SimpleNamespace(residuals=(slope[:, 0],), slopes=(slope,)),
+            )
+            assert foresee_falls([None], none, [number]) == [0.0]

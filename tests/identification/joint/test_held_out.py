@@ -53,3 +53,19 @@ def test_the_rules_say_from_which_held_out_error_a_number_is_not_named(share: st
     assert reasons[0].startswith(
         "the training runs suggest that the brakes follow the pressure with a lag of 0.0"
     )
+
+
+def test_which_number_goes_first_depends_on_no_unit(monkeypatch):
+    """Speed counts over its error with all numbers, as the other channels do over their scales."""
+    errors = {"both": (10.0, 1.0), "without lag": (9.0, 1.3), "without fade": (9.9, 0.9)}
+    lag, fade = (n for n in load_joint_numbers() if n.name in ("lag", "fade"))
+    fitted = SimpleNamespace(
+        name="both", numbers=(lag, fade), removable_numbers=(lag, fade), by_name={"lag": 0.1, "fade": 0.05}
+    )
+    alone = {"lag": SimpleNamespace(name="without fade", removable_numbers=()),
+             "fade": SimpleNamespace(name="without lag", removable_numbers=())}  # fmt: skip
+    monkeypatch.setattr(held_out, "_held_out_misfit", lambda _, fit: errors[fit.name])
+    monkeypatch.setattr(held_out, "refit_numbers", lambda _, __, left: alone[left[0].name])
+    monkeypatch.setattr(held_out, "eliminate_uncertain_numbers", lambda _, fit, __: fit)
+    rules = replace(RULES, better_prediction_share=1.0, equal_prediction_share=1.0)
+    assert drop_what_predicts_worse([], [], fitted, rules, []).name == "without fade"

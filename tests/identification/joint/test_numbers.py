@@ -131,6 +131,15 @@ def test_a_car_that_is_driven_does_not_coast_down():
     assert coasts_down(pedal, shut) and not coasts_down(pedal, driven)
 
 
+def test_a_brake_behind_the_used_samples_counts_for_nothing():
+    """A coast-down to walking pace, and the foot on the brake there."""
+    slow = len(coast().run.pressure) - 30
+    pressure = np.where(np.arange(slow + 30) < slow, 0.0, 6.0)
+    late = replace(coast(), samples=slow, run=replace(coast().run, pressure=pressure))
+    assert coasts_down(late, replace(RULES, coasted_share=0.01))
+    assert chosen_priors([*stops(), late], RULES) == chosen_priors([*stops(), coast()], RULES)
+
+
 def test_a_lag_and_a_dead_time_are_one_delay_in_a_slow_log():
     delays = [n for n in load_joint_numbers() if n.group == "delay"]
     interval = stops()[0].run.interval
