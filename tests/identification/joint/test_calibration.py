@@ -14,6 +14,7 @@ from tasks.identification.decision.calibrated import tell_calibrated
 from tasks.identification.decision.disputes import ForeignCarError
 from tasks.identification.inference.fit import Fit
 from tasks.identification.inference.linearisation import prepare_evidence
+from tasks.identification.inference.quantiles import NORMAL_QUANTILE
 from tasks.identification.joint.calibration import calibrate_gain
 from tasks.vehicle.effects.table import build_parameter_vector
 from tests.identification.synthetic import SURFACE, TOLERANCES, VEHICLE, measured, plain_run
@@ -100,5 +101,5 @@ def test_a_calibrated_gain_is_wrong_beyond_as_many_tolerances_as_the_rules_say(g
     assert not (within if is_wrong else wrong)
     assert told.name == "retuned_pressure_gain"
     (number,) = told.parameters
-    reach = 1.96 * np.hypot(0.01, 0.01 * (1.0 + gain))  # of the fit, and of the mass that was held
+    reach = NORMAL_QUANTILE * np.hypot(0.01, 0.01 * (1.0 + gain))  # of the fit, and of the mass that was held
     assert (number.ci_low, number.value, number.ci_high) == pytest.approx((gain - reach, gain, gain + reach))
