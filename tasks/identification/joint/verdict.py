@@ -44,6 +44,10 @@ from tasks.identification.joint.held_out import (
     predict_held_out,
     summarise_held_out,
 )
+from tasks.identification.joint.instruments import (
+    drop_contradicted_instruments,
+    drop_contradicted_readings,
+)
 from tasks.identification.joint.numbers import (
     CALIBRATED,
     FRICTION,
@@ -131,6 +135,7 @@ def judge_jointly(
     reasons = [disagreement] if disagreement else []
     fitted = eliminate_uncertain_numbers(train, settled, joint)
     fitted = add_certain_numbers(train, fitted, everything.numbers, joint)
+    fitted = drop_contradicted_instruments(train, fitted, joint, reasons)
     fitted = drop_at_bounds(train, fitted, joint, reasons)
     fitted = drop_what_predicts_worse(train, held_out, fitted, joint, reasons)
     retuned = refit_numbers(train, fitted, tuple(n for n in fitted.numbers if n.group in CALIBRATED))
@@ -158,6 +163,7 @@ def judge_jointly(
     claimed = [name for name, tolerance in tolerances.items() if tolerance < joint.unknown_gain_tolerance]
     doubted = {e.parameters[0].name for e in effects} & set(claimed)
     as_good = find_substitutes(train, fitted, shown, rules.rival_gain_share, doubted)
+    as_good = drop_contradicted_readings(train, as_good)
     substitutes = drop_contradicted_rivals(held_out, fitted, as_good, joint)
     # what other physics explains as well is no number of the file alone
     disputed = {substitute.of for substitute in substitutes}
