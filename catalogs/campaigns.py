@@ -53,6 +53,10 @@ RUN_NUMBERS = (
 
 HEAT_COLUMN = "braking_heat_j_kg"
 """Column of runs.csv with the heat of the discs that an import estimates; a campaign may lack it."""
+SLOPE_COLUMN = "felt_slope_rad"
+"""Column of runs.csv with the slope of the road that an import reads off the accelerometer; a campaign may lack it."""
+STEEPEST_ROAD = 0.4
+"""Slope beyond which no road goes; Baldwin Street has 0.35 [rad]."""
 
 
 class Split(BaseModel):
@@ -184,7 +188,7 @@ def _read_header_and_runs(
     except InputError as error:
         problems += error.problems
     try:
-        rows = parse_rows(table, ("run", "weather", *RUN_NUMBERS), (*RUN_NUMBERS, HEAT_COLUMN))
+        rows = parse_rows(table, ("run", "weather", *RUN_NUMBERS), (*RUN_NUMBERS, HEAT_COLUMN, SLOPE_COLUMN))
         problems += [
             f"{row['run']}: direction must be 1 or -1; it is {shorten(row['direction'], 40)}"
             for row in rows
@@ -194,6 +198,11 @@ def _read_header_and_runs(
             f"{row['run']}: {HEAT_COLUMN} must not be negative; it is {row[HEAT_COLUMN]}"
             for row in rows
             if float(row.get(HEAT_COLUMN, 0.0)) < 0.0
+        ]
+        problems += [
+            f"{row['run']}: {SLOPE_COLUMN} must be within {STEEPEST_ROAD} of 0; it is {row[SLOPE_COLUMN]}"
+            for row in rows
+            if abs(float(row.get(SLOPE_COLUMN, 0.0))) > STEEPEST_ROAD
         ]
     except InputError as error:
         problems += error.problems
@@ -269,6 +278,7 @@ def _make_run(
         direction=int(float(row["direction"])),
         disc_rise=float(row["disc_temperature_above_ambient_c"]),
         braking_heat=float(row.get(HEAT_COLUMN, 0.0)),
+        felt_slope=float(row.get(SLOPE_COLUMN, 0.0)),
         hazard_center=float(row["hazard_center_m"]),
         hazard_length=float(row["hazard_length_m"]),
         hazard_height=float(row["hazard_height_m"]),

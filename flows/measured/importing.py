@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 import yaml
 
-from catalogs.campaigns import HEAT_COLUMN
+from catalogs.campaigns import HEAT_COLUMN, SLOPE_COLUMN
 from catalogs.channel_maps import ChannelMap, FaultyMap, load_channel_map
 from catalogs.channel_maps.conditions import Conditions
 from catalogs.recordings import read_signals, recording_files, recording_root, stored_files
@@ -28,6 +28,7 @@ from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME
 from tasks.campaign.run_validation import motion_problem
 from tasks.campaign.signals import Signal
 from tasks.campaign.slow_channels import measure_slow_rates
+from tasks.campaign.unmapped_slope import estimate_slopes
 from tasks.errors import InputError
 from tasks.surface.weather import DRY
 
@@ -134,9 +135,11 @@ def write_campaign(
 ) -> dict[str, Any]:
     """Write the folder and say what is in it; campaign.yaml comes last, so that it marks a whole campaign."""
     rate = channel_map.sample_rate_hz
+    felt = "longitudinal_acceleration" in channel_map.channels
+    slopes = estimate_slopes({run.name: found.readable for run, found in made}, 1.0 / rate) if felt else {}
     split = {part: [run.name for run, _ in made if run.part == part] for part in ("train", "held_out")}
     table = io.StringIO()
-    columns = ["run", *Conditions.model_fields, HEAT_COLUMN, "drive", "start_s"]
+    columns = ["run", *Conditions.model_fields, HEAT_COLUMN, SLOPE_COLUMN, "drive", "start_s"]
     writer = csv.DictWriter(table, columns, lineterminator="\n")
     writer.writeheader()
     for run, found in made:
@@ -144,6 +147,7 @@ def write_campaign(
         row = {
             "run": run.name,
             HEAT_COLUMN: f"{heat[run.name]:.4g}",
+            SLOPE_COLUMN: f"{slopes.get(run.name, 0.0):.4g}",
             "drive": drive,
             "start_s": f"{found.start:.6f}",
         }

@@ -92,6 +92,7 @@ class Run:
     throttle : float64 [N] share of the full throttle [1]; None where it was not measured
     speed_of_wheels : the speed was measured at the wheels, whose slip it has
     braking_heat : of the discs at the start, by the drive before it, per mass of the car [J/kg]
+    felt_slope : of the road by what the accelerometer reads, uphill positive; counts where none was measured [rad]
     sampled : bool [N, 7] instants at which each channel has a sample; None where all have one at every instant
     """
 
@@ -113,12 +114,20 @@ class Run:
     throttle: NDArray[np.float64] | None = None
     speed_of_wheels: bool = False
     braking_heat: float = 0.0
+    felt_slope: float = 0.0
     sampled: NDArray[np.bool_] | None = None
 
     @property
     def speed(self) -> NDArray[np.float64]:
         """Return the measured speed, float64 [N] [m/s]."""
         return np.asarray(self.response[:, CHANNELS.index("speed")])
+
+    @property
+    def slope(self) -> NDArray[np.float64] | None:
+        """Return the slope of the road, measured or felt, float64 [N] [rad]; None on a flat road."""
+        if self.road_slope is not None or not self.felt_slope:
+            return self.road_slope
+        return np.full(len(self.pressure), self.felt_slope)
 
     def find_samples(self, channel: int) -> NDArray[np.int64]:
         """Return the instants at which a channel has a sample, int64 [M].

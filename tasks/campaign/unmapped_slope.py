@@ -1,8 +1,8 @@
 """Slopes of the road that no map names: an accelerometer reads gravity along them, and the rate of speed does not.
 
-The accelerometer sits on the body and reads gravity along the dive as well, about 3 % of the deceleration, and its
-scale may be off by as much. Both follow the deceleration within each run, and a slope does not; a speed that is late
-follows the change of acceleration. Only what is left of the difference in each run is compared.
+Scale, dive and delay of the two are the same in all runs, and a slope is not. The median over the runs of what the
+accelerometer reads too much is its zero, and what a run reads beyond it is the slope of that run, as far as runs
+scatter more than a zero drifts.
 """
 
 from collections.abc import Mapping
@@ -11,13 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.brake_validation import MOVING
-from tasks.campaign.channel_validation import smooth_channel
 from tasks.campaign.channels import GRAVITY
+from tasks.campaign.speed_by_acceleration import pair_samples, relate_speed_to_acceleration
 
-LEAST_SPREAD = 0.2
-"""Standard deviation over runs from which slopes are told [m/s^2]: 2 % of slope; an accelerometer drifts by 0.1."""
+DRIFT = 0.03
+"""Standard deviation over the runs of a session of an accelerometer's zero [m/s^2]; on flat roads runs of five
+simulators scatter by 0.002 to 0.02, on slopes of 1 to 2 % by 0.06 to 0.2."""
+TOLD = 2.0
+"""Drifts by which runs must scatter for their slopes to be told [1]."""
 FEWEST_RUNS = 3
 """Runs of which a deviation is told [1]."""
+STEEPEST = 0.2
+"""Sine beyond which no slope is believed: the accelerometer is off by something else [1]."""
 SHORTEST_RUN = 1.0
 """Time in motion that a run needs to tell its mean [s]."""
 
@@ -31,20 +36,47 @@ def describe_slopes(runs: Mapping[str, Mapping[str, NDArray[np.float64]]], inter
         not computed from the speed
     interval : of their clock [s]
     """
-    apart = measure_apart(runs, interval)
-    if len(apart) < FEWEST_RUNS or float(np.std(list(apart.values()))) <= LEAST_SPREAD:
+    apart = {run: zero for run, (zero, _) in measure_apart(runs, interval).items()}
+    if not estimate_slopes(runs, interval) or float(np.std(list(apart.values()))) <= TOLD * DRIFT:
         return []
     low, high = min(apart, key=lambda run: apart[run]), max(apart, key=lambda run: apart[run])
     return [
         f"channel longitudinal_acceleration differs from the rate of speed by {apart[low]:.2f} ({low}) to"
         f" {apart[high]:.2f} m/s^2 ({high}) from run to run, besides what braking gives, as on slopes of"
-        f" {100.0 * apart[low] / GRAVITY:.1f} to {100.0 * apart[high] / GRAVITY:.1f} %, which the model does not"
-        " know: map road_slope, from altitude or the satellite receiver"
+        f" {100.0 * apart[low] / GRAVITY:.1f} to {100.0 * apart[high] / GRAVITY:.1f} %: close-loop takes each run"
+        " for one slope; map road_slope, from altitude or the satellite receiver, for slopes that change within a run"
     ]
 
 
-def measure_apart(runs: Mapping[str, Mapping[str, NDArray[np.float64]]], interval: float) -> dict[str, float]:
-    """Return by how much the acceleration of each run differs from the rate of speed without braking [m/s^2].
+def estimate_slopes(
+    runs: Mapping[str, Mapping[str, NDArray[np.float64]]], interval: float
+) -> dict[str, float]:
+    """Return the slope of the road in each run, uphill positive, by what its accelerometer reads [rad].
+
+    What scatters over the runs is slope, drift and the error of each run's; the share of slope counts (James and Stein
+    1961). Without
+    enough runs, or where they scatter no more than a zero drifts, none has a slope.
+
+    Parameters
+    ----------
+    runs : as in `describe_slopes`
+    interval : of their clock [s]
+    """
+    apart = measure_apart(runs, interval)
+    if len(apart) < FEWEST_RUNS:
+        return {}
+    zeros, errors = np.array(list(apart.values())).T
+    share = 1.0 - (DRIFT**2 + float(np.mean(errors**2))) / max(float(np.var(zeros)), DRIFT**2)
+    if share <= 0.0:
+        return {}
+    sines = share * (zeros - np.median(zeros)) / GRAVITY
+    return dict(zip(apart, np.arcsin(np.clip(sines, -STEEPEST, STEEPEST)).tolist(), strict=True))
+
+
+def measure_apart(
+    runs: Mapping[str, Mapping[str, NDArray[np.float64]]], interval: float
+) -> dict[str, tuple[float, float]]:
+    """Return by how much the acceleration of each run differs from the rate of speed, and how surely [m/s^2].
 
     The road's slope is positive uphill. Runs without both channels, without motion, or with a mapped slope are left
     out.
@@ -54,23 +86,31 @@ def measure_apart(runs: Mapping[str, Mapping[str, NDArray[np.float64]]], interva
     runs : channels of each run by name, each float64 [N], in campaign units
     interval : of their clock [s]
     """
-    parts = {
-        run: _compare(columns, interval)
+    both = {
+        run: (columns["speed"], columns["longitudinal_acceleration"])
         for run, columns in runs.items()
         if {"speed", "longitudinal_acceleration"} <= columns.keys() and "road_slope" not in columns
     }
-    parts = {run: part for run, part in parts.items() if len(part) * interval >= SHORTEST_RUN}
-    if not parts:
+    pairs = {
+        run: pair_samples(speed, felt, interval)[: find_stop(speed)] for run, (speed, felt) in both.items()
+    }
+    pairs = {run: pair for run, pair in pairs.items() if len(pair) * interval >= SHORTEST_RUN}
+    found = relate_speed_to_acceleration(list(pairs.values()))
+    if found is None:
         return {}
-    within = np.concatenate([part - part.mean(axis=0) for part in parts.values()])
-    shares = np.linalg.lstsq(within[:, 1:], within[:, 0], rcond=None)[0]
-    return {run: float(np.mean(part[:, 0] - part[:, 1:] @ shares)) for run, part in parts.items()}
+    return {
+        run: (float(zero), float(error))
+        for run, zero, error in zip(pairs, found.zeros, found.errors, strict=True)
+        if np.isfinite(zero)
+    }
 
 
-def _compare(columns: Mapping[str, NDArray[np.float64]], interval: float) -> NDArray[np.float64]:
-    """Return difference and rate of speed [m/s^2] and rate of acceleration [m/s^3] in motion, float64 [M, 3]."""
-    speed, felt = (smooth_channel(columns[name], interval) for name in ("speed", "longitudinal_acceleration"))
-    if len(speed) < 2:
-        return np.empty((0, 3))
-    rate = np.gradient(speed, interval)
-    return np.column_stack((felt - rate, rate, np.gradient(felt, interval)))[speed > MOVING]
+def find_stop(speed: NDArray[np.float64]) -> int:
+    """Return the number of samples until the car no longer moves.
+
+    Parameters
+    ----------
+    speed : float64 [N] [m/s]
+    """
+    slow = np.flatnonzero(speed <= MOVING)
+    return int(slow[0]) if slow.size else len(speed)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tasks.campaign.unmapped_slope import describe_slopes, measure_apart
+from tasks.campaign.unmapped_slope import DRIFT, describe_slopes, estimate_slopes, measure_apart
 
 INTERVAL = 0.02
 TIME = np.arange(400) * INTERVAL
@@ -37,7 +37,9 @@ def test_what_braking_gives_does_not_count() -> None:
         f"run-{n:02d}": drive_on_slopes(0.01, brake=brake, dive=0.1, late=0.1, seed=n)
         for n, brake in enumerate((0.0, 1.0, 3.0, 5.0, 7.0))
     }
-    assert list(measure_apart(runs, INTERVAL).values()) == pytest.approx([0.098] * 5, abs=0.04)
+    assert [zero for zero, _ in measure_apart(runs, INTERVAL).values()] == pytest.approx(
+        [0.098] * 5, abs=0.02
+    )
     assert describe_slopes(runs, INTERVAL) == []
 
 
@@ -46,7 +48,7 @@ def test_what_braking_gives_does_not_count() -> None:
     [
         {name: drive_on_slopes(0.05) for name in SLOPES},  # one slope, or one offset
         {name: drive_on_slopes(slope) for name, slope in list(SLOPES.items())[:2]},
-        {name: drive_on_slopes(0.3 * slope) for name, slope in SLOPES.items()},
+        {name: drive_on_slopes(0.1 * slope) for name, slope in SLOPES.items()},
         {
             name: drive_on_slopes(slope) | {"road_slope": 57.3 * slope + 0.0 * TIME}
             for name, slope in SLOPES.items()
@@ -55,5 +57,54 @@ def test_what_braking_gives_does_not_count() -> None:
         {name: {c: x[:30] for c, x in drive_on_slopes(slope).items()} for name, slope in SLOPES.items()},
     ],
 )
-def test_one_offset_small_slopes_and_mapped_ones_raise_no_alarm(runs: dict[str, Columns]) -> None:
-    assert describe_slopes(runs, INTERVAL) == []
+def test_one_offset_small_slopes_and_mapped_ones_raise_no_alarm_and_are_no_slope(
+    runs: dict[str, Columns],
+) -> None:
+    assert describe_slopes(runs, INTERVAL) == [] and estimate_slopes(runs, INTERVAL) == {}
+
+
+@pytest.mark.parametrize("zero", [0.0, 0.5])
+def test_the_slope_of_each_run_is_read_off_the_accelerometer_whatever_its_zero(zero: float) -> None:
+    runs = {name: drive_on_slopes(slope, seed=n) for n, (name, slope) in enumerate(SLOPES.items())}
+    for columns in runs.values():
+        columns["longitudinal_acceleration"] = columns["longitudinal_acceleration"] + zero
+    found = estimate_slopes(runs, INTERVAL)
+    middle = float(np.median(list(SLOPES.values())))
+    assert found == pytest.approx({name: slope - middle for name, slope in SLOPES.items()}, abs=0.001)
+
+
+def test_of_a_scatter_that_is_half_drift_half_of_it_is_slope() -> None:
+    scatter = np.array([-1.0, 1.0, -1.0, 1.0]) * np.sqrt(2.0) * DRIFT / 9.80665
+    runs = {name: drive_on_slopes(slope) for name, slope in zip(SLOPES, scatter, strict=True)}
+    found = list(estimate_slopes(runs, INTERVAL).values())
+    assert found == pytest.approx((0.5 * (scatter - np.median(scatter))).tolist(), abs=2e-5)
+    assert (
+        min(estimate_slopes({n: drive_on_slopes(30.0 * s) for n, s in SLOPES.items()}, INTERVAL).values())
+        >= -0.202
+    )
+
+
+def test_runs_of_one_deceleration_each_tell_no_slope() -> None:
+    """Scale and zero of the accelerometer stand in for each other there, and the rest is noise of both."""
+    runs = {}
+    for n, brake in enumerate((2.0, 4.0, 6.0, 8.0)):
+        columns = drive_on_slopes(0.0, brake=brake, seed=n)
+        runs[f"run-{n}"] = {name: values[TIME > 3.6] for name, values in columns.items()}
+    assert measure_apart(runs, INTERVAL) == {} == estimate_slopes(runs, INTERVAL)
+
+
+@pytest.mark.parametrize("noise", [0.03, 0.1])
+def test_runs_scatter_by_their_errors_and_that_is_no_slope(noise: float) -> None:
+    runs = {}
+    for n in range(40):
+        columns = drive_on_slopes(0.0, seed=n)
+        loud = noise * np.random.default_rng(n + 90).standard_normal(len(TIME))
+        short = (TIME > 2.2) & (TIME < 4.2)
+        runs[f"run-{n}"] = {
+            "speed": (columns["speed"] + loud)[short],
+            "longitudinal_acceleration": columns["longitudinal_acceleration"][short],
+        }
+    zeros, errors = np.array(list(measure_apart(runs, INTERVAL).values())).T
+    assert 0.7 < np.std(zeros) / np.sqrt(np.mean(errors**2)) < 1.4
+    slopes = np.array(list(estimate_slopes(runs, INTERVAL).values()) or [0.0])
+    assert np.std(slopes) < 0.002

@@ -56,18 +56,33 @@ def test_a_run_is_driven_in_weather_that_there_is(folder: Path, old: str, new: s
     assert words in list_problems(folder)
 
 
-def test_the_heat_of_the_discs_may_be_there_and_is_then_a_number(folder: Path) -> None:
-    assert {run.braking_heat for run in read_campaign(folder).runs} == {0.0}
+@pytest.mark.parametrize(
+    ("column", "value", "wrong", "words"),
+    [
+        ("braking_heat_j_kg", 450.0, "-3", "braking_heat_j_kg must not be negative; it is -3"),
+        ("felt_slope_rad", -0.02, "4.5", "felt_slope_rad must be within 0.4 of 0; it is 4.5"),
+    ],
+)
+def test_what_an_import_estimates_of_a_run_may_be_there_and_is_then_a_number(
+    folder: Path, column: str, value: float, wrong: str, words: str
+) -> None:
+    def read() -> set[float]:
+        runs = read_campaign(folder).runs
+        return {run.braking_heat if column.startswith("braking") else run.felt_slope for run in runs}
+
+    assert read() == {0.0}
     table = folder / "runs.csv"
     lines = table.read_text().splitlines()
-    for heat in ("450", "hot", "-3"):
-        text = "\n".join([lines[0] + ",braking_heat_j_kg", *(f"{line},{heat}" for line in lines[1:])])
-        table.write_text(text)
-        if heat == "450":
-            assert {run.braking_heat for run in read_campaign(folder).runs} == {450.0}
-        if heat == "hot":
-            assert "run-01: braking_heat_j_kg must be a finite number; it is 'hot'" in list_problems(folder)
-    assert "run-01: braking_heat_j_kg must not be negative; it is -3" in list_problems(folder)
+
+    def write(text: str) -> None:
+        table.write_text("\n".join([f"{lines[0]},{column}", *(f"{line},{text}" for line in lines[1:])]))
+
+    write(str(value))
+    assert read() == {value}
+    write("hot")
+    assert f"run-01: {column} must be a finite number; it is 'hot'" in list_problems(folder)
+    write(wrong)
+    assert f"run-01: {words}" in list_problems(folder)
 
 
 def drive_off(folder: Path, standing: int, total: int = 1000) -> None:

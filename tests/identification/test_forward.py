@@ -15,9 +15,13 @@ from tests.identification.synthetic import SURFACE, VEHICLE, plain_run
 def test_a_measured_slope_acts_as_a_grade_of_the_session_does_whatever_the_mass(mass: float):
     run = plain_run(20.0, 1.0)
     slope = np.full(len(run.pressure), np.arctan(0.05))
-    measured = predict_channels(
-        prepare_run(replace(run, road_slope=slope), VEHICLE, SURFACE), build_parameter_vector({"mass": mass})
-    )
+    theta = build_parameter_vector({"mass": mass})
+    measured = predict_channels(prepare_run(replace(run, road_slope=slope), VEHICLE, SURFACE), theta)
+    felt = replace(run, felt_slope=float(slope[0]))
+    assert np.array_equal(predict_channels(prepare_run(felt, VEHICLE, SURFACE), theta), measured)
+    # what was measured counts before what the accelerometer feels
+    both = replace(run, road_slope=slope, felt_slope=-0.1)
+    assert np.array_equal(predict_channels(prepare_run(both, VEHICLE, SURFACE), theta), measured)
     graded = predict_channels(
         prepare_run(run, VEHICLE, SURFACE), build_parameter_vector({"mass": mass, "slope": 0.05})
     )

@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from tasks.campaign.campaign import Campaign
 from tasks.identification.decision.answer import NamedEffect, Parameter
 from tasks.identification.decision.log_faults import tell_log_faults
@@ -61,3 +63,15 @@ def test_a_fade_by_discs_that_nobody_measured_says_so() -> None:
     assert tell_log_faults(hot, [make_effect("brake_lag")], ["brake_fade"]) == [told]
     assert tell_log_faults(hot, [make_effect("brake_lag")], ()) == []
     assert tell_log_faults(cold, [make_effect("brake_fade")], ()) == []
+
+
+def test_slopes_that_only_the_accelerometer_feels_are_told() -> None:
+    flat = campaign_at_rest(0.0)
+    hilly = replace(
+        flat,
+        runs=tuple(replace(run, felt_slope=s) for run, s in zip(flat.runs, (-0.01, 0.0, 0.02), strict=True)),
+    )
+    (told,) = tell_log_faults(hilly, (), ())
+    assert told.startswith("no slope of the road was mapped") and "slopes of -1.0 to 2.0 %" in told
+    mapped = tuple(replace(run, road_slope=np.zeros(len(run.pressure))) for run in hilly.runs)
+    assert tell_log_faults(replace(hilly, runs=mapped), (), ()) == []

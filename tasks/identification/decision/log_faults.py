@@ -1,6 +1,7 @@
 """Faults of a log that look exactly like a named effect, so that no search can tell them from it."""
 
 from collections.abc import Collection, Sequence
+from math import sin
 
 from tasks.campaign.campaign import Campaign
 from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME
@@ -28,6 +29,12 @@ def tell_log_faults(campaign: Campaign, named: Sequence[NamedEffect], rivals: Co
         told.append(
             f"no disc temperature was measured: the runs begin up to {hottest:.0f} K above ambient by the braking"
             " before them, with discs of the model's heat capacity; a fade per 100 K is of these"
+        )
+    if any(run.felt_slope and run.road_slope is None for run in campaign.runs):
+        slopes = [100.0 * sin(run.felt_slope) for run in campaign.runs]
+        told.append(
+            f"no slope of the road was mapped: by what the accelerometer reads beyond the rate of speed the runs are on"
+            f" slopes of {min(slopes):.1f} to {max(slopes):.1f} %, each run on one"
         )
     if campaign.throttle_rest:
         told.append(

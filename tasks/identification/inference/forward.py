@@ -140,10 +140,10 @@ def prepare_run(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunMo
 
 
 def _compute_grade_force(run: Run, vehicle: Vehicle) -> tuple[Slot, ...]:
-    """Return the force of the measured slope over time, rearward positive [N]."""
-    if run.road_slope is None:
+    """Return the force of the road's slope over time, rearward positive [N]."""
+    if run.slope is None:
         return ()
-    force = vehicle.mass * vehicle.gravity * np.sin(run.road_slope)
+    force = vehicle.mass * vehicle.gravity * np.sin(run.slope)
     return (Slot(port="longitudinal_force", variable="time", origin=0.0, spacing=run.interval, values=force),)
 
 
@@ -267,8 +267,8 @@ def compute_instrument_readings(
         simulated.column("longitudinal_acceleration")
         + g * theta[PARAMETER_INDEX["slope"]] * model.run.direction
     )
-    if model.run.road_slope is not None:
-        felt = felt + g * np.sin(model.run.road_slope[: model.samples])
+    if model.run.slope is not None:
+        felt = felt + g * np.sin(model.run.slope[: model.samples])
     up = simulated.column("heave_acceleration")
     tilt = e["mount_tilt"]
     ax = (felt - e["gravity_leak"] * g * np.sin(pitch) + tilt * (g + up)) * (1.0 + e["acceleration_scale"])

@@ -10,6 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.campaign import CHANNELS
+from tasks.campaign.speed_by_acceleration import (
+    SpeedByAcceleration,
+    pair_samples,
+    relate_speed_to_acceleration,
+)
 from tasks.identification.inference.driver import SPEED
 from tasks.identification.inference.forward import RunModel
 from tasks.identification.joint.elimination import Substitute, eliminate_uncertain_numbers, refit_numbers
@@ -18,44 +23,26 @@ from tasks.identification.joint.stops import Stop, predict_stop
 from tasks.identification.rules import JointRules
 
 ACCELERATION = CHANNELS.index("longitudinal_acceleration")
-TOLD_BY_BOTH = {"acceleration_scale": 0, "speed_delay": 1}
-"""Numbers of instruments that speed and accelerometer tell without a car, by place in `compare_speed_with_acceleration`."""
-FEWEST_SAMPLES = 5
-"""Samples of the speed that a run needs beside its own two numbers [1]."""
 
 
-def compare_speed_with_acceleration(
+def relate_instruments(
     models: Sequence[RunModel], readings: Sequence[NDArray[np.float64]]
-) -> NDArray[np.float64] | None:
-    """Return how much the accelerometer reads over the rate of speed [1], and how late the speed is [s], float64 [2].
-
-    The speed is the integral of what the accelerometer reads over its scale, a moment later, with a start and a bias of
-    each run's own. Gravity along a dive that follows the deceleration counts as scale. None where too little moves.
+) -> SpeedByAcceleration | None:
+    """Return what speed and accelerometer say of each other; None where too little moves.
 
     Parameters
     ----------
     models : runs in which both were measured
     readings : of the two, measured or predicted, float64 [N, 7] each
     """
-    rows, speeds = [], []
+    runs = []
     for model, y in zip(models, readings, strict=True):
-        known = model.find_samples(ACCELERATION)
-        at = model.find_samples(SPEED)
-        at = at[(at >= known[0]) & (at <= known[-1])] if len(known) > 1 else at[:0]
-        if len(at) < FEWEST_SAMPLES:
-            continue
-        time = np.arange(model.samples) * model.run.interval
-        felt = np.interp(time, time[known], y[known, ACCELERATION])
-        gained = np.concatenate(([0.0], np.cumsum(0.5 * (felt[1:] + felt[:-1]) * model.run.interval)))
-        own, _ = np.linalg.qr(np.column_stack((np.ones(len(at)), time[at])))
-        both = np.column_stack((gained[at], felt[at], y[at, SPEED]))
-        both -= own @ (own.T @ both)
-        rows.append(both[:, :2])
-        speeds.append(both[:, 2])
-    if not rows:
-        return None
-    (share, late), _, rank, _ = np.linalg.lstsq(np.vstack(rows), np.concatenate(speeds), rcond=None)
-    return np.array([1.0 / share, -late / share]) if rank == 2 and share > 0.0 else None
+        known, at = model.find_samples(ACCELERATION), model.find_samples(SPEED)
+        if len(known) > 1:
+            felt = np.interp(np.arange(len(y)), known, y[known, ACCELERATION])
+            at = at[(at >= known[0]) & (at <= known[-1])]
+            runs.append(pair_samples(y[:, SPEED], felt, model.run.interval, at))
+    return relate_speed_to_acceleration(runs)
 
 
 def make_instrument_check(stops: Sequence[Stop]) -> Callable[[JointFit, str], bool]:
@@ -67,20 +54,21 @@ def make_instrument_check(stops: Sequence[Stop]) -> Callable[[JointFit, str], bo
     """
     models = [stop.model for stop in stops]
     seen = all({SPEED, ACCELERATION} <= set(stop.channels.tolist()) for stop in stops)
-    measured = compare_speed_with_acceleration(models, [m.measured for m in models]) if seen else None
+    measured = relate_instruments(models, [m.measured for m in models]) if seen else None
 
-    def predict(fitted: JointFit, numbers: Mapping[str, float]) -> NDArray[np.float64] | None:
+    def predict(fitted: JointFit, numbers: Mapping[str, float]) -> SpeedByAcceleration | None:
         readings = [predict_stop(stop, numbers, own) for stop, own in zip(stops, fitted.offsets, strict=True)]
-        return compare_speed_with_acceleration(models, readings)
+        return relate_instruments(models, readings)
 
     def contradicts(fitted: JointFit, name: str) -> bool:
-        if measured is None or name not in TOLD_BY_BOTH:
+        if measured is None or name not in ("acceleration_scale", "speed_delay"):
             return False
-        place = TOLD_BY_BOTH[name]
         told, plain = predict(fitted, fitted.by_name), predict(fitted, fitted.by_name | {name: 0.0})
         if told is None or plain is None:
             return False
-        return bool(abs(told[place] - measured[place]) > abs(plain[place] - measured[place]))
+        if name == "speed_delay":
+            return abs(told.delay - measured.delay) > abs(plain.delay - measured.delay)
+        return abs(told.scale - measured.scale) > abs(plain.scale - measured.scale)
 
     return contradicts
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 import yaml
 
+from catalogs.campaigns import read_campaign
 from flows.measured.importing import import_measurements
 from tests.campaign.recorded import MAP, braking_columns, log_signal
-from tests.flows.measured.recordings import map_beside, write_csv, write_map
+from tests.flows.measured.recordings import write_csv, write_map
 
 
 def test_a_brake_in_a_turn_is_told(tmp_path: Path) -> None:
@@ -31,6 +32,12 @@ def test_slopes_that_no_map_names_are_told_where_an_accelerometer_feels_them(
         speed = log["v_kmh"] / 3.6
         log["ax_g"] = np.gradient(speed, 0.01) / 9.80665 if computed else log["ax_g"] + slope / 9.80665
         write_csv(tmp_path / f"run-{n}.csv", log)
-    report = import_measurements(str(tmp_path), map=map_beside(tmp_path), out=str(tmp_path / "campaign"))
+    (tmp_path / "map").mkdir()
+    parts = ("train", "train", "held_out")
+    runs = [{"name": f"run-{n}", "file": f"run-{n}.csv", "part": part} for n, part in enumerate(parts)]
+    channel_map = write_map(tmp_path / "map", runs=runs)
+    report = import_measurements(str(tmp_path), map=channel_map, out=str(tmp_path / "campaign"))
     warnings = report.get("warnings", [])
     assert any("map road_slope" in warning for warning in warnings) == told
+    felt = [run.felt_slope for run in read_campaign(tmp_path / "campaign").runs]
+    assert felt == pytest.approx([told * slope / 9.80665 for slope in (-0.4, 0.0, 0.3)], abs=0.0015)

@@ -1,0 +1,104 @@
+"""Speed as the integral of what an accelerometer reads: scale, delay and zeros of the two, whatever drives the car.
+
+The accelerometer reads gravity along the dive of the body too, about 3 % of the deceleration, which counts as its
+scale; along a slope of the road it reads more by g times the sine, which counts as its zero in that run.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FEWEST_SAMPLES = 5
+"""Samples of the speed that a run needs beside its own two numbers [1]."""
+LEAST_EXPLAINED = 0.9
+"""Share of what the speeds do beside straight lines that the acceleration must explain: less is noise of both [1]."""
+LONGEST_MEMORY = 0.99
+"""Largest correlation from sample to sample that errors are widened for [1]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpeedByAcceleration:
+    """What the accelerometer reads, per rate of speed, and how late the speed is.
+
+    Parameters
+    ----------
+    scale : of the accelerometer over the rate of speed [1]
+    delay : of the speed behind the accelerometer [s]
+    zeros : float64 [R] what the accelerometer reads beyond that in each run; NaN in one of too few samples [m/s2]
+    errors : float64 [R] their standard errors [m/s2]
+    """
+
+    scale: float
+    delay: float
+    zeros: NDArray[np.float64]
+    errors: NDArray[np.float64]
+
+
+def pair_samples(
+    speed: NDArray[np.float64],
+    felt: NDArray[np.float64],
+    interval: float,
+    at: NDArray[np.int64] | None = None,
+) -> NDArray[np.float64]:
+    """Return time, speed, integral of the acceleration, and acceleration at the samples of a speed, float64 [M, 4].
+
+    Parameters
+    ----------
+    speed, felt : of one run, the acceleration without gaps, float64 [N] [m/s, m/s2]
+    interval : between the instants [s]
+    at : int64 [M] instants at which the speed has a sample; None for all
+    """
+    time = np.arange(len(felt)) * interval
+    gained = np.concatenate(([0.0], np.cumsum(0.5 * (felt[1:] + felt[:-1]) * interval)))
+    columns = np.column_stack((time, speed, gained, felt))
+    return columns if at is None else columns[at]
+
+
+def relate_speed_to_acceleration(runs: Sequence[NDArray[np.float64]]) -> SpeedByAcceleration | None:
+    """Return scale, delay and zeros by least squares over all runs; None where too little moves.
+
+    Parameters
+    ----------
+    runs : of `pair_samples`
+    """
+    lines = [_fit_line(run) for run in runs]
+    known = [line for line in lines if line is not None]
+    if not known:
+        return None
+    left = np.vstack([rest for _, rest, _ in known])
+    (share, late), _, rank, _ = np.linalg.lstsq(left[:, 1:], left[:, 0], rcond=None)
+    missed = [rest @ np.array([1.0, -share, -late]) for _, rest, _ in known]
+    unexplained = sum(float(e @ e) for e in missed)
+    if rank < 2 or share <= 0.0 or unexplained > (1.0 - LEAST_EXPLAINED) * float(left[:, 0] @ left[:, 0]):
+        return None
+    shared = np.linalg.inv(left[:, 1:].T @ left[:, 1:])
+    noise = _measure_noise(missed)
+    zeros, errors = np.full(len(runs), np.nan), np.full(len(runs), np.nan)
+    for i, line in enumerate(lines):
+        if line is not None:
+            slopes, _, spread = line
+            zeros[i] = (share * slopes[1] + late * slopes[2] - slopes[0]) / share
+            errors[i] = np.sqrt(noise * (1.0 / spread + slopes[1:] @ shared @ slopes[1:])) / share
+    return SpeedByAcceleration(scale=1.0 / share, delay=-late / share, zeros=zeros, errors=errors)
+
+
+def _fit_line(
+    run: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float] | None:
+    """Return slopes over time of the other three columns, what is left of them, and the sum of squares of the time."""
+    if len(run) < FEWEST_SAMPLES:
+        return None
+    time, others = run[:, 0] - run[:, 0].mean(), run[:, 1:] - run[:, 1:].mean(axis=0)
+    spread = float(time @ time)
+    slopes = time @ others / spread
+    return slopes, others - np.outer(time, slopes), spread
+
+
+def _measure_noise(missed: Sequence[NDArray[np.float64]]) -> float:
+    """Return the variance of what is missed, widened by its correlation from sample to sample [m2/s2]."""
+    power = float(np.mean(np.concatenate(missed) ** 2))
+    products = np.concatenate([e[1:] * e[:-1] for e in missed])
+    kept = float(np.clip(np.mean(products) / max(power, 1e-12), 0.0, LONGEST_MEMORY))
+    return power * (1.0 + kept) / (1.0 - kept)
