@@ -38,7 +38,7 @@ JUDGES = (
     "catalogs/effects/",
     "catalogs/decision_rules",
     "catalogs/joint_numbers",
-    "catalogs/studies/closing",
+    "catalogs/studies/closing.",
     "catalogs/surfaces/",
     "catalogs/tyre_families",
     "catalogs/tyres/__init__",

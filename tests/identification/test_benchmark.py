@@ -221,3 +221,8 @@ def test_every_source_that_a_verdict_imports_counts_in_its_hash_or_is_known_to_d
     untold = [file for file in own if not file.startswith((*closing_benchmark.JUDGES, *NO_JUDGE))]
     assert untold == []
     assert all(any(file.startswith(place) for file in source_hashes()) for place in closing_benchmark.JUDGES)
+
+
+def test_the_counts_of_the_benchmark_are_no_source_of_a_verdict() -> None:
+    """Else the file that says which version judged again would make that version another one."""
+    assert not "catalogs/studies/closing_error_rates.json".startswith(closing_benchmark.JUDGES)
