@@ -23,7 +23,7 @@ def test_the_commands_run_on_the_car_of_the_page(tmp_path, monkeypatch):
     new, check, use = (shlex.split(block)[1:] for block in blocks(""))
     run = CliRunner().invoke
     assert run(app, new).exit_code == 0
-    (car,) = blocks("yaml")
+    car, effects = blocks("yaml")
     (tmp_path / "my-car.yaml").write_text(car)
     checked = run(app, check)
     assert checked.exit_code == 0 and "my-car.yaml: every figure is plausible" in checked.output
@@ -31,11 +31,19 @@ def test_the_commands_run_on_the_car_of_the_page(tmp_path, monkeypatch):
     kept, own = (load_vehicle(tmp_path / p) for p in ("datasets/my-car/inputs/vehicle.yaml", "my-car.yaml"))
     assert (kept.mass, kept.families) == (own.mass, own.families) == (1285, own.families)
     assert len(load_tolerances(tmp_path / "my-car.yaml")) == car.count("tolerance:")
+    (tmp_path / "my-car.yaml").write_text(f"{car}\n{effects}\n")
+    checked = run(app, check)
+    assert checked.exit_code == 0 and "my-car.yaml: every figure is plausible" in checked.output
+    assert set(load_vehicle(tmp_path / "my-car.yaml").effects) == {
+        "drag_area",
+        "rolling_coefficient",
+        "engine_torque",
+    }
 
 
 def test_the_sentence_is_what_the_command_says(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (car,) = blocks("yaml")
+    car, _ = blocks("yaml")
     (wrong,) = re.findall(r"`(wheel_radius: \{.*?\})`", TEXT)
     (tmp_path / "my-car.yaml").write_text(re.sub(r"^wheel_radius: .*$", wrong, car, flags=re.M))
     said = CliRunner().invoke(app, ["vehicle", "check", "my-car.yaml"])
