@@ -54,7 +54,7 @@ def predict_runs(trace: Trace | JointTrace) -> tuple[tuple[RunPrediction, ...], 
                     "after": after,
                 },
             )
-            for run, after in zip(runs, trace.predict(runs), strict=True)
+            for run, after in zip(runs, trace.predict_readings(runs), strict=True)
         )
         for runs in (evidence.train, evidence.held_out)
     )

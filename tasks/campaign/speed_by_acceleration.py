@@ -20,7 +20,7 @@ LONGEST_MEMORY = 0.99
 
 @dataclass(frozen=True, kw_only=True)
 class SpeedByAcceleration:
-    """What the accelerometer reads, per rate of speed, and how late the speed is.
+    """Scale, delay and zeros of an accelerometer and a speed that read one motion.
 
     Parameters
     ----------

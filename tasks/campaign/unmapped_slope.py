@@ -53,9 +53,9 @@ def estimate_slopes(
 ) -> dict[str, float]:
     """Return the slope of the road in each run, uphill positive, by what its accelerometer reads [rad].
 
-    What scatters over the runs is slope, drift and the error of each run's; the share of slope counts (James and Stein
-    1961). Without
-    enough runs, or where they scatter no more than a zero drifts, none has a slope.
+    The zeros of the runs scatter by slopes, by drift and by their errors; only the share of the slopes in that counts
+    (James and Stein 1961). No run has a slope where there are fewer than three, or where they scatter no more than
+    drift and errors explain.
 
     Parameters
     ----------

@@ -65,7 +65,7 @@ class Trace:
     compared: tuple[RivalComparison, ...]
     calibrated: tuple[NamedEffect, ...] = ()
 
-    def predict(self, runs: Sequence[RunEvidence]) -> list[NDArray[np.float64]]:
+    def predict_readings(self, runs: Sequence[RunEvidence]) -> list[NDArray[np.float64]]:
         """Return the readings of runs by the grown model, float64 [N, 7] each [units of the channels].
 
         Parameters

@@ -156,8 +156,23 @@ def drop_at_bounds(
         f"the fit ends where {number.say(fitted.by_name[number.name])}, as far as it may go: not named"
         for number in ended
     ]
-    left = refit_numbers(stops, fitted, tuple(n for n in fitted.numbers if n not in ended))
-    return drop_at_bounds(stops, eliminate_uncertain_numbers(stops, left, rules), rules, reasons)
+    return drop_at_bounds(stops, eliminate_without(stops, fitted, ended, rules), rules, reasons)
+
+
+def eliminate_without(
+    stops: Sequence[Stop], fitted: JointFit, gone: Collection[JointNumber], rules: JointRules
+) -> JointFit:
+    """Return the fit of what is certain when some numbers are gone.
+
+    Parameters
+    ----------
+    stops : training runs
+    fitted : with them
+    gone : the numbers
+    rules : of the joint fit
+    """
+    left = refit_numbers(stops, fitted, tuple(n for n in fitted.numbers if n not in gone))
+    return eliminate_uncertain_numbers(stops, left, rules)
 
 
 def add_certain_numbers(

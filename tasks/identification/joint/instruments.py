@@ -17,7 +17,7 @@ from tasks.campaign.speed_by_acceleration import (
 )
 from tasks.identification.inference.driver import SPEED
 from tasks.identification.inference.forward import RunModel
-from tasks.identification.joint.elimination import Substitute, eliminate_uncertain_numbers, refit_numbers
+from tasks.identification.joint.elimination import Substitute, eliminate_without
 from tasks.identification.joint.fit import JointFit
 from tasks.identification.joint.stops import Stop, predict_stop
 from tasks.identification.rules import JointRules
@@ -28,11 +28,11 @@ ACCELERATION = CHANNELS.index("longitudinal_acceleration")
 def relate_instruments(
     models: Sequence[RunModel], readings: Sequence[NDArray[np.float64]]
 ) -> SpeedByAcceleration | None:
-    """Return what speed and accelerometer say of each other; None where too little moves.
+    """Return scale and delay of speed and accelerometer; None where too little moves, or one was not measured.
 
     Parameters
     ----------
-    models : runs in which both were measured
+    models : the runs
     readings : of the two, measured or predicted, float64 [N, 7] each
     """
     runs = []
@@ -46,15 +46,14 @@ def relate_instruments(
 
 
 def make_instrument_check(stops: Sequence[Stop]) -> Callable[[JointFit, str], bool]:
-    """Return whether the instruments themselves contradict what a fit says of one: they agree better without it.
+    """Return the question whether speed and accelerometer contradict a number of a fit: they agree better without it.
 
     Parameters
     ----------
     stops : the runs of the fits
     """
     models = [stop.model for stop in stops]
-    seen = all({SPEED, ACCELERATION} <= set(stop.channels.tolist()) for stop in stops)
-    measured = relate_instruments(models, [m.measured for m in models]) if seen else None
+    measured = relate_instruments(models, [model.measured for model in models])
 
     def predict(fitted: JointFit, numbers: Mapping[str, float]) -> SpeedByAcceleration | None:
         readings = [predict_stop(stop, numbers, own) for stop, own in zip(stops, fitted.offsets, strict=True)]
@@ -94,10 +93,8 @@ def drop_contradicted_instruments(
         " with each other without that: not named"
         for number in wrong
     ]
-    left = refit_numbers(stops, fitted, tuple(n for n in fitted.numbers if n not in wrong))
-    return drop_contradicted_instruments(
-        stops, eliminate_uncertain_numbers(stops, left, rules), rules, reasons
-    )
+    left = eliminate_without(stops, fitted, wrong, rules)
+    return drop_contradicted_instruments(stops, left, rules, reasons)
 
 
 def drop_contradicted_readings(stops: Sequence[Stop], rivals: Sequence[Substitute]) -> list[Substitute]:

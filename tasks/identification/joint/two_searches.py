@@ -66,7 +66,7 @@ def judge_by_two_searches(
         return single
     fitted = fit_all(names_numbers=False)
     share, judged = joint.brake_onset_share, single.start.evidence.held_out
-    before = measure_error_from_brake([run.model for run in judged], single.predict(judged), share)
+    before = measure_error_from_brake([run.model for run in judged], single.predict_readings(judged), share)
     now = measure_error_from_brake(
         [stop.model for stop in fitted.held_out], [y[-1] for y in fitted.predicted], share
     )

@@ -47,7 +47,7 @@ class SingleTrace(Trace):
 
     off: float
 
-    def predict(self, runs):
+    def predict_readings(self, runs):
         return [run.model.measured + self.off for run in runs]
 
 
