@@ -5,16 +5,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from numpy.typing import NDArray
 
 from tasks.render.rasterise.painters_bias import LARGEST_SHIFT, MOST_OVERLAP, interpolate_shift, shift_terms
-from tasks.render.rasterise.painters_bias_torch import means_nearer
-from tasks.render.rasterise.projection import ANTIALIASED_LOW_PASS, X, Y, project_gaussians
+from tasks.render.rasterise.painters_bias_torch import move_nearer
+from tasks.render.rasterise.projection import (
+    ANTIALIASED_LOW_PASS,
+    COLUMN_FALLOFF,
+    ROW_FALLOFF,
+    SLOPE,
+    X,
+    Y,
+    project_gaussians,
+)
 from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tasks.render.rasterise.reference_rasteriser import rasterise_reference
-from tasks.render.rasterise.view import view_of
+from tasks.render.rasterise.view import View, view_of
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.surroundings import add_surroundings
-from tests.render.clouds import HEIGHT, WIDTH, K, make_cloud, random_cloud
+from tests.render.clouds import HEIGHT, WIDTH, K, camera_at, make_cloud, random_cloud, rotation_matrix
 from tests.render.striped_road import crossing_row, striped_road, true_row
 
 AHEAD = np.eye(4)
@@ -89,28 +98,47 @@ def test_the_kernel_draws_what_the_reference_integrates():
     assert np.abs(got.rgb - plain.rgb).max() > 0.1
 
 
-def test_centres_for_a_gpu_project_where_the_kernel_puts_the_splats():
-    level = surround_cloud(random_cloud(600))
-    prepared, view = prepare_gaussians(level), view_of(AHEAD, K, WIDTH, HEIGHT)
-    records, slots = project_gaussians(prepared, view)
+def move_on_gpu(level: Gaussians, view: View) -> list[NDArray[np.float64]]:
+    """Centres and covariances as a GPU's rasteriser takes them."""
     arrays = (level.means, level.quats_wxyz, level.scales, level.normals, level.surroundings)
-    moved = means_nearer(*(torch.from_numpy(array) for array in arrays), view, ANTIALIASED_LOW_PASS).numpy()
-    assert np.array_equal(moved[:, 2], level.means[:, 2])
-    x, y, z = moved[prepared.order[slots]].T
+    moved = move_nearer(*(torch.from_numpy(array) for array in arrays), view, ANTIALIASED_LOW_PASS)
+    return [tensor.numpy().astype(np.float64) for tensor in moved]
+
+
+@pytest.mark.parametrize("turn", [0, 2])
+def test_gaussians_for_a_gpu_project_to_the_kernel_s_splats(turn):
+    """Zwicker et al. (2001), doi:10.1109/VISUAL.2001.964490: the covariance by the derivative of the projection."""
+    level = surround_cloud(random_cloud(600))
+    viewmat = camera_at((0.1, 0.2, 0.0), rotation_matrix(turn)) if turn else AHEAD
+    prepared, view = prepare_gaussians(level), view_of(viewmat, K, WIDTH, HEIGHT)
+    records, slots = project_gaussians(prepared, view)
+    centres, covariances = (array[prepared.order[slots]] for array in move_on_gpu(level, view))
     assert len(slots) > 20
-    assert np.abs(K[0, 0] * x / z + K[0, 2] - records[:, X]).max() < 2e-3
-    assert np.abs(K[1, 1] * y / z + K[1, 2] - records[:, Y]).max() < 2e-3
+    R, focal = viewmat[:3, :3], np.diag(K)[:2]
+    in_camera = centres @ R.T + viewmat[:3, 3]
+    ray = in_camera[:, :2] / in_camera[:, 2:]
+    assert np.abs(focal * ray + K[:2, 2] - records[:, [X, Y]]).max() < 2e-3
+    limits = view.ray_limits.reshape(2, 2)
+    derivative = np.zeros((len(slots), 2, 3))
+    derivative[:, [0, 1], [0, 1]] = focal / in_camera[:, 2:]
+    derivative[:, :, 2] = -np.clip(ray, *limits.T) * focal / in_camera[:, 2:]
+    blur = ANTIALIASED_LOW_PASS * np.eye(2)
+    got = derivative @ R @ covariances @ R.T @ derivative.transpose(0, 2, 1) + blur
+    down = 0.5 / records[:, ROW_FALLOFF]
+    skew = records[:, SLOPE] * down
+    across = 0.5 / records[:, COLUMN_FALLOFF] + skew**2 / down
+    wanted = np.array([[across, skew], [skew, down]]).transpose(2, 0, 1)
+    assert np.abs(got - wanted).max() / wanted.max() < 1e-4
+    assert np.abs(got / wanted - 1)[np.abs(wanted) > 1.0].max() < 1e-2
 
 
 def test_centres_in_the_camera_s_plane_stay_on_a_gpu():
     level = surround_cloud(random_cloud(50))
     means = level.means.copy()
     means[::3, 2] = 0.0
-    arrays = (means, level.quats_wxyz, level.scales, level.normals, level.surroundings)
-    view = view_of(AHEAD, K, WIDTH, HEIGHT)
-    moved = means_nearer(*(torch.from_numpy(array) for array in arrays), view, ANTIALIASED_LOW_PASS).numpy()
-    assert np.isfinite(moved).all()
-    assert np.array_equal(moved[::3], means[::3])
+    centres, covariances = move_on_gpu(replace(level, means=means), view_of(AHEAD, K, WIDTH, HEIGHT))
+    assert np.isfinite(centres).all() and np.isfinite(covariances).all()
+    assert np.array_equal(centres[::3], means[::3])
 
 
 def test_a_cloud_without_surroundings_is_drawn_as_its_trainer_drew_it():

@@ -9,11 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+import torch
 from numpy.typing import NDArray
 
 from tasks.errors import InputError
 from tasks.render.rasterise import backend
 from tasks.render.rasterise.backend import CpuBackend, compare_with_cpu, probe_scene, select_backend
+from tasks.render.rasterise.front_torch import first_below_half
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tests.render.clouds import HEIGHT, WIDTH, K, camera_at, random_cloud, rotation_matrix
@@ -79,11 +81,6 @@ def test_an_unknown_backend_lists_those_that_exist() -> None:
 
 
 def test_gsplats_class_is_found_where_light_falls_below_one_half() -> None:
-    pytest.importorskip("gsplat", reason="gsplat is not installed")
-    import torch
-
-    from tasks.render.rasterise.gsplat_backend import first_below_half
-
     alpha = torch.tensor([0.3, 0.2, 0.9, 0.6, 0.9, 0.2, 0.2, 0.5, 0.1])
     pixel = torch.tensor([0, 0, 0, 3, 3, 4, 4, 6, 6])
     wanted = [False, False, True, True, False, False, False, False, True]

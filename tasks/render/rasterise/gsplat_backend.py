@@ -14,8 +14,10 @@ import torch
 from numpy.typing import NDArray
 
 from tasks.render.rasterise.blending import SURFACE_RATIO
+from tasks.render.rasterise.front_torch import first_below_half
 from tasks.render.rasterise.gbuffer import GBuffer
-from tasks.render.rasterise.painters_bias_torch import means_nearer
+from tasks.render.rasterise.painters_bias_torch import move_nearer
+from tasks.render.rasterise.preparation import morton_order
 from tasks.render.rasterise.projection import NEAR, low_pass
 from tasks.render.rasterise.strips import MAX_ALPHA
 from tasks.render.rasterise.view import view_of
@@ -55,7 +57,7 @@ class GsplatBackend:
             raise RuntimeError("torch finds no CUDA device")
 
     def prepare_gaussians(self, gaussians: Gaussians) -> DeviceGaussians:
-        """Check a cloud and copy it to the device.
+        """Check a cloud and copy it to the device, along the curve of `tasks.render.rasterise.preparation`.
 
         Raises
         ------
@@ -63,15 +65,19 @@ class GsplatBackend:
             An array has a wrong shape, a NaN or a value out of range.
         """
         check_gaussians(gaussians)
+        # centres of one depth are drawn in the order of the cloud: here as on the CPU
+        order = morton_order(gaussians.means)
         return DeviceGaussians(
-            means=self._to_tensor(gaussians.means),
-            quats=self._to_tensor(gaussians.quats_wxyz),
-            scales=self._to_tensor(gaussians.scales),
-            opacities=self._to_tensor(gaussians.opacities),
-            sh=self._to_tensor(gaussians.sh),
-            normals=self._to_tensor(gaussians.normals),
-            class_id=self._to_tensor(gaussians.class_id),
-            surroundings=None if gaussians.surroundings is None else self._to_tensor(gaussians.surroundings),
+            means=self._to_tensor(gaussians.means[order]),
+            quats=self._to_tensor(gaussians.quats_wxyz[order]),
+            scales=self._to_tensor(gaussians.scales[order]),
+            opacities=self._to_tensor(gaussians.opacities[order]),
+            sh=self._to_tensor(gaussians.sh[order]),
+            normals=self._to_tensor(gaussians.normals[order]),
+            class_id=self._to_tensor(gaussians.class_id[order]),
+            surroundings=None
+            if gaussians.surroundings is None
+            else self._to_tensor(gaussians.surroundings[order]),
             antialiased=gaussians.antialiased,
         )
 
@@ -92,9 +98,9 @@ class GsplatBackend:
         colours = (gsplat.spherical_harmonics(degree, direction, prepared.sh) + 0.5).clamp_min(0)
         away = (prepared.normals * direction).sum(dim=1, keepdim=True) > 0
         facing = torch.where(away, -prepared.normals, prepared.normals)
-        means = prepared.means
+        means, covariances = prepared.means, None
         if prepared.surroundings is not None:
-            means = means_nearer(
+            means, covariances = move_nearer(
                 means,
                 prepared.quats,
                 prepared.scales,
@@ -107,6 +113,7 @@ class GsplatBackend:
             means=means,
             quats=prepared.quats,
             scales=prepared.scales,
+            covars=covariances,
             opacities=prepared.opacities,
             colors=torch.cat((colours, facing), dim=1),
             viewmats=self._to_tensor(view.viewmat.astype(np.float32))[None],
@@ -167,26 +174,3 @@ class GsplatBackend:
 
     def _to_tensor(self, array: NDArray[Any]) -> torch.Tensor:
         return torch.from_numpy(np.ascontiguousarray(array)).to(self.device)
-
-
-def first_below_half(alpha: torch.Tensor, pixel: torch.Tensor) -> torch.Tensor:
-    """Return the splats that bring their pixel's transmittance from one half or more to less.
-
-    Parameters
-    ----------
-    alpha : [M] opacity of each splat at its pixel, below 1 [1]
-    pixel : [M] pixel of each, all of one pixel together and nearest first [1]
-
-    Returns
-    -------
-    bool [M]
-    """
-    opaqueness = -torch.log1p(-alpha.double())
-    behind = torch.cumsum(opaqueness, dim=0)
-    front = behind - opaqueness
-    starts = torch.ones_like(pixel, dtype=torch.bool)
-    starts[1:] = pixel[1:] != pixel[:-1]
-    # The sum before the pixel's own first splat.
-    before = front[starts][torch.cumsum(starts, dim=0) - 1]
-    half = np.log(2.0)
-    return (front - before <= half) & (behind - before > half)

@@ -1,4 +1,4 @@
-"""Correction of the painter's bias by moved centres, for a rasteriser that takes means instead of splats.
+"""Correction of the painter's bias by moved Gaussians, for a rasteriser that takes these instead of splats.
 
 The rules of `tasks.render.rasterise.projection`, on tensors.
 """
@@ -12,7 +12,7 @@ from tasks.render.rasterise.view import View
 _FACING = 1e-20
 
 
-def means_nearer(
+def move_nearer(
     means: torch.Tensor,
     quats_wxyz: torch.Tensor,
     scales: torch.Tensor,
@@ -20,8 +20,11 @@ def means_nearer(
     surroundings: torch.Tensor,
     view: View,
     low_pass: float,
-) -> torch.Tensor:
-    """Return world centres that project to the corrected splats; camera z, and so the order, stays but for rounding.
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """Return centres and covariances, in the world, of Gaussians that project to the corrected splats.
+
+    Camera z, and so the order, stays but for rounding. A Gaussian in another place is seen along another ray, which
+    would change its splat: each is sheared across the camera's axis by as much as its ray turns.
 
     Parameters
     ----------
@@ -31,7 +34,8 @@ def means_nearer(
 
     Returns
     -------
-    float32 [N, 3]; centres nearer than the near plane or behind it are not moved [m]
+    float32 [N, 3] centres; those nearer than the near plane or behind it are not moved [m]
+    float32 [N, 3, 3] covariances [m^2]
     """
     R, t = means.new_tensor(view.viewmat[:3, :3]), means.new_tensor(view.viewmat[:3, 3])
     focal = means.new_tensor((view.K[0, 0], view.K[1, 1]))
@@ -59,8 +63,11 @@ def means_nearer(
         / own.sqrt()
         * torch.where(slant > 0, 1.0, -1.0)
     )
-    shift = torch.cat((way[:, None] * along / focal * z, torch.zeros_like(z)), dim=1) @ R
-    return means + torch.where(drawn, shift, 0.0)
+    turn = torch.where(drawn, way[:, None] * along / focal, 0.0)
+    moved = means + torch.cat((turn * z, torch.zeros_like(z)), dim=1) @ R
+    shear = (ray + turn).clamp(limits[:, 0], limits[:, 1]) - bounded
+    sheared = torch.cat((axes[..., :2] + shear[:, None] * axes[..., 2:], axes[..., 2:]), dim=2) @ R
+    return moved, sheared.transpose(1, 2) @ sheared
 
 
 def _interpolate_shift(overlap: torch.Tensor, ratio: torch.Tensor, closeness: torch.Tensor) -> torch.Tensor:
