@@ -20,6 +20,7 @@ class JointRulesEntry(CatalogueEntry):
     fewest_runs: Count
     foreign_misfit: Level
     questioned_misfit: Level
+    missed_share: Share
     noticed_share: Share
     driven_acceleration: Annotated[Scalar, require_quantity("m s-2", above=0)]
     brake_onset_share: Share

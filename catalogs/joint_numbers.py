@@ -22,11 +22,14 @@ class JointNumberEntry(CatalogueEntry):
     lower: Limit
     upper: Limit
     unit: Text
-    group: Literal["gain", "friction", "grip", "radius", "delay", "curve", "resistance", "sensor", "mass"]
+    group: Literal[
+        "gain", "friction", "grip", "radius", "delay", "curve", "resistance", "sensor", "mass", "road"
+    ]
     removable: bool
     needs: Annotated[tuple[Text, ...], Field(min_length=1)]
     source: Text
     of_pressure: bool = False
+    of_grade: bool = False
     free_with: tuple[Text, ...] = ()
     stands_in: bool = False
     weather: Text | None = None
@@ -74,7 +77,7 @@ def load_joint_numbers(path: str | Path = JOINT_NUMBERS) -> tuple[JointNumber, .
         JointNumber(
             name=name, sigma=entry.sigma, lower=entry.lower, upper=entry.upper, group=entry.group,
             removable=entry.removable, needs=entry.needs, effect=effects[name], of_pressure=entry.of_pressure,
-            free_with=entry.free_with, stands_in=entry.stands_in, weather=entry.weather,
+            of_grade=entry.of_grade, free_with=entry.free_with, stands_in=entry.stands_in, weather=entry.weather,
         )
         for name, entry in entries.items()
     )  # fmt: skip

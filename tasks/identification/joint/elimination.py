@@ -149,7 +149,7 @@ def drop_at_bounds(
     rules : of the joint fit
     reasons : is added to
     """
-    ended = [n for n in fitted.numbers if n.removable and n.is_at_bound(fitted.by_name[n.name])]
+    ended = [n for n in fitted.numbers if n.may_go and n.is_at_bound(fitted.by_name[n.name])]
     if not ended:
         return fitted
     reasons += [

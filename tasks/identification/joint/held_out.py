@@ -33,12 +33,12 @@ def drop_what_predicts_worse(
     """
     there = _held_out_misfit(held_out, fitted)
     trials = []
-    for number in fitted.removable_numbers:
+    for number in (n for n in fitted.numbers if n.may_go):
         without = refit_numbers(train, fitted, tuple(n for n in fitted.numbers if n.name != number.name))
         gone = _held_out_misfit(held_out, without)
         # a number earns its name by what it does to any channel, and not against the speed
         better = gone[0] < rules.better_prediction_share * there[0]
-        if better or gone[1] < rules.equal_prediction_share * there[1]:
+        if better or (number.removable and gone[1] < rules.equal_prediction_share * there[1]):
             trials.append((gone, number, without))
     if not trials:
         return fitted
@@ -54,11 +54,16 @@ def drop_what_predicts_worse(
 
 
 def makes_difference(
-    fitted: JointFit, error: Mapping[str, ChannelError], rules: JointRules, reasons: list[str]
+    fitted: JointFit,
+    error: Mapping[str, ChannelError],
+    rules: JointRules,
+    reasons: list[str],
+    over_noise: float,
 ) -> bool:
     """Whether what is named lowers the error of some channel of the held-out runs beside re-tuning; else say so.
 
-    The equations of another car differ a little everywhere, and some number takes up a part of that.
+    The equations of another car differ a little everywhere, and some number takes up a part of that. Where stops are
+    missed with it, too, the car lacks more, and what takes up little of that is most often something else.
 
     Parameters
     ----------
@@ -66,14 +71,16 @@ def makes_difference(
     error : of the held-out runs, by channel
     rules : of the joint fit
     reasons : is added to
+    over_noise : error of the speed over its noise [1]
     """
     named = [n.say(fitted.by_name[n.name]) for n in fitted.numbers if n.removable]
     retuned = {name: replace(e, after=e.retuned) for name, e in error.items()}
-    if not named or is_noticed(error, retuned, rules.noticed_share):
+    share = rules.missed_share if over_noise > rules.foreign_misfit else rules.noticed_share
+    if not named or is_noticed(error, retuned, share):
         return True
     reasons.append(
         f"the training runs suggest that {join_phrases(named)}, but beside re-tuning that makes no difference of"
-        f" {1.0 - rules.noticed_share:.0%} to the error of any channel of the held-out runs: not named"
+        f" {1.0 - share:.0%} to the error of any channel of the held-out runs: not named"
     )
     return False
 

@@ -23,6 +23,8 @@ from tasks.identification.joint.stops import Stop, predict_stop
 from tasks.identification.rules import JointRules
 
 ACCELERATION = CHANNELS.index("longitudinal_acceleration")
+LEFT = 0.5
+"""Share of what the two disagree by that an error of one of them may leave [1]."""
 
 
 def relate_instruments(
@@ -66,8 +68,8 @@ def make_instrument_check(stops: Sequence[Stop]) -> Callable[[JointFit, str], bo
         if told is None or plain is None:
             return False
         if name == "speed_delay":
-            return abs(told.delay - measured.delay) > abs(plain.delay - measured.delay)
-        return abs(told.scale - measured.scale) > abs(plain.scale - measured.scale)
+            return abs(told.delay - measured.delay) > LEFT * abs(plain.delay - measured.delay)
+        return abs(told.scale - measured.scale) > LEFT * abs(plain.scale - measured.scale)
 
     return contradicts
 

@@ -14,9 +14,11 @@ from tasks.vehicle.parameters import compute_surface_response
 
 GAIN = "pressure_gain"
 FRICTION = "friction"
+ROAD = "road"
+"""Group of what is common to the slopes of all runs, where an accelerometer told them."""
 GRIP = "grip"
 """Group of what makes the tyres' limit depend on how they are driven."""
-CALIBRATED = ("gain", FRICTION, "radius")
+CALIBRATED = ("gain", FRICTION, "radius", ROAD)
 """Groups of numbers that re-tuning moves."""
 AT_BOUND = 0.005
 """Share of its range within which a number lies at an end of it [1]."""
@@ -40,6 +42,7 @@ class JointNumber:
     needs : channels of which one must be measured
     effect : of the library, whose first number it is
     of_pressure : sigma is a share of the largest brake pressure of the training runs
+    of_grade : sigma and bounds are in tolerances that the campaign gives for the slope of its road
     free_with : channels without any of which it is never free, but may explain the runs in the place of another number
     stands_in : it is never free, or none of those was measured
     weather : kind of weather on which alone it acts
@@ -54,9 +57,15 @@ class JointNumber:
     needs: tuple[str, ...]
     effect: Effect
     of_pressure: bool = False
+    of_grade: bool = False
     free_with: tuple[str, ...] = ()
     stands_in: bool = False
     weather: str | None = None
+
+    @property
+    def may_go(self) -> bool:
+        """Whether it may be taken away: it must earn its place, or other physics may stand behind it."""
+        return self.removable or self.group == ROAD
 
     def is_at_bound(self, value: float) -> bool:
         """Whether a value lies where the fit had to stop, other than at the vehicle file's.
@@ -110,6 +119,16 @@ def choose_numbers(
             for model in _find_runs_on(number, numbers, models)
         ):
             continue
+        if number.group == ROAD and not any(
+            run.felt_slope and run.road_slope is None for run in campaign.train
+        ):
+            continue  # flat, or the map knows its slopes
+        if number.of_grade:
+            doubt = campaign.tolerances.session[SESSION.index("slope")]
+            number = replace(
+                number, sigma=doubt * number.sigma, lower=doubt * number.lower, upper=doubt * number.upper,
+                of_grade=False,
+            )  # fmt: skip
         if number.of_pressure:
             largest = max(float(model.pressure.max()) for model in models)
             number = replace(

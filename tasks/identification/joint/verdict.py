@@ -18,7 +18,7 @@ from tasks.identification.decision.answer import (
 )
 from tasks.identification.decision.held_out import find_worse_channels, is_lowered
 from tasks.identification.decision.log_faults import tell_log_faults
-from tasks.identification.decision.missed import tell_miss
+from tasks.identification.decision.missed import compare_with_noise, tell_miss
 from tasks.identification.inference.disturbance import Disturbance
 from tasks.identification.joint.calibration import fit_first_numbers, is_gain_unknown
 from tasks.identification.joint.elimination import (
@@ -144,8 +144,12 @@ def judge_jointly(
         predicted = predict_held_out(held_out, retuned, grown)
         return predicted, *summarise_held_out(held_out, predicted, rules)
 
+    def measure_follows(fit: JointFit) -> float:
+        return float(measure_misfit(fit, train)[CHANNELS.index("speed")])
+
     predicted, error, manoeuvres = predict_with(fitted)
-    if not makes_difference(fitted, error, joint, reasons):
+    over_noise = compare_with_noise(campaign, error, measure_follows(fitted))
+    if not makes_difference(fitted, error, joint, reasons, over_noise):
         fitted = retuned
         predicted, error, manoeuvres = predict_with(fitted)
     tolerances = _tolerances(campaign, shown)
@@ -203,8 +207,7 @@ def judge_jointly(
         reasons=tuple(reasons),
         disagreement=disagreement,
     )  # fmt: skip
-    follows = float(measure_misfit(fitted, train)[CHANNELS.index("speed")])
-    verdict = tell_miss(verdict, campaign, joint.foreign_misfit, follows)
+    verdict = tell_miss(verdict, campaign, joint.foreign_misfit, measure_follows(fitted))
     return JointTrace(
         verdict=verdict,
         calibrated=calibrated if effects or is_lowered(error["speed"]) else (),
@@ -292,6 +295,6 @@ def _tolerances(campaign: Campaign, shown: Sequence[JointNumber]) -> dict[str, f
     """Return the declared tolerance of each number that re-tuning moves."""
     session = dict(zip(SESSION, campaign.tolerances.session, strict=True))
     frictions = [n.name for n in shown if n.group == FRICTION]
-    return {name: session[name] for name in (GAIN, "wheel_radius", "mass")} | dict.fromkeys(
+    return {name: session[name] for name in (GAIN, "wheel_radius", "mass", "slope")} | dict.fromkeys(
         frictions, campaign.tolerances.friction
     )

@@ -10,6 +10,7 @@ from catalogs.joint_numbers import load_joint_numbers
 from tasks.campaign.campaign import CHANNELS
 from tasks.campaign.speed_by_acceleration import FEWEST_SAMPLES
 from tasks.identification.inference.forward import RunModel, predict_channels, prepare_run
+from tasks.identification.joint import instruments
 from tasks.identification.joint.elimination import refit_numbers
 from tasks.identification.joint.instruments import (
     drop_contradicted_instruments,
@@ -92,6 +93,18 @@ def test_an_instruments_error_that_the_instruments_show_stays_and_one_that_they_
     # the same of what stands for a named number; other numbers are none of theirs
     rivals = [SimpleNamespace(name=name, fitted=wrong) for name in ("speed_delay", "lag")]
     assert [rival.name for rival in drop_contradicted_readings(late.train, rivals)] == ["lag"]
+
+
+@pytest.mark.parametrize("name", ["acceleration_scale", "speed_delay"])
+@pytest.mark.parametrize(("told", "wrong"), [(0.02, True), (0.04, False), (0.08, False), (0.10, True)])
+def test_an_instruments_error_must_explain_half_of_what_the_two_disagree_by(
+    monkeypatch: pytest.MonkeyPatch, name: str, told: float, wrong: bool
+) -> None:
+    """An accelerometer was 11 % off where it read 6 % more than the rate of speed."""
+    readings = iter(SimpleNamespace(scale=1.0 + off, delay=off) for off in (0.06, told, 0.0))
+    monkeypatch.setattr(instruments, "relate_instruments", lambda *_: next(readings))
+    fitted = SimpleNamespace(by_name={name: told}, offsets=())
+    assert instruments.make_instrument_check([])(fitted, name) is wrong
 
 
 def test_nothing_is_contradicted_where_no_accelerometer_was_measured() -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.joint_numbers import load_joint_numbers
-from tasks.campaign.campaign import CHANNELS, Campaign
+from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
 from tasks.identification.inference.forward import RunModel, simulate_run
 from tasks.identification.joint.numbers import choose_numbers, coasts_down, free_numbers, peak_deceleration
 from tasks.identification.joint.stops import make_stop
@@ -79,6 +79,15 @@ def test_fade_is_free_where_discs_begin_at_different_temperatures():
     assert "fade" not in chosen_priors(stops(), RULES)
     hot = replace(stops()[0], run=replace(stops()[0].run, disc_rise=250.0))
     assert "fade" in chosen_priors([hot, *stops()[1:]], RULES)
+
+
+def test_what_slopes_have_in_common_is_free_where_the_accelerometer_told_them_and_no_map():
+    models = stops()
+    assert "slope" not in chosen_priors(models, RULES)
+    felt = [replace(m, run=replace(m.run, felt_slope=0.02)) for m in models]
+    assert chosen_priors(felt, RULES)["slope"] == TOLERANCES.session[SESSION.index("slope")]
+    mapped = [replace(m, run=replace(m.run, road_slope=np.full(len(m.run.pressure), 0.02))) for m in felt]
+    assert "slope" not in chosen_priors(mapped, RULES)
 
 
 @pytest.mark.parametrize("engine", [None, -150.0])

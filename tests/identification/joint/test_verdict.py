@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from catalogs.joint_numbers import load_joint_numbers
-from tasks.campaign.campaign import CHANNELS, SESSION
+from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
 from tasks.identification.decision.answer import NamedEffect
 from tasks.identification.joint import verdict
 from tasks.identification.joint.calibration import needs_joint_fit
@@ -15,7 +15,7 @@ from tasks.identification.joint.elimination import (
 )
 from tasks.identification.joint.verdict import JointTrace, judge_jointly
 from tasks.vehicle.effects.table import build_parameter_vector
-from tests.identification.joint.known_car import FEW, RULES, campaign_of, judge_car, slow_brakes
+from tests.identification.joint.known_car import FEW, RULES, campaign_of, judge_car, own_channels, slow_brakes
 from tests.identification.synthetic import SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
 
@@ -61,7 +61,7 @@ def test_a_mass_and_frictions_are_wrong_by_the_tolerances_of_their_campaign():
     campaign = campaign_of({})
     found = verdict._tolerances(campaign, [numbers["wet_friction"], numbers["lag"]])
     session = dict(zip(SESSION, campaign.tolerances.session, strict=True))
-    named = {name: session[name] for name in ("pressure_gain", "wheel_radius", "mass")}
+    named = {name: session[name] for name in ("pressure_gain", "wheel_radius", "mass", "slope")}
     assert found == named | {"wet_friction": campaign.tolerances.friction}
 
 
@@ -75,6 +75,43 @@ def test_a_car_that_is_as_its_file_says_lacks_nothing():
     trace = judge_car(campaign_of({}))
     assert trace.verdict.verdict == "NOTHING" and not named_intervals(trace)
     assert trace.fitted.by_name["pressure_gain"] == pytest.approx(0.0, abs=0.01)
+
+
+def hilly_campaign(common: float, tolerance: float = 0.01) -> Campaign:
+    """Runs on three slopes, of which an import knows all but what they have in common [rad]."""
+    flat, slopes = campaign_of({}), (-0.01, 0.0, 0.02)
+    runs = []
+    for i, (run, slope) in enumerate(zip(flat.runs, slopes, strict=True)):
+        driven = measured(replace(run, felt_slope=slope + common), build_parameter_vector({}), 70 + i).run
+        seen = own_channels(driven, flat.channels, run.held_out)
+        runs.append(replace(seen, felt_slope=slope))
+    session = (*flat.tolerances.session[:-1], tolerance)
+    return replace(flat, runs=tuple(runs), tolerances=replace(flat.tolerances, session=session))
+
+
+BRAKES_AND_ROAD = tuple(
+    n for n in load_joint_numbers() if n.name in {"pressure_gain", "lag", "push_out", "slope"}
+)
+
+
+def test_what_all_felt_slopes_have_in_common_is_the_roads_and_no_fault_of_the_brakes():
+    """A car that lacked nothing had a dead band of 0.11 MPa, for its runs were on slopes 1.5 % lower than taken."""
+    trace = judge_car(hilly_campaign(-0.012), numbers=BRAKES_AND_ROAD)
+    assert trace.verdict.verdict == "NOTHING"
+    assert trace.fitted.by_name["slope"] == pytest.approx(-0.012, abs=0.002)
+    assert trace.fitted.by_name["pressure_gain"] == pytest.approx(0.0, abs=0.02)
+    # re-tuning moves what is no name
+    steeper = judge_car(hilly_campaign(0.012), numbers=BRAKES_AND_ROAD).verdict.error["speed"]
+    assert steeper.retuned == pytest.approx(steeper.after, rel=1e-3)
+    unknown = judge_car(hilly_campaign(-0.012), numbers=[n for n in BRAKES_AND_ROAD if n.name != "slope"])
+    assert abs(unknown.fitted.by_name["pressure_gain"]) > 0.03 or len(unknown.fitted.by_name) > 1
+
+
+def test_a_common_slope_that_would_be_steeper_than_two_tolerances_is_none():
+    """A force that holds a racing car back looks like a hill of 8 %: it is not one."""
+    trace = judge_car(hilly_campaign(-0.03), numbers=BRAKES_AND_ROAD)
+    assert "slope" not in trace.fitted.by_name
+    assert any("the road falls or climbs by -0.02" in reason for reason in trace.verdict.reasons)
 
 
 def test_a_number_of_the_file_is_wrong_only_beyond_as_many_tolerances_as_the_rules_say():
