@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from catalogs.channel_maps import HIGHEST_RATE
-from catalogs.channel_maps.conditions import condition_problems
+from catalogs.channel_maps.conditions import find_condition_problems
 from catalogs.documents import LARGEST_YAML, read_content
-from catalogs.names import name_problem
+from catalogs.names import find_name_problem
 from catalogs.quantities import Text
 from catalogs.sentences import shorten, shorten_value
 from tasks.errors import InputError
-from tasks.surface.weather import weather_problem
+from tasks.surface.weather import find_weather_problem
 
 LARGEST_TABLE = 64 * 2**20
 """Bytes of runs.csv [1]: a line of 200 bytes for each of 300,000 runs."""
@@ -104,18 +104,20 @@ def parse_rows(content: bytes, needed: Collection[str], numbers: Collection[str]
         raise InputError(problems)
     seen: set[str] = set()
     for number, row in enumerate(rows, start=1):
-        problems += _row_problems(row, numbers, f"runs.csv, run {number}", seen)
+        problems += _find_row_problems(row, numbers, f"runs.csv, run {number}", seen)
     if problems:
         raise InputError(problems)
     return rows
 
 
-def _row_problems(row: dict[str, str], numbers: Collection[str], place: str, seen: set[str]) -> list[str]:
+def _find_row_problems(
+    row: dict[str, str], numbers: Collection[str], place: str, seen: set[str]
+) -> list[str]:
     if None in row or None in row.values():
         return [f"{place}: must have as many fields as there are columns"]
     problems = []
     name = row["run"]
-    if problem := name_problem(name):
+    if problem := find_name_problem(name):
         return [f"{place}: a run's name must {problem}"]
     if name in seen:
         problems.append(f"{name}: stands twice in runs.csv: give each run its own name")
@@ -123,11 +125,11 @@ def _row_problems(row: dict[str, str], numbers: Collection[str], place: str, see
     numbers = [key for key in numbers if key in row]
     wrong = [key for key in numbers if not _is_number(row[key])]
     problems += [f"{name}: {key} must be a finite number; it is {shorten_value(row[key])}" for key in wrong]
-    if problem := weather_problem(row["weather"]):
+    if problem := find_weather_problem(row["weather"]):
         problems.append(f"{name}: weather {problem}")
     elif not wrong:
         facts = {"weather": row["weather"], **{key: float(row[key]) for key in numbers}}
-        problems += [f"{name}: {problem}" for problem in condition_problems(facts)]
+        problems += [f"{name}: {problem}" for problem in find_condition_problems(facts)]
     return problems
 
 
@@ -158,7 +160,7 @@ def parse_columns(
         with pq.ParquetFile(pa.BufferReader(content)) as parquet:
             schema, count = parquet.schema_arrow, parquet.metadata.num_rows
             found = [name for name in schema.names if name in names]
-            problems = _column_problems(schema, found, count, file)
+            problems = _find_column_problems(schema, found, count, file)
             if problems:
                 raise InputError(problems)
             table = parquet.read(columns=found)
@@ -171,7 +173,7 @@ def parse_columns(
     return columns, {name: unit for name, unit in units.items() if unit is not None}
 
 
-def unit_problems(units: Mapping[str, str], wanted: Mapping[str, str], file: str) -> list[str]:
+def find_unit_problems(units: Mapping[str, str], wanted: Mapping[str, str], file: str) -> list[str]:
     """Return a sentence for each column whose file states another unit than its reader takes.
 
     Parameters
@@ -187,7 +189,7 @@ def unit_problems(units: Mapping[str, str], wanted: Mapping[str, str], file: str
     ]
 
 
-def _column_problems(schema: pa.Schema, found: Sequence[str], count: int, file: str) -> list[str]:
+def _find_column_problems(schema: pa.Schema, found: Sequence[str], count: int, file: str) -> list[str]:
     problems = [
         f"{file} must have distinct columns; {name} stands there twice"
         for name in dict.fromkeys(found)

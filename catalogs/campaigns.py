@@ -18,7 +18,7 @@ from catalogs.channel_maps.tolerances import Tolerances as TolerancesEntry
 from catalogs.documents import read_content
 from catalogs.quantities import Text, parse_entry
 from catalogs.sentences import cap_problems, shorten, shorten_value
-from tasks.campaign.brake_gain import gain_problems
+from tasks.campaign.brake_gain import find_gain_problems
 from tasks.campaign.campaign import (
     CHANNELS,
     SESSION,
@@ -30,7 +30,7 @@ from tasks.campaign.campaign import (
 from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME, SpeedSource
 from tasks.campaign.resting_pressure import find_brake_rest, measure_resting_levels
 from tasks.campaign.resting_throttle import find_throttle_rest
-from tasks.campaign.run_validation import COLUMN_UNITS, motion_problem, run_problems
+from tasks.campaign.run_validation import COLUMN_UNITS, find_motion_problem, find_recording_problems
 from tasks.campaign.slow_channels import collect_samples, fill_between_samples
 from tasks.errors import InputError
 from tasks.surface.weather import DRY
@@ -107,9 +107,9 @@ def read_campaign(folder: str | Path) -> Campaign:
     header_bytes, table_bytes = read_header_bytes(folder)
     header, rows = _read_header_and_runs(folder, header_bytes, table_bytes)
     train, held_out = header.split.train, header.split.held_out
-    problems = _split_problems([row["run"] for row in rows], train, held_out)
-    problems += _channel_problems(header.not_measured)
-    problems += _brake_problems(header)
+    problems = _find_split_problems([row["run"] for row in rows], train, held_out)
+    problems += _find_channel_problems(header.not_measured)
+    problems += _find_brake_problems(header)
     signal = _find_brake_signal(header)
     needed = [name for name in ("time", signal, *NEEDED, *CHANNELS) if name not in header.not_measured]
     needed = list(dict.fromkeys(needed))
@@ -130,7 +130,7 @@ def read_campaign(folder: str | Path) -> Campaign:
                 )
             columns, units = parse_columns(content, path.name, COLUMN_UNITS)
             columns = {name: values for name, values in columns.items() if name not in header.not_measured}
-            found = run_problems(
+            found = find_recording_problems(
                 columns, units, interval, needed, brake_stands_in=header.brake_stands_for is not None
             )
         except InputError as error:
@@ -145,13 +145,13 @@ def read_campaign(folder: str | Path) -> Campaign:
             run = _make_run(
                 row, columns, interval, held_out=row["run"] in judged, of_wheels=header.speed_from == "wheels"
             )
-            if problem := motion_problem(run.speed, interval, run.hazard_length > 0.0):
+            if problem := find_motion_problem(run.speed, interval, run.hazard_length > 0.0):
                 problems.append(f"{run.name}: {problem}")
             first, _ = find_motion(run.speed)
             runs.append(run.begin_at(first) if first else run)
     if header.brake_stands_for is None:
         slippery = [row["run"] for row in rows if row["weather"] != DRY]
-        problems += gain_problems(readable, interval, slippery=slippery)
+        problems += find_gain_problems(readable, interval, slippery=slippery)
     if problems:
         raise InputError(cap_problems([f"{shorten(folder.name)}: {problem}" for problem in problems]))
     zero = 0.0
@@ -211,7 +211,7 @@ def _read_header_and_runs(
     return checked, rows
 
 
-def _split_problems(names: Sequence[str], train: Sequence[str], held_out: Sequence[str]) -> list[str]:
+def _find_split_problems(names: Sequence[str], train: Sequence[str], held_out: Sequence[str]) -> list[str]:
     problems = [
         f"{shorten(name, 60)}: is in both parts of the split" for name in sorted(set(train) & set(held_out))
     ]
@@ -233,7 +233,7 @@ def _split_problems(names: Sequence[str], train: Sequence[str], held_out: Sequen
     return problems
 
 
-def _channel_problems(not_measured: Sequence[str]) -> list[str]:
+def _find_channel_problems(not_measured: Sequence[str]) -> list[str]:
     """Sentences on channels that do not exist, and on those without which nothing can be judged."""
     problems = [
         f"not_measured: {shorten_value(name)} is no channel; there are: {', '.join(CHANNELS_BY_NAME)}"
@@ -247,7 +247,7 @@ def _channel_problems(not_measured: Sequence[str]) -> list[str]:
     return problems
 
 
-def _brake_problems(header: MeasuredHeader) -> list[str]:
+def _find_brake_problems(header: MeasuredHeader) -> list[str]:
     """Sentences on a campaign of which nobody can say how hard the driver braked."""
     signal = _find_brake_signal(header)
     if signal not in BRAKE_SIGNALS:

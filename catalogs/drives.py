@@ -8,10 +8,10 @@ import numpy as np
 from catalogs.campaign_files import (
     LARGEST_RUN,
     CampaignHeader,
+    find_unit_problems,
     parse_columns,
     parse_rows,
     read_header_bytes,
-    unit_problems,
 )
 from catalogs.documents import read_content
 from catalogs.quantities import parse_entry
@@ -73,7 +73,7 @@ def read_drives(folder: str | Path, *, needed: tuple[str, ...] = NEEDED) -> Driv
             problems += [f"{row['run']}: {problem}" for problem in error.problems]
             continue
         columns = {name: fill_between_samples(name, values) for name, values in columns.items()}
-        problems += unit_problems(units, COLUMN_UNITS, row["run"])
+        problems += find_unit_problems(units, COLUMN_UNITS, row["run"])
         problems += [f"{row['run']}: channel {name} is missing" for name in needed if name not in columns]
         problems += [
             f"{row['run']}: channel {name} has a gap; import the recording again"

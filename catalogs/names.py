@@ -5,13 +5,13 @@ from typing import Annotated
 from pydantic import AfterValidator, Field, WithJsonSchema
 
 from catalogs.sentences import is_encodable, shorten_value
-from tasks.surface.weather import WEATHERS, weather_problem
+from tasks.surface.weather import WEATHERS, find_weather_problem
 
 LONGEST_NAME = 100
 """Characters of a name [1]: a label of several names still fits a file name of 255 bytes."""
 
 
-def name_problem(name: str) -> str | None:
+def find_name_problem(name: str) -> str | None:
     """Why the text cannot be a name, as the rest of a sentence after "must"; None where it can.
 
     Parameters
@@ -27,31 +27,31 @@ def name_problem(name: str) -> str | None:
     return None
 
 
-def label_problem(label: str) -> str | None:
-    """As `name_problem`, for a label: names joined by slashes.
+def find_label_problem(label: str) -> str | None:
+    """As `find_name_problem`, for a label: names joined by slashes.
 
     Parameters
     ----------
     label : such as of a level of an axis
     """
-    problems = map(name_problem, label.split("/"))
+    problems = map(find_name_problem, label.split("/"))
     return next((problem for problem in problems if problem), None)
 
 
 def _check_name(name: str) -> str:
-    if problem := name_problem(name):
+    if problem := find_name_problem(name):
         raise ValueError(f"a name must {problem}")
     return name
 
 
 def _check_label(label: str) -> str:
-    if problem := label_problem(label):
+    if problem := find_label_problem(label):
         raise ValueError(f"a label must {problem}")
     return label
 
 
 def _check_weather(name: str) -> str:
-    if problem := weather_problem(name):
+    if problem := find_weather_problem(name):
         raise ValueError(problem)
     return name
 

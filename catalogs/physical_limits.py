@@ -39,7 +39,7 @@ def load_physical_limits() -> PhysicalLimits:
     return read_entry(PhysicalLimits, PHYSICAL_LIMITS, "table of physical limits")
 
 
-def limit_problem(name: str, value: float, limit: Scalar) -> str | None:
+def find_limit_problem(name: str, value: float, limit: Scalar) -> str | None:
     """A sentence where a value exceeds its limit, else None.
 
     Parameters

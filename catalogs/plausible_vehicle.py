@@ -75,7 +75,7 @@ def load_plausible_vehicle() -> PlausibleVehicle:
     return read_entry(PlausibleVehicle, PLAUSIBLE_VEHICLE, "table of plausible figures")
 
 
-def plausibility_problems(figures: Mapping[str, float], tolerances: Mapping[str, float]) -> list[str]:
+def find_plausibility_problems(figures: Mapping[str, float], tolerances: Mapping[str, float]) -> list[str]:
     """Return a sentence for each figure and each tolerance of a vehicle that is implausible.
 
     Parameters

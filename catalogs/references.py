@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AliasChoices, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from catalogs.campaign_files import parse_columns, unit_problems
+from catalogs.campaign_files import find_unit_problems, parse_columns
 from catalogs.documents import LARGEST_YAML, parse_json, read_content
 from catalogs.names import Name, WeatherName
-from catalogs.physical_limits import limit_problem, load_physical_limits
+from catalogs.physical_limits import find_limit_problem, load_physical_limits
 from catalogs.sentences import cap_problems, describe_rules, shorten_value
 from tasks.errors import InputError
 from tasks.eval.state_agreement import REFERENCE_COLUMNS, CaseFacts
@@ -82,7 +82,7 @@ class ReferenceCase(BaseModel):
             "hazard_length_m": (self.hazard_length_m, limits.hazard_length),
             "hazard_height_m": (abs(self.hazard_height_m), limits.hazard_height),
         }
-        found = [limit_problem(name, value, limit) for name, (value, limit) in bounded.items()]
+        found = [find_limit_problem(name, value, limit) for name, (value, limit) in bounded.items()]
         if problems := [problem for problem in found if problem]:
             raise ValueError("; ".join(problems))
         return self
@@ -209,7 +209,7 @@ def _with_trace(folder: Path, case: ReferenceCase) -> tuple[ReferenceCase, Trace
     if missing:
         raise InputError(f"{path}: a trace needs the columns {', '.join(missing)}; they are missing")
     columns = {name: held[name] for name in (*REFERENCE_COLUMNS, *OPTIONAL_COLUMNS) if name in held}
-    problems = unit_problems(units, TRACE_UNITS, str(path))
+    problems = find_unit_problems(units, TRACE_UNITS, str(path))
     problems += [
         f"{path}: column {name} must hold numbers throughout; {int(np.sum(~np.isfinite(values)))} are not"
         for name, values in columns.items()
@@ -218,7 +218,7 @@ def _with_trace(folder: Path, case: ReferenceCase) -> tuple[ReferenceCase, Trace
     if not problems and not (len(columns["time"]) > 1 and (np.diff(columns["time"]) > 0).all()):
         problems.append(f"{path}: column time must hold at least two ascending times")
     if not problems:
-        problems = [f"{path}: {problem}" for problem in _quantity_problems(case, columns)]
+        problems = [f"{path}: {problem}" for problem in _find_quantity_problems(case, columns)]
     if problems:
         raise InputError(problems)
     if case.peak_pressure_mpa and case.brake_onset_s is None and case.brake_onset_m is None:
@@ -226,7 +226,7 @@ def _with_trace(folder: Path, case: ReferenceCase) -> tuple[ReferenceCase, Trace
     return case, columns
 
 
-def _quantity_problems(case: ReferenceCase, columns: Traces) -> list[str]:
+def _find_quantity_problems(case: ReferenceCase, columns: Traces) -> list[str]:
     """Sentences on columns that contradict the case or each other by more than a factor: units that were mixed up."""
     time, station, speed = columns["time"], columns["station"], columns["speed"]
     begun, announced = float(speed[0]), case.initial_speed_km_h / 3.6

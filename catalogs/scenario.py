@@ -7,7 +7,7 @@ from operator import attrgetter
 from typing import Any
 
 from catalogs.names import WeatherName
-from catalogs.physical_limits import PhysicalLimits, limit_problem, load_physical_limits
+from catalogs.physical_limits import PhysicalLimits, find_limit_problem, load_physical_limits
 from catalogs.quantities import Scalar
 from tasks.surface.weather import DRY, WEATHERS, find_weather
 
@@ -63,7 +63,7 @@ UNKNOWN_WEATHER = "unknown"
 """Replaces a weather that could not be read, as NaN replaces a number: no rule applies to either."""
 
 
-def scenario_problems(scenario: Scenario, unknown: Collection[str] = ()) -> list[str]:
+def find_scenario_problems(scenario: Scenario, unknown: Collection[str] = ()) -> list[str]:
     """Every rule the scenario breaks by itself, each as one sentence; empty when it is sound.
 
     Parameters
@@ -77,8 +77,8 @@ def scenario_problems(scenario: Scenario, unknown: Collection[str] = ()) -> list
         for name in NUMBERS
         if (value := getattr(s, name)) is not None and not isfinite(value) and name not in unknown
     ]
-    problems += range_problems(s)
-    problems += _weather_problems(s)
+    problems += find_range_problems(s)
+    problems += _find_weather_problems(s)
     if s.peak_pressure_mpa > 0 and (s.brake_onset_s is None) == (s.brake_onset_m is None):
         problems.append(
             "braking (peak_pressure_mpa above 0) needs exactly one of brake_onset_s and brake_onset_m"
@@ -98,7 +98,7 @@ def scenario_problems(scenario: Scenario, unknown: Collection[str] = ()) -> list
     return problems
 
 
-def _weather_problems(s: Scenario) -> list[str]:
+def _find_weather_problems(s: Scenario) -> list[str]:
     """Rules of the row of its kind of weather that the scenario breaks."""
     if s.weather == UNKNOWN_WEATHER:
         return []
@@ -122,7 +122,7 @@ def _weather_problems(s: Scenario) -> list[str]:
     return problems
 
 
-def range_problems(scenario: Scenario) -> list[str]:
+def find_range_problems(scenario: Scenario) -> list[str]:
     """Every number of the scenario that no scenario may have, whatever the others are, each as one sentence.
 
     Parameters
@@ -134,7 +134,7 @@ def range_problems(scenario: Scenario) -> list[str]:
     if scenario.initial_speed_km_h <= 0:
         problems.append(f"initial_speed_km_h must be positive; it is {scenario.initial_speed_km_h:g}")
     limited = _list_limits(scenario, load_physical_limits())
-    return problems + [problem for one in limited if (problem := limit_problem(*one)) is not None]
+    return problems + [problem for one in limited if (problem := find_limit_problem(*one)) is not None]
 
 
 def _list_limits(s: Scenario, limits: PhysicalLimits) -> list[tuple[str, float, Scalar]]:
@@ -156,13 +156,13 @@ def _list_limits(s: Scenario, limits: PhysicalLimits) -> list[tuple[str, float, 
     limited += [
         (name, value, limit) for name, limit in by_name.items() if (value := getattr(s, name)) is not None
     ]
-    if kind and kind.accumulates and not any(limit_problem(*one) for one in limited):
+    if kind and kind.accumulates and not any(find_limit_problem(*one) for one in limited):
         fallen = s.precipitation_mm_h * s.snow_accumulation_h
         limited.append(("precipitation_mm_h times snow_accumulation_h", fallen, limits.snow_water_equivalent))
     return limited
 
 
-def route_problems(scenario: Scenario, route_length_m: float, scene: str) -> list[str]:
+def find_route_problems(scenario: Scenario, route_length_m: float, scene: str) -> list[str]:
     """Rules that tie the scenario to the route it drives on."""
     if scenario.hazard_height_m == 0:
         return []

@@ -55,7 +55,7 @@ def load_yaml(text: str, start: str, *, finite: bool) -> Any:
         node = loader.get_single_node()
         if node is None:
             return None
-        if problems := _node_problems(loader, node, finite):
+        if problems := _find_node_problems(loader, node, finite):
             raise InputError(cap_problems([f"{start} {problem}" for problem in problems]))
         return loader.construct_document(node)
     except yaml.MarkedYAMLError as error:
@@ -104,7 +104,7 @@ def _check_shape(text: str, start: str) -> None:
             )
 
 
-def _node_problems(loader: Any, root: yaml.Node, finite: bool) -> list[str]:
+def _find_node_problems(loader: Any, root: yaml.Node, finite: bool) -> list[str]:
     """Faults of keys and values, in the order of the text."""
     found: list[tuple[int, str]] = []
     waiting, seen = [root], {id(root)}
@@ -112,11 +112,11 @@ def _node_problems(loader: Any, root: yaml.Node, finite: bool) -> list[str]:
         node = waiting.pop()
         children: list[yaml.Node] = []
         if isinstance(node, yaml.MappingNode):
-            found += _key_problems(node)
+            found += _find_key_problems(node)
             children = [value for _, value in node.value]
         elif isinstance(node, yaml.SequenceNode):
             children = node.value
-        problem = _value_problem(loader, node, finite)
+        problem = _find_value_problem(loader, node, finite)
         if problem:
             found.append((node.start_mark.line, problem))
         for child in children:
@@ -126,7 +126,7 @@ def _node_problems(loader: Any, root: yaml.Node, finite: bool) -> list[str]:
     return [f"{problem} (line {line + 1})" for line, problem in sorted(found, key=lambda one: one[0])]
 
 
-def _key_problems(node: yaml.MappingNode) -> list[tuple[int, str]]:
+def _find_key_problems(node: yaml.MappingNode) -> list[tuple[int, str]]:
     found, keys = [], set()
     for key, _ in node.value:
         line = key.start_mark.line
@@ -142,7 +142,7 @@ def _key_problems(node: yaml.MappingNode) -> list[tuple[int, str]]:
     return found
 
 
-def _value_problem(loader: Any, node: yaml.Node, finite: bool) -> str | None:
+def _find_value_problem(loader: Any, node: yaml.Node, finite: bool) -> str | None:
     plain = _SCALAR_TAGS
     if isinstance(node, yaml.CollectionNode):
         plain = (_TAG + ("map" if isinstance(node, yaml.MappingNode) else "seq"),)

@@ -205,7 +205,7 @@ def check_record(form: type[Record], value: Any, place: object) -> Record:
         record: Record = _ADAPTERS[form].validate_python(value)
     except ValidationError as error:
         raise InputError(cap_problems(describe_rules(error, place))) from None
-    problems = _clip_problems(value.get("clips", []))
+    problems = _find_clip_problems(value.get("clips", []))
     if problems:
         raise InputError([f"{place}: {problem}" for problem in problems])
     return record
@@ -216,7 +216,7 @@ _ADAPTERS: dict[Any, TypeAdapter[Any]] = {
 }
 
 
-def _clip_problems(clips: Sequence[Mapping[str, Any]]) -> list[str]:
+def _find_clip_problems(clips: Sequence[Mapping[str, Any]]) -> list[str]:
     """Rules that bind the clips of one record together."""
     rules = {
         "every clip must have a label of its own; some have the same": _are_distinct(clips, "label"),

@@ -136,7 +136,7 @@ def add_signature(manifest: bytes, envelope: bytes | None, signer: CryptoSigner)
     return canonical_bytes(held.to_dict())
 
 
-def signature_problems(manifest: bytes, envelope: bytes | None, key: SSlibKey) -> list[str]:
+def find_signature_problems(manifest: bytes, envelope: bytes | None, key: SSlibKey) -> list[str]:
     """Why a key does not vouch for a manifest; empty when its signature over these very bytes is valid.
 
     What a statement says is looked at only after its signature holds.
@@ -170,7 +170,9 @@ def signature_problems(manifest: bytes, envelope: bytes | None, key: SSlibKey) -
         statement = parse_json(held.payload, ENVELOPE, "signed statement")
     except InputError as error:
         return list(error.problems)
-    return [f"{ENVELOPE}: {problem}" for problem in _statement_problems(statement, sha256_of([manifest]))]
+    return [
+        f"{ENVELOPE}: {problem}" for problem in _find_statement_problems(statement, sha256_of([manifest]))
+    ]
 
 
 def read_envelope(content: bytes) -> Envelope:
@@ -198,7 +200,7 @@ def read_envelope(content: bytes) -> Envelope:
     return held
 
 
-def _statement_problems(statement: Any, digest: str) -> list[str]:
+def _find_statement_problems(statement: Any, digest: str) -> list[str]:
     """List the reasons why a signed statement is not about the manifest with this hash."""
     if not isinstance(statement, Mapping) or statement.get("_type") != STATEMENT_TYPE:
         return [f"the signed statement must be of type {STATEMENT_TYPE}; it is not"]

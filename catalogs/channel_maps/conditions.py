@@ -5,7 +5,7 @@ from typing import Any, Literal
 
 from catalogs.names import WeatherName
 from catalogs.quantities import CatalogueEntry, Number
-from catalogs.scenario import SCENARIO_FIELDS, Scenario, scenario_problems
+from catalogs.scenario import SCENARIO_FIELDS, Scenario, find_scenario_problems
 from tasks.surface.weather import DRY
 
 
@@ -22,11 +22,13 @@ class Conditions(CatalogueEntry):
     hazard_height_m: Number = 0.0
 
 
-def condition_problems(facts: Mapping[str, Any]) -> list[str]:
+def find_condition_problems(facts: Mapping[str, Any]) -> list[str]:
     """Rules of a scenario that a run's weather and road break; other facts are left out.
 
     Parameters
     ----------
     facts : weather and numbers by the names of `Scenario`
     """
-    return scenario_problems(Scenario(**{name: facts[name] for name in SCENARIO_FIELDS if name in facts}))
+    return find_scenario_problems(
+        Scenario(**{name: facts[name] for name in SCENARIO_FIELDS if name in facts})
+    )

@@ -11,7 +11,7 @@ from catalogs.grids.blocks import fields_set_by, list_combinations
 from catalogs.grids.faults import read_form
 from catalogs.grids.form import GridFile
 from catalogs.grids.selection import CALIBRATION, facts_of, split_of
-from catalogs.scenario import UNKNOWN_WEATHER, Scenario, range_problems, scenario_problems
+from catalogs.scenario import UNKNOWN_WEATHER, Scenario, find_range_problems, find_scenario_problems
 from catalogs.sentences import cap_problems, name_some, shorten
 from tasks.errors import InputError
 
@@ -89,7 +89,7 @@ def expand_grid(settings: GridFile, place: str) -> Grid:
     """The product of the blocks, later ones over earlier ones over ``base``, less what is excluded, each checked."""
     base = fields_set_by(settings.base)
     # a value that every level overrides is checked too: it is in the file
-    problems: dict[str, list[str]] = {problem: ["base"] for problem in range_problems(Scenario(**base))}
+    problems: dict[str, list[str]] = {problem: ["base"] for problem in find_range_problems(Scenario(**base))}
     scenarios, tags, left_out = [], [], 0
     labels: set[str] = set()
     idle = set(range(len(settings.exclude)))
@@ -110,7 +110,7 @@ def expand_grid(settings: GridFile, place: str) -> Grid:
         scenarios.append((label, scenario))
         tags.append((split or "", facts[CALIBRATION]))
         # of what cannot be read in full nobody knows whether it is excluded
-        found = [] if unknown and settings.exclude else scenario_problems(scenario, unknown)
+        found = [] if unknown and settings.exclude else find_scenario_problems(scenario, unknown)
         if settings.splits and split is None and not unknown:
             found.append("belongs to no split: end them with one whose condition is {}")
         if len(label.encode()) > LONGEST_LABEL:

@@ -8,7 +8,7 @@ from catalogs.grids.blocks import Blocks, PartialScenario, Whole, count_combinat
 from catalogs.grids.blocks import Number as LaxNumber
 from catalogs.grids.selection import Condition
 from catalogs.names import Name
-from catalogs.physical_limits import limit_problem, load_physical_limits
+from catalogs.physical_limits import find_limit_problem, load_physical_limits
 from catalogs.variants import Variant
 
 LIMITS = load_physical_limits()
@@ -77,7 +77,9 @@ class GridFile(Blocks):
     @classmethod
     def _clips_are_short_enough(cls, rate: float, info: ValidationInfo) -> float:
         frames = info.data.get("frames", 2)
-        if problem := limit_problem("(frames - 1) / frame_rate_hz", (frames - 1) / rate, LIMITS.duration):
+        if problem := find_limit_problem(
+            "(frames - 1) / frame_rate_hz", (frames - 1) / rate, LIMITS.duration
+        ):
             raise ValueError(problem)
         return rate
 
@@ -86,7 +88,7 @@ class GridFile(Blocks):
     def _telemetry_covers_the_frames(cls, duration: float | None, info: ValidationInfo) -> float | None:
         if duration is None or not {"frames", "frame_rate_hz"} <= info.data.keys():
             return duration
-        if problem := limit_problem("duration_s", duration, LIMITS.duration):
+        if problem := find_limit_problem("duration_s", duration, LIMITS.duration):
             raise ValueError(problem)
         if abs(duration * 1000 - round(duration * 1000)) > 1e-6:
             raise ValueError(f"must be whole milliseconds; it is {duration} s")

@@ -10,7 +10,7 @@ from catalogs.calibrated_range import CALIBRATION_TAGS, calibration_tag, load_ca
 from catalogs.grids.blocks import Number, Strict
 from catalogs.scenario import NUMBERS, SCENARIO_FIELDS, Scenario
 from catalogs.sentences import shorten_value
-from tasks.surface.weather import weather_problem
+from tasks.surface.weather import find_weather_problem
 
 CALIBRATION = "calibration"
 Value = bool | str | float
@@ -66,7 +66,7 @@ class Condition(RootModel[dict[str, Value | Annotated[list[Value], Field(min_len
             f"{name}: {problem}"
             for name, wanted in self.root.items()
             for value in (wanted if isinstance(wanted, list) else [wanted])
-            if (problem := _value_problem(name, value)) is not None
+            if (problem := _find_value_problem(name, value)) is not None
         ]
 
 
@@ -80,7 +80,7 @@ def split_of(facts: Mapping[str, Any], splits: Mapping[str, Condition]) -> str |
     return next((name for name, condition in splits.items() if condition.holds(facts)), None)
 
 
-def _value_problem(name: str, wanted: Any) -> str | None:
+def _find_value_problem(name: str, wanted: Any) -> str | None:
     if isinstance(wanted, Between):
         if name not in NUMBERS:
             return "an interval is of numbers, which this is not"
@@ -90,7 +90,7 @@ def _value_problem(name: str, wanted: Any) -> str | None:
         right = isinstance(wanted, float) and isfinite(wanted)
         return None if right else f"must be a number or an interval; it is {shorten_value(wanted)}"
     if name == "weather":
-        return weather_problem(wanted)
+        return find_weather_problem(wanted)
     if name == "hold_speed" and not isinstance(wanted, bool):
         return f"must be true or false; it is {shorten_value(wanted)}"
     return None

@@ -51,7 +51,7 @@ def make_type_store(definition: MessageDefinition, message_type: str) -> Typesto
     # constants are no signals, and their values would be code
     fields: Typesdict = {name: ([], fields) for name, (_, fields) in types.items()}
     if problems := [
-        problem for name, (_, found) in fields.items() if (problem := _type_problem(name, found))
+        problem for name, (_, found) in fields.items() if (problem := _find_type_problem(name, found))
     ]:
         raise InputError(problems)
     store = get_typestore(Stores.EMPTY)
@@ -71,7 +71,7 @@ def _parse_definition(definition: MessageDefinition, message_type: str) -> Types
     return types
 
 
-def _type_problem(name: str, fields: list[tuple[str, FieldDesc]]) -> str:
+def _find_type_problem(name: str, fields: list[tuple[str, FieldDesc]]) -> str:
     """Return what is wrong with a type; empty if nothing is."""
     if not _TYPE_NAME.fullmatch(name):
         return f"message {shorten(name, 60)}: must have a name of letters, digits and underscores"

@@ -18,7 +18,7 @@ from tasks.conventions import ROAD_CLASSES
 from tasks.errors import InputError
 from tasks.scene.gaussians import Gaussians, check_gaussians
 from tasks.scene.route import Route
-from tasks.scene.scene import LOWEST_SUN_DEG, Scene, sun_problems
+from tasks.scene.scene import LOWEST_SUN_DEG, Scene, find_sun_problems
 
 SCENE_FORMAT = "musync-scene/1"
 GAUSSIAN_ARRAYS = ("means", "quats_wxyz", "scales", "opacities", "sh", "normals", "class_id")
@@ -239,7 +239,7 @@ def _is_number(value: Any, most: float = 360.0) -> bool:
 def _is_sun(value: Any) -> bool:
     """Whether an entry of scene.json is a sound direction of the sun, or none."""
     pair = isinstance(value, list) and len(value) == 2 and all(map(_is_number, value))
-    return value is None or (pair and not sun_problems((value[0], value[1])))
+    return value is None or (pair and not find_sun_problems((value[0], value[1])))
 
 
 def _file_hash(path: Path) -> str | None:

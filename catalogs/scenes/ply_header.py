@@ -70,7 +70,7 @@ def check_ply(path: Path) -> None:
     except UnicodeDecodeError:
         raise InputError(f"{path}: the header of a .ply must be ASCII text; it is not") from None
     elements = _read_elements(path, [line.split() for line in lines])
-    problems = _compressed_problems(elements) if "chunk" in elements else _plain_problems(elements)
+    problems = _find_compressed_problems(elements) if "chunk" in elements else _find_plain_problems(elements)
     if problems:
         raise InputError(cap_problems([f"{path}: {problem}" for problem in problems]))
     announced = end + len(END) + sum(element.bytes for element in elements.values())
@@ -108,7 +108,7 @@ def _read_elements(path: Path, lines: list[list[str]]) -> dict[str, Element]:
     return {name: Element(count=counts[name], properties=tuple(properties[name])) for name in counts}
 
 
-def _plain_problems(elements: dict[str, Element]) -> list[str]:
+def _find_plain_problems(elements: dict[str, Element]) -> list[str]:
     vertex = elements["vertex"]
     names = [name for _, name in vertex.properties]
     problems = _find_repeated(names)
@@ -124,7 +124,7 @@ def _plain_problems(elements: dict[str, Element]) -> list[str]:
     return problems
 
 
-def _compressed_problems(elements: dict[str, Element]) -> list[str]:
+def _find_compressed_problems(elements: dict[str, Element]) -> list[str]:
     layout = {
         "chunk": tuple(("float", name) for name in CHUNK_PROPERTIES),
         "vertex": tuple(("uint", name) for name in PACKED_PROPERTIES),

@@ -56,9 +56,9 @@ def read_stereo_folder(folder: Path) -> StereoSequence:
     poses = _read_matrices(folder / "poses.txt", problems)
     left, right = (_read_pictures(folder / side, problems) for side in ("image_l", "image_r"))
     if calibration is not None:
-        problems += _calibration_problems(folder / "calib.txt", calibration)
+        problems += _find_calibration_problems(folder / "calib.txt", calibration)
     if poses is not None:
-        problems += _pose_problems(folder / "poses.txt", poses)
+        problems += _find_pose_problems(folder / "poses.txt", poses)
     if left and right and len(left) != len(right):
         problems.append(
             f"{folder}: image_l and image_r must pair up; they hold {len(left)} and {len(right)} pictures"
@@ -124,7 +124,7 @@ def _read_matrices(path: Path, problems: list[str]) -> NDArray[np.float64] | Non
     return np.array(rows) if rows and len(rows) == len(lines) else None
 
 
-def _calibration_problems(path: Path, P: NDArray[np.float64]) -> list[str]:
+def _find_calibration_problems(path: Path, P: NDArray[np.float64]) -> list[str]:
     if len(P) != 2:
         return [
             f"{path}: must hold two rows, the projection matrices of the cameras of image_l and image_r; it has"
@@ -146,7 +146,7 @@ def _calibration_problems(path: Path, P: NDArray[np.float64]) -> list[str]:
     return problems
 
 
-def _pose_problems(path: Path, poses: NDArray[np.float64]) -> list[str]:
+def _find_pose_problems(path: Path, poses: NDArray[np.float64]) -> list[str]:
     R = poses[:, :, :3]
     off = np.abs(R @ R.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
     wrong = np.flatnonzero((off > ROTATION_TOLERANCE) | (np.linalg.det(R) < 0))

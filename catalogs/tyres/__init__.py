@@ -94,7 +94,7 @@ def parse_tyre(content: bytes, place: object) -> MagicFormula:
             elif name in entries:
                 values[name] = number
         if not problems:
-            problems = _shape_problems(values, version)
+            problems = _find_shape_problems(values, version)
     if problems or version is None:
         raise InputError(cap_problems([f"{shorten(place)}: {problem}" for problem in problems]))
     return fold_scaling(values, version)
@@ -141,7 +141,7 @@ def _read_number(text: str) -> float | None:
     return number if isfinite(number) else None
 
 
-def _shape_problems(values: Mapping[str, float], version: str) -> list[str]:
+def _find_shape_problems(values: Mapping[str, float], version: str) -> list[str]:
     """List why the coefficients describe no tyre: no load, no peak, no grip, or forces that are not finite."""
     if values["FNOMIN"] <= 0 or values.get("LFZO", 1.0) <= 0:
         return [

@@ -12,7 +12,7 @@ from catalogs.names import Name, WeatherName
 from catalogs.quantities import CatalogueEntry, Scalar, parse_entry, require_quantity
 from catalogs.tyre_families import KNOT_TABLES, FamilyEntry
 from catalogs.tyres import load_tyre
-from catalogs.vehicles.added import FormEntry, effect_problems
+from catalogs.vehicles.added import FormEntry, find_effect_problems
 from catalogs.vehicles.frozen import Provenance
 from catalogs.vehicles.inherited import Generation, join_generations, read_generations
 from catalogs.vehicles.numbers import VehicleNumber
@@ -71,7 +71,7 @@ class VehicleEntry(CatalogueEntry):
     @model_validator(mode="after")
     def _effects_keep_their_rules(self) -> "VehicleEntry":
         bounds = self.provenance.bounds if self.provenance else {}
-        problems = effect_problems(self.effects, bounds)
+        problems = find_effect_problems(self.effects, bounds)
         units = self._units_inside()
         problems += [
             f"provenance.bounds: unit of {group} must be {units[group]}; it is {limits.unit}"

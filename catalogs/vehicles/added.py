@@ -68,7 +68,7 @@ class FormEntry(CatalogueEntry):
         )  # fmt: skip
 
 
-def effect_problems(effects: Mapping[str, Scalar], bounds: Mapping[str, Limits]) -> list[str]:
+def find_effect_problems(effects: Mapping[str, Scalar], bounds: Mapping[str, Limits]) -> list[str]:
     """Every rule that numbers of effects break: they exist, have their unit and lie within their bounds.
 
     Parameters

@@ -10,7 +10,7 @@ from typing import Any
 
 from catalogs.documents import LARGEST_YAML, parse_yaml, read_content
 from catalogs.entries import YAML, find_entry
-from catalogs.names import name_problem
+from catalogs.names import find_name_problem
 from catalogs.sentences import shorten, shorten_value
 from catalogs.vehicles.frozen import check_seal, frozen_text, plain_text
 from tasks.errors import InputError
@@ -146,7 +146,7 @@ def _find_parent(name: object, child: Path) -> Path:
     where = shorten(child)
     if not isinstance(name, str):
         raise InputError(f"{where}: extends must be the name of a vehicle; it is {shorten_value(name)}")
-    if problem := name_problem(name):
+    if problem := find_name_problem(name):
         raise InputError(f"{where}: the name of the vehicle that it extends must {problem}")
     try:
         return find_entry("vehicle", child.with_name(name) if Path(name).suffix in YAML else name)

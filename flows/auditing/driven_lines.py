@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from catalogs.low_speed import load_kept_low_speed
-from catalogs.scenario import Scenario, scenario_problems
+from catalogs.scenario import Scenario, find_scenario_problems
 from catalogs.studies import load_sensitivity_study
 from catalogs.studies.ablation import FamilyWeather, cut_coupling, load_kept_families
 from catalogs.surfaces import load_surface
@@ -240,7 +240,7 @@ def _change_line(
         (inputs / line.file).write_bytes(scale_line(line.file, kept[line.file], line.place, factor))
         return asked, load_entries(inputs, asked.variant)
     scenario = replace(asked.scenario, **{line.key: line.value * factor})
-    if problems := scenario_problems(scenario):
+    if problems := find_scenario_problems(scenario):
         raise InputError(problems)
     return replace(asked, scenario=scenario), load_entries(inputs, asked.variant)
 

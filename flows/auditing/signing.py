@@ -18,10 +18,10 @@ from manifests.signing import (
     ENVELOPE,
     LARGEST_ENVELOPE,
     add_signature,
+    find_signature_problems,
     load_signer,
     load_verifier,
     read_envelope,
-    signature_problems,
 )
 from tasks.errors import InputError
 
@@ -106,7 +106,7 @@ def signature_findings(layout: Layout, key: str | None) -> dict[str, Any]:
     signers = []
     try:
         content, envelope = read_content(layout.manifest, "manifest", LARGEST_JSON), _load_envelope(layout)
-        problems = signature_problems(content, envelope, verifier)
+        problems = find_signature_problems(content, envelope, verifier)
         signers = _list_signers(envelope)
     except InputError as error:
         problems = list(error.problems)

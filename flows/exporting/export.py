@@ -58,7 +58,7 @@ def export_dataset(
     folder = choose_folder(dataset, to, out)
     problems = [
         *([] if kept else [f"{dataset}: every clip is in quarantine; name clips with --clip to export them"]),
-        *_picture_problems(chosen, manifest, dataset),
+        *_find_picture_problems(chosen, manifest, dataset),
     ]
     if chosen.whole and len(kept) < len(rows):
         problems.append(
@@ -159,7 +159,7 @@ def write_folder(folder: Path) -> Iterator[Path]:
         shutil.rmtree(partial, ignore_errors=True)
 
 
-def _picture_problems(chosen: ExportFormat, manifest: Mapping[str, Any], dataset: str) -> list[str]:
+def _find_picture_problems(chosen: ExportFormat, manifest: Mapping[str, Any], dataset: str) -> list[str]:
     if not chosen.pictures or manifest["grid"].get("pictures", True):
         return []
     without = ", ".join(row.name for row in FORMATS if not row.pictures)

@@ -6,7 +6,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from catalogs.campaign_files import parse_columns, unit_problems
+from catalogs.campaign_files import find_unit_problems, parse_columns
 from catalogs.documents import read_content
 from catalogs.sentences import shorten
 from tasks.errors import InputError
@@ -30,7 +30,7 @@ def read_claim(path: Path) -> VideoClaim:
     """
     content = read_content(path, "claim", LARGEST_CLAIM)
     columns, units = parse_columns(content, f"{path}: the claim", CLAIMED)
-    problems = unit_problems(units, CLAIMED, str(path))
+    problems = find_unit_problems(units, CLAIMED, str(path))
     if not columns.keys() & {"t_ns", "time"}:
         problems.append(
             f"{path}: the claim lacks a column t_ns or time; it has {shorten(', '.join(columns))}."

@@ -11,14 +11,14 @@ from catalogs.gates import GATES
 from catalogs.grids import Grid, GridFile
 from catalogs.hazard_markings import load_marking
 from catalogs.low_speed import LOW_SPEED, NO_LOW_SPEED_RULE, is_rule_applied, load_low_speed
-from catalogs.scenario import route_problems
+from catalogs.scenario import find_route_problems
 from catalogs.scenes import load_scene, scene_identity
 from catalogs.studies import SENSITIVITY
 from catalogs.studies.ablation import ABLATION, cut_coupling, load_families
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_content, vehicle_tyre_source
 from catalogs.weather.grip import FOLDER as WEATHER_FOLDER
-from flows.making.memory import memory_problems
+from flows.making.memory import find_memory_problems
 from flows.making.places import remember_place
 from flows.making.traced import read_trace_inputs
 from tasks.errors import InputError
@@ -111,9 +111,9 @@ def read_grid_inputs(grid: Grid, tick_rate_hz: int) -> tuple[dict[str, bytes], d
     weathers = {scenario.weather for scenario in (*scenarios, *driven)}
     inputs, scene, problems = _read_entries(grid.settings, weathers)
     if not problems:
-        problems += _weather_problems(grid.settings, weathers)
+        problems += _find_weather_problems(grid.settings, weathers)
     if scene:
-        problems += _route_problems(grid)
+        problems += _find_route_problems(grid)
     if grid.poses is not None:
         traces, found = read_trace_inputs(grid, grid.poses)
         inputs, problems = inputs | traces, problems + found
@@ -127,7 +127,7 @@ def read_grid_inputs(grid: Grid, tick_rate_hz: int) -> tuple[dict[str, bytes], d
             "variant no-low-speed-rule leaves out a rule of vehicle_mode: paper with low_speed: steady; this grid"
             f" drives vehicle_mode: {grid.settings.vehicle_mode} with low_speed: {grid.settings.low_speed}"
         )
-    return inputs, scene, problems + _camera_problems(grid.settings, tick_rate_hz)
+    return inputs, scene, problems + _find_camera_problems(grid.settings, tick_rate_hz)
 
 
 def _read_entries(
@@ -155,7 +155,7 @@ def _read_entries(
     return inputs, scene, problems
 
 
-def _weather_problems(settings: GridFile, weathers: Set[str]) -> list[str]:
+def _find_weather_problems(settings: GridFile, weathers: Set[str]) -> list[str]:
     """Kinds of weather in which the vehicle has no tyres."""
     vehicle = load_vehicle(settings.vehicle)
     problems: list[str] = []
@@ -167,14 +167,14 @@ def _weather_problems(settings: GridFile, weathers: Set[str]) -> list[str]:
     return problems
 
 
-def _camera_problems(settings: GridFile, tick_rate_hz: int) -> list[str]:
+def _find_camera_problems(settings: GridFile, tick_rate_hz: int) -> list[str]:
     """List settings that exceed the camera or the memory of this machine; a faulty camera is reported elsewhere."""
     try:
         camera = load_camera(settings.camera)
     except InputError:
         return []
     ticks = int(settings.telemetry_s * tick_rate_hz) + 1
-    problems = memory_problems(settings, camera, ticks)
+    problems = find_memory_problems(settings, camera, ticks)
     if settings.composition == "linear" or (camera.plain and camera.sensor == Sensor()):
         return problems
     return [
@@ -184,10 +184,10 @@ def _camera_problems(settings: GridFile, tick_rate_hz: int) -> list[str]:
     ]
 
 
-def _route_problems(grid: Grid) -> list[str]:
+def _find_route_problems(grid: Grid) -> list[str]:
     route = load_scene(grid.settings.scene).route
     problems: dict[str, str] = {}
     for label, scenario in grid.scenarios:
-        for problem in route_problems(scenario, route.length, grid.settings.scene):
+        for problem in find_route_problems(scenario, route.length, grid.settings.scene):
             problems.setdefault(problem, f"scenario {label}: {problem}")
     return list(problems.values())

@@ -48,7 +48,7 @@ def memory_here() -> int:
     return min(limits)
 
 
-def memory_problems(settings: GridFile, camera: Camera, ticks: int) -> list[str]:
+def find_memory_problems(settings: GridFile, camera: Camera, ticks: int) -> list[str]:
     """A sentence where one clip does not fit into this machine's memory.
 
     Parameters

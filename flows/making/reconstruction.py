@@ -9,7 +9,7 @@ from catalogs.scenes.folder import must_be_new
 from catalogs.scenes.stereo_folder import read_stereo_folder
 from tasks.errors import InputError
 from tasks.reconstruction.reconstruct import reconstruct_street
-from tasks.scene.scene import sun_problems
+from tasks.scene.scene import find_sun_problems
 
 
 def scene_from_stereo(
@@ -27,7 +27,7 @@ def scene_from_stereo(
         Listing every problem of the folder, or if ``out`` is not empty, or the sun below the horizon.
     """
     must_be_new(Path(out))
-    if problems := sun_problems(sun_direction_deg):
+    if problems := find_sun_problems(sun_direction_deg):
         raise InputError(problems)
     result = reconstruct_street(read_stereo_folder(Path(folder)))
     figures = result.summarise()

@@ -19,7 +19,7 @@ from tasks.render.contact_sheet import encode_png
 from tasks.render.environment import environment_view, plain_sky
 from tasks.render.rasterise.backend import select_backend
 from tasks.scene.classify import classify_road
-from tasks.scene.scene import Scene, sun_problems
+from tasks.scene.scene import Scene, find_sun_problems
 from tasks.scene.transform import transform_gaussians
 
 
@@ -48,7 +48,7 @@ def scene_import(
         Listing the problems of the files, or if ``out`` is not empty, or the sun below the horizon.
     """
     must_be_new(Path(out))
-    if problems := sun_problems(sun_direction_deg):
+    if problems := find_sun_problems(sun_direction_deg):
         raise InputError(problems)
     course, T_world_source = read_route(Path(route), camera_height, metres_per_unit)
     cloud = transform_gaussians(read_gaussians(Path(gaussians)), T_world_source)

@@ -11,7 +11,7 @@ import numpy as np
 from catalogs.calibration import load_procedure
 from catalogs.documents import parse_yaml
 from catalogs.entries import find_entry
-from catalogs.names import name_problem
+from catalogs.names import find_name_problem
 from catalogs.references import ReferenceCase, Traces, read_reference, trace_file
 from catalogs.vehicles import load_vehicle, vehicle_content
 from catalogs.vehicles.frozen import frozen_text
@@ -59,7 +59,7 @@ def calibrate_on_traces(
     InputError
         Listing every problem of traces, vehicle or procedure; or for a name that is none.
     """
-    if problem := name_problem(name):
+    if problem := find_name_problem(name):
         raise InputError(f"--name must {problem}")
     beside = tyre_beside(vehicle)
     results = Outputs(out, "calibrate", f"{name}.yaml", "calibration.json", *beside)

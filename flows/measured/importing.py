@@ -22,10 +22,10 @@ from flows.store.layout import write_atomically, write_json
 from flows.store.telemetry import write_parquet
 from manifests.canonical import sha256_of_file
 from tasks.campaign.assembly import Assembled, assemble_run
-from tasks.campaign.brake_gain import gain_problems
+from tasks.campaign.brake_gain import find_gain_problems
 from tasks.campaign.braking_heat import measure_braking_heat
 from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME
-from tasks.campaign.run_validation import motion_problem
+from tasks.campaign.run_validation import find_motion_problem
 from tasks.campaign.signals import Signal
 from tasks.campaign.slow_channels import measure_slow_rates
 from tasks.campaign.unmapped_slope import estimate_slopes
@@ -71,7 +71,7 @@ def import_measurements(
     try:
         channel_map, map_file = load_channel_map(map)
     except FaultyMap as faults:
-        raise InputError([*faults.problems, *_signal_problems(Path(source), faults.readable)]) from None
+        raise InputError([*faults.problems, *_find_signal_problems(Path(source), faults.readable)]) from None
     root = recording_root(Path(source))
     recordings = _read_all(recording_files(Path(source), channel_map), channel_map)
     planned, left_out = plan_runs(channel_map, root, recordings)
@@ -87,19 +87,23 @@ def import_measurements(
         for run in planned
     ]
     problems = join_shared_problems(
-        [_place_problem(run, problem) for run, found in made for problem in found.problems], len(made), "runs"
+        [_find_place_problem(run, problem) for run, found in made for problem in found.problems],
+        len(made),
+        "runs",
     )
     interval = 1.0 / channel_map.sample_rate_hz
     readable = {run.name: found.readable for run, found in made}
     if not has_stand_in(channel_map):
         slippery = [run.name for run, _ in made if run.conditions.weather != DRY]
-        problems += gain_problems(readable, interval, slippery=slippery)
+        problems += find_gain_problems(readable, interval, slippery=slippery)
     still = [
-        _place_problem(run, problem)
+        _find_place_problem(run, problem)
         for run, found in made
         if "speed" in found.readable
         and (
-            problem := motion_problem(found.readable["speed"], interval, run.conditions.hazard_length_m > 0.0)
+            problem := find_motion_problem(
+                found.readable["speed"], interval, run.conditions.hazard_length_m > 0.0
+            )
         )
     ]
     problems += join_shared_problems(still, len(made), "runs")
@@ -247,7 +251,7 @@ def run_table(columns: dict[str, np.ndarray], rate: float) -> pa.Table:
     return pa.Table.from_arrays(arrays, schema=pa.schema(fields))
 
 
-def _signal_problems(source: Path, channel_map: ChannelMap | None) -> list[str]:
+def _find_signal_problems(source: Path, channel_map: ChannelMap | None) -> list[str]:
     """Faults of the signals that a faulty map names, as far as it can be read."""
     if channel_map is None:
         return []
@@ -271,5 +275,5 @@ def _read_all(files: tuple[Path, ...], channel_map: ChannelMap) -> dict[Path, di
     return recordings
 
 
-def _place_problem(run: PlannedRun, problem: str) -> PlacedProblem:
+def _find_place_problem(run: PlannedRun, problem: str) -> PlacedProblem:
     return PlacedProblem(name=run.name, place=f"{run.name} ({run.file.name})", sentence=problem)

@@ -9,7 +9,7 @@ import numpy as np
 from catalogs.campaign_files import MOST_SAMPLES
 from catalogs.channel_maps import ChannelMap, SegmentEntry
 from catalogs.channel_maps.conditions import Conditions
-from catalogs.names import name_problem
+from catalogs.names import find_name_problem
 from catalogs.sentences import cap_problems, shorten
 from tasks.campaign.channels import BRAKE_SIGNALS
 from tasks.campaign.segments import SegmentRule, cut_segments, find_brake_rule
@@ -85,7 +85,7 @@ def find_run_problems(
         for name in sorted({name for name in names if names.count(name) > 1})
     ]
     for run in planned:
-        if problem := name_problem(run.name):
+        if problem := find_name_problem(run.name):
             problems.append(f"{shorten(run.file)}: a run takes the file's name, which must {problem}")
         shared = [
             np.clip(signal.time[[0, -1]], run.start, run.end)

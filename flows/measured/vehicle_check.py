@@ -4,7 +4,7 @@ from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 
-from catalogs.plausible_vehicle import load_plausible_vehicle, plausibility_problems
+from catalogs.plausible_vehicle import find_plausibility_problems, load_plausible_vehicle
 from catalogs.vehicles import load_tolerances, load_vehicle, vehicle_numbers
 from flows.measured.vehicle_template import TO_FILL_IN
 from tasks.vehicle.figures import compute_figures
@@ -28,7 +28,7 @@ def check_vehicle(vehicle: str) -> dict[str, Any]:
         As `catalogs.vehicles.load_vehicle`.
     """
     figures, tolerances = compute_figures(load_vehicle(vehicle)), load_tolerances(vehicle)
-    problems = plausibility_problems(figures, tolerances)
+    problems = find_plausibility_problems(figures, tolerances)
     ranges = load_plausible_vehicle().figures
     return {
         "vehicle": vehicle,

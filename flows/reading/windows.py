@@ -147,7 +147,7 @@ def windows_of(
     ]
     files = list(table_files(layout, manifest)["frames"].values())
     stored = {name for name in arrays_of(labels=True) if (layout.frames / name).is_dir()}
-    problems = _column_problems(files[0], columns)
+    problems = _find_column_problems(files[0], columns)
     problems += [f"array {name!r}: the dataset has {', '.join(sorted(stored)) or 'no frames'}"
                  for name in arrays if name not in stored]  # fmt: skip
     if not (is_whole(window) and 1 <= window <= frames):
@@ -204,7 +204,7 @@ def windows_of(
     )
 
 
-def _column_problems(file: Path, columns: Sequence[str]) -> list[str]:
+def _find_column_problems(file: Path, columns: Sequence[str]) -> list[str]:
     try:
         schema = pq.read_schema(file)
     except (pa.ArrowException, OSError) as error:

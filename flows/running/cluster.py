@@ -32,7 +32,7 @@ def facts_here() -> dict[str, str]:
     return {"muSync": code["version"], "muSync's source": code["source_sha256"][:12]} | kept
 
 
-def version_problems(
+def find_version_problems(
     here: Mapping[str, str], there: Mapping[str, Mapping[str, str] | BaseException]
 ) -> list[str]:
     """How workers differ from this machine, workers with one difference in one sentence.
@@ -73,7 +73,7 @@ def check_cluster(client: Any, address: str) -> None:
         raise InputError(
             f"--scheduler {address}: the cluster has no workers: start some and run the command again"
         )
-    problems = version_problems(facts_here(), client.run(facts_here, on_error="return"))
+    problems = find_version_problems(facts_here(), client.run(facts_here, on_error="return"))
     if problems:
         raise InputError([f"--scheduler {address}: {problem}" for problem in problems])
 
@@ -116,7 +116,7 @@ class JoiningCheck(WorkerPlugin):
 
     async def setup(self, worker: Any) -> None:
         """Hold the worker's facts against the driver's; Dask reads the worker's messages when this has returned."""
-        problems = version_problems(self.here, {worker.address: facts_here()})
+        problems = find_version_problems(self.here, {worker.address: facts_here()})
         for problem in problems:
             worker.log_event(TURNED_AWAY, f"{problem}; it was turned away")
         if problems:

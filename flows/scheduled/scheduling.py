@@ -163,7 +163,7 @@ def checked_parameters(
     except InputError as error:
         problems += error.problems
     root = out.rstrip("/") if is_address(out) else str(Path(out).resolve())
-    problems += _place_problems(out)
+    problems += _find_place_problems(out)
     problems += list_runner_problems(runner, scheduler)
     if scheduler is not None and not re.fullmatch(r"(tcp|tls)://[^/]+:\d+", scheduler):
         problems.append(f"--scheduler must be like tcp://host:8786 or tls://host:8786; it is {scheduler!r}")
@@ -188,7 +188,7 @@ def checked_parameters(
     }
 
 
-def _place_problems(out: str) -> list[str]:
+def _find_place_problems(out: str) -> list[str]:
     if is_address(out):
         try:
             Objects(out).folders()

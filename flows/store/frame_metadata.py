@@ -62,7 +62,7 @@ def check_frames(
     InputError
         Listing what breaks a rule.
     """
-    problems = _group_problems(read, members, place)
+    problems = _find_group_problems(read, members, place)
     shapes = {}
     for name in sorted(members):
         if name not in arrays_of(labels=True):
@@ -108,15 +108,15 @@ def check_array(read: ReadMetadata, name: str, place: object) -> tuple[int, ...]
     if not isinstance(metadata, dict):
         raise InputError(f"{where}: must be a table of metadata; it is {shorten_value(metadata)}")
     shape: Any = metadata.get("shape")
-    problems = _shape_problems(shape, array)
+    problems = _find_shape_problems(shape, array)
     if not problems:
-        problems = _layout_problems(metadata, array, shape)
+        problems = _find_layout_problems(metadata, array, shape)
     if problems:
         raise InputError(cap_problems([f"{where}: {problem}" for problem in problems]))
     return tuple(shape)
 
 
-def _group_problems(read: ReadMetadata, members: Collection[str], place: object) -> list[str]:
+def _find_group_problems(read: ReadMetadata, members: Collection[str], place: object) -> list[str]:
     where, content = f"{place}/{METADATA}", read(METADATA)
     if content is None:
         return [f"{where}: missing: musync repair makes it again"]
@@ -158,7 +158,7 @@ def _parse_member(read: ReadMetadata, name: str) -> Any:
         return float("nan")
 
 
-def _shape_problems(shape: Any, array: PixelArray) -> list[str]:
+def _find_shape_problems(shape: Any, array: PixelArray) -> list[str]:
     sizes = [DIMENSION_SIZES[dimension] for dimension in array.dimensions]
     whole = isinstance(shape, list) and all(type(size) is int and 1 <= size < 2**31 for size in shape)
     if not whole or len(shape) != 4 + len(sizes) or shape[4:] != sizes:
@@ -174,7 +174,7 @@ def _shape_problems(shape: Any, array: PixelArray) -> list[str]:
     return []
 
 
-def _layout_problems(metadata: Mapping[str, Any], array: PixelArray, shape: list[int]) -> list[str]:
+def _find_layout_problems(metadata: Mapping[str, Any], array: PixelArray, shape: list[int]) -> list[str]:
     tail = shape[2:]
     wanted: dict[str, Any] = {
         "shape": shape,

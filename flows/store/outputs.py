@@ -126,7 +126,7 @@ class Outputs:
         return nullcontext() if self._alone else _lock_folder(folder, wait=True)
 
     def _refuse_strangers(self, folder: Path) -> None:
-        problems = [f"{folder}: {problem}" for problem in map(name_problem, self.names) if problem]
+        problems = [f"{folder}: {problem}" for problem in map(find_name_problem, self.names) if problem]
         nearest = next(place for place in (folder, *folder.absolute().parents) if os.path.lexists(place))
         if not nearest.is_dir():
             problems.append(f"{nearest}: must be a folder; name another one for the files of {self._title}")
@@ -160,7 +160,7 @@ def _find_dataset_around(folder: Path) -> Path | None:
     return next((one for one in places if (one / "plan.json").is_file() and (one / "inputs").is_dir()), None)
 
 
-def name_problem(name: str) -> str | None:
+def find_name_problem(name: str) -> str | None:
     """Why a name cannot be a file's inside the folder; None if it can."""
     parts = PurePosixPath(name).parts
     if not parts or name != "/".join(parts) or parts[0] == "/" or ".." in parts:
@@ -192,7 +192,7 @@ def read_marker(folder: Path) -> dict[str, str]:
         raise _not_a_marker(path) from None
     files = value.get("files") if isinstance(value, dict) and value.get("format") == FORMAT else None
     if not isinstance(files, dict) or not all(
-        isinstance(command, str) and name_problem(name) is None for name, command in files.items()
+        isinstance(command, str) and find_name_problem(name) is None for name, command in files.items()
     ):
         raise _not_a_marker(path)
     return files

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from tasks.campaign.campaign import LEAST_SAMPLES
 from tasks.campaign.channel_validation import (
     DIGITS_OF_DAY,
-    frozen_problem,
-    plausibility_problems,
-    signal_problems,
+    find_frozen_problem,
+    find_plausibility_problems,
+    find_signal_problems,
 )
 from tasks.campaign.channels import ALIASES, UNITS
 from tasks.campaign.dead_sources import find_dead_sources
@@ -76,7 +76,7 @@ def assemble_run(
             stated = ALIASES.get(signal.unit, signal.unit)
             if stated in UNITS and stated != rule.unit:
                 found.append((rule.channel, _describe_stated_unit(stated, rule.unit)))
-            found += [(rule.channel, problem) for problem in signal_problems(signal)]
+            found += [(rule.channel, problem) for problem in find_signal_problems(signal)]
         parts[rule.channel] = [convert_to_channel(signal, rule) for signal in logged]
         found += [(rule.channel, problem) for problem in find_dead_sources(rule, parts[rule.channel])]
     if not any(problem == DIGITS_OF_DAY for _, problem in found):
@@ -103,7 +103,7 @@ def assemble_run(
     units = {rule.channel: rule.unit for rule in rules}
     if any(rule.channel == "brake_pressure" and rule.gain is not None for rule in rules):
         units["brake_pressure"] = "1"  # what stands for it has a scale that nobody knows
-    problems += plausibility_problems(whole, 1.0 / rate, units)
+    problems += find_plausibility_problems(whole, 1.0 / rate, units)
     if problems:
         return Assembled(start=float(clock[0]), columns={}, readable=whole, problems=tuple(problems))
     cleared = {
@@ -141,7 +141,7 @@ def _find_frozen_channels(parts: Mapping[str, list[Signal]]) -> list[tuple[str, 
         (channel, problem)
         for channel, signals in parts.items()
         for signal in signals
-        if len(signal.time) > 2 and (problem := frozen_problem(channel, signal, speed)) is not None
+        if len(signal.time) > 2 and (problem := find_frozen_problem(channel, signal, speed)) is not None
     ]
 
 

@@ -44,7 +44,7 @@ class Braking:
     torque: NDArray[np.float64]
 
 
-def gain_problems(
+def find_gain_problems(
     runs: Mapping[str, Mapping[str, NDArray[np.float64]]], interval: float, *, slippery: Collection[str] = ()
 ) -> list[str]:
     """Return the problem of a pressure whose unit or scale is wrong; none where the runs do not tell it.

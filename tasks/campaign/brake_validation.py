@@ -19,7 +19,7 @@ LEAST_SAMPLES = 20
 """Samples of an applied and of a released brake from which their decelerations are compared [1]."""
 
 
-def brake_problems(
+def find_brake_problems(
     columns: Mapping[str, NDArray[np.float64]],
     smooth: Mapping[str, NDArray[np.float64]],
     interval: float,
@@ -39,18 +39,18 @@ def brake_problems(
     found: list[str | None] = []
     if "brake_pressure" in columns and not stands_in:
         motor_brakes = bool(np.any(columns.get("engine_torque", np.zeros(1)) < 0.0))
-        found.append(_slow_clock_problem(smooth["brake_pressure"], smooth.get("speed"), rate))
+        found.append(_find_slow_clock_problem(smooth["brake_pressure"], smooth.get("speed"), rate))
         width = len(columns["brake_pressure"]) - len(smooth["brake_pressure"]) + 1
-        found.append(_constant_problem(columns["brake_pressure"], None if motor_brakes else rate, width))
+        found.append(_find_constant_problem(columns["brake_pressure"], None if motor_brakes else rate, width))
     if rate is not None:
         moving = smooth["speed"] > MOVING
         found += [
-            _effect_problem(name, smooth[name], moving, rate) for name in BRAKE_SIGNALS if name in smooth
+            _find_effect_problem(name, smooth[name], moving, rate) for name in BRAKE_SIGNALS if name in smooth
         ]
     return [problem for problem in found if problem is not None]
 
 
-def _constant_problem(
+def _find_constant_problem(
     pressure: NDArray[np.float64], rate: NDArray[np.float64] | None, width: int
 ) -> str | None:
     """Return the problem of a constant pressure, or of a pressure of 0 while the car brakes.
@@ -77,7 +77,7 @@ def _constant_problem(
     )
 
 
-def _slow_clock_problem(
+def _find_slow_clock_problem(
     pressure: NDArray[np.float64], speed: NDArray[np.float64] | None, rate: NDArray[np.float64] | None
 ) -> str | None:
     """Return the problem of a stop that takes hours: a time in ms that was taken for s.
@@ -97,7 +97,7 @@ def _slow_clock_problem(
     )
 
 
-def _effect_problem(
+def _find_effect_problem(
     name: str, brake: NDArray[np.float64], moving: NDArray[np.bool_], rate: NDArray[np.float64]
 ) -> str | None:
     """Return the problem of a signal with which the car slows when it is negative, or when it is released.

@@ -5,12 +5,12 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.brake_validation import MOVING, brake_problems
+from tasks.campaign.brake_validation import MOVING, find_brake_problems
 from tasks.campaign.channels import CHANNELS_BY_NAME, UNITS, guess_unit
 from tasks.campaign.signals import Signal
 from tasks.campaign.time_of_day import TIME_OF_DAY, looks_like_time_of_day
-from tasks.campaign.torque_validation import torque_problems
-from tasks.campaign.wheel_validation import radius_problems
+from tasks.campaign.torque_validation import find_torque_problems
+from tasks.campaign.wheel_validation import find_radius_problems
 
 DIGITS_OF_DAY = (
     "has a clock that jumps by 40 at each minute, because its numbers are the digits of hours, minutes and seconds:"
@@ -36,7 +36,7 @@ LARGEST_ACCELERATION, LARGEST_CORRECTION = 20.0, 0.5
 """Rate [m/s^2] and correction [m/s] by which speed changes at once at most, besides ten usual steps of its sensor."""
 
 
-def signal_problems(signal: Signal) -> list[str]:
+def find_signal_problems(signal: Signal) -> list[str]:
     """Return the problems of one signal on its own clock: empty, gaps, clock jumps, values that are not numbers.
 
     Parameters
@@ -52,10 +52,10 @@ def signal_problems(signal: Signal) -> list[str]:
         problems.append(
             f"has {np.count_nonzero(bad)} samples that are not numbers, the first at {at:.3f} s: cut the run there"
         )
-    return problems + clock_problems(signal)
+    return problems + find_clock_problems(signal)
 
 
-def clock_problems(signal: Signal) -> list[str]:
+def find_clock_problems(signal: Signal) -> list[str]:
     """Return the problems of a signal's clock: gaps, and times that do not advance.
 
     Parameters
@@ -91,7 +91,7 @@ def _say_what_to_do(back: NDArray[np.float64]) -> str:
     return "give repeats: keep_first under time in the map if the logger stamps samples twice, else cut the run there"
 
 
-def frozen_problem(name: str, signal: Signal, speed: Signal | None) -> str | None:
+def find_frozen_problem(name: str, signal: Signal, speed: Signal | None) -> str | None:
     """Return the problem of a sensor that held one value while the car moved; None if there is none.
 
     Parameters
@@ -146,7 +146,7 @@ def _find_smallest_step(values: NDArray[np.float64], changes: NDArray[np.int64])
     return float(np.min(np.concatenate((pairs, single)), initial=np.inf))
 
 
-def plausibility_problems(
+def find_plausibility_problems(
     columns: Mapping[str, NDArray[np.float64]], interval: float, units: Mapping[str, str]
 ) -> list[str]:
     """Return wrong units and signs, by magnitude and by other channels; every sentence names its channel.
@@ -158,7 +158,7 @@ def plausibility_problems(
     units : the unit that each channel's values were taken to be in
     """
     stands_in = UNITS[units.get("brake_pressure", "MPa")][0] != "pressure"
-    problems = _step_problems(columns, interval)
+    problems = _find_step_problems(columns, interval)
     for name, values in columns.items():
         channel = CHANNELS_BY_NAME[name]
         if name == "brake_pressure" and stands_in:
@@ -175,22 +175,22 @@ def plausibility_problems(
                 " turn its sign over, or correct its offset"
             )
     smooth = {name: smooth_channel(values, interval) for name, values in columns.items()}
-    problems += radius_problems(smooth, interval)
-    problems += brake_problems(columns, smooth, interval, stands_in=stands_in)
-    problems += torque_problems(smooth, interval, stands_in=stands_in)
+    problems += find_radius_problems(smooth, interval)
+    problems += find_brake_problems(columns, smooth, interval, stands_in=stands_in)
+    problems += find_torque_problems(smooth, interval, stands_in=stands_in)
     if "speed" in smooth:
         rate = np.gradient(smooth["speed"], interval)
         if "longitudinal_acceleration" in smooth:
             felt = smooth["longitudinal_acceleration"]
             unit = units["longitudinal_acceleration"]
-            problems += _pair_problems(
+            problems += _find_pair_problems(
                 "longitudinal_acceleration", felt, "the rate of speed", rate, 0.8, unit
-            ) or _axis_problems(felt, rate)
+            ) or _find_axis_problems(felt, rate)
         if "pitch" in smooth:
-            problems += _pitch_problems(smooth, rate, interval)
+            problems += _find_pitch_problems(smooth, rate, interval)
     if "pitch" in smooth and "pitch_rate" in smooth:
         slope = np.gradient(smooth["pitch"], interval)
-        problems += _pair_problems(
+        problems += _find_pair_problems(
             "pitch_rate", smooth["pitch_rate"], "the slope of pitch", slope, 0.8, units["pitch_rate"]
         )
     if "vertical_acceleration" in smooth:
@@ -203,7 +203,7 @@ def plausibility_problems(
     return problems
 
 
-def _step_problems(columns: Mapping[str, NDArray[np.float64]], interval: float) -> list[str]:
+def _find_step_problems(columns: Mapping[str, NDArray[np.float64]], interval: float) -> list[str]:
     """Return the problem of a speed that jumps while its clock does not: samples are lost."""
     if "speed" not in columns:
         return []
@@ -219,7 +219,7 @@ def _step_problems(columns: Mapping[str, NDArray[np.float64]], interval: float) 
     ]
 
 
-def _pair_problems(
+def _find_pair_problems(
     name: str,
     values: NDArray[np.float64],
     other_name: str,
@@ -246,7 +246,7 @@ def _pair_problems(
     ]
 
 
-def _axis_problems(felt: NDArray[np.float64], rate: NDArray[np.float64]) -> list[str]:
+def _find_axis_problems(felt: NDArray[np.float64], rate: NDArray[np.float64]) -> list[str]:
     """Return the problem of a forward acceleration that holds gravity, as that of an axis which points down does."""
     apart = float(np.mean(felt - rate))
     if abs(apart) <= HALF_GRAVITY:
@@ -257,7 +257,7 @@ def _axis_problems(felt: NDArray[np.float64], rate: NDArray[np.float64]) -> list
     ]
 
 
-def _pitch_problems(
+def _find_pitch_problems(
     columns: Mapping[str, NDArray[np.float64]], rate: NDArray[np.float64], interval: float
 ) -> list[str]:
     """Check the sign and the size of the pitch of a car that brakes."""
@@ -270,10 +270,12 @@ def _pitch_problems(
     # changes over half a second: the body's response to the brake, without the slow slope of the road
     lag = max(round(0.5 / interval), 1)
     dive, less = columns["pitch"][lag:] - columns["pitch"][:-lag], rate[:-lag] - rate[lag:]
-    return _pair_problems("pitch", dive, "the deceleration", less, 0.5, None) or _dive_problems(dive, less)
+    return _find_pair_problems("pitch", dive, "the deceleration", less, 0.5, None) or _find_dive_problems(
+        dive, less
+    )
 
 
-def _dive_problems(dive: NDArray[np.float64], less: NDArray[np.float64]) -> list[str]:
+def _find_dive_problems(dive: NDArray[np.float64], less: NDArray[np.float64]) -> list[str]:
     """Check the size of the body's pitch response to the brake, where there is one."""
     x, y = less - less.mean(), dive - dive.mean()
     if float(x @ y) < 0.5 * float(np.sqrt((x @ x) * (y @ y))) or not x.any():

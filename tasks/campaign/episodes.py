@@ -26,7 +26,7 @@ class Episode:
         return self.end_time - self.onset_time
 
 
-def pressure_episodes(
+def find_pressure_episodes(
     time: NDArray[np.float64], pressure: NDArray[np.float64], *, threshold: float, merge_gap: float
 ) -> tuple[Episode, ...]:
     """Return the episodes of samples at or above a threshold, merged over short gaps (paper, Appendix C.5).

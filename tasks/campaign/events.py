@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.episodes import Episode, pressure_episodes
+from tasks.campaign.episodes import Episode, find_pressure_episodes
 from tasks.surface.weather import DRY, Weather
 
 Window = tuple[float, float]
@@ -145,7 +145,7 @@ def find_events(drive: RecordedRun, protocol: Protocol) -> tuple[int, list[Event
     """
     pressure = drive.columns["brake_pressure"]
     time: NDArray[np.float64] = np.arange(len(pressure), dtype=np.float64) * drive.interval
-    episodes = pressure_episodes(
+    episodes = find_pressure_episodes(
         time, pressure, threshold=protocol.onset_pressure, merge_gap=protocol.merge_gap
     )
     cut = [_cut_event(drive, time, episode, protocol) for episode in episodes]

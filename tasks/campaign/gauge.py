@@ -32,7 +32,7 @@ def zero_pressure_at_rest(measured: NDArray[np.float64]) -> NDArray[np.float64]:
     ----------
     measured : float64 [N] [MPa] at a fixed rate
     """
-    return np.where(_moving_mean(measured, RESTING_SPAN // 2) < RESTING_PRESSURE, 0.0, measured)
+    return np.where(_compute_moving_mean(measured, RESTING_SPAN // 2) < RESTING_PRESSURE, 0.0, measured)
 
 
 def denoise_pressure(measured: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -57,7 +57,7 @@ def denoise_pressure(measured: NDArray[np.float64]) -> NDArray[np.float64]:
         return best
     low, high = measured - AGREEING * sigma, measured + AGREEING * sigma
     for half in HALF_WIDTHS:
-        mean = _moving_mean(measured, half)
+        mean = _compute_moving_mean(measured, half)
         n = 2 * half + 1
         k = np.arange(1, n)
         spread = sigma * np.sqrt((1.0 + 2.0 * np.sum((1.0 - k / n) * rho**k)) / n)
@@ -83,8 +83,8 @@ def estimate_gauge_noise(pressure: NDArray[np.float64]) -> tuple[float, float]:
     if len(pressure) <= 4 * LAG:
         return 0.0, 0.0
     second = pressure[2:] - 2.0 * pressure[1:-1] + pressure[:-2]
-    near, fourth = _robust_deviation(second), _robust_deviation(np.diff(second, 2))
-    far = _robust_deviation(pressure[2 * LAG :] - 2.0 * pressure[LAG:-LAG] + pressure[: -2 * LAG])
+    near, fourth = _measure_robust_deviation(second), _measure_robust_deviation(np.diff(second, 2))
+    far = _measure_robust_deviation(pressure[2 * LAG :] - 2.0 * pressure[LAG:-LAG] + pressure[: -2 * LAG])
     if far == 0.0:
         return 0.0, 0.0
     share = min((near / far) ** 2, 1.0)
@@ -92,10 +92,10 @@ def estimate_gauge_noise(pressure: NDArray[np.float64]) -> tuple[float, float]:
     return fourth / float(np.sqrt(np.polyval((2.0, -16.0, 56.0, -112.0, 70.0), rho))), rho
 
 
-def _moving_mean(x: NDArray[np.float64], half: int) -> NDArray[np.float64]:
+def _compute_moving_mean(x: NDArray[np.float64], half: int) -> NDArray[np.float64]:
     n = 2 * half + 1
     return np.convolve(np.pad(x, half, mode="edge"), np.ones(n) / n, mode="valid")
 
 
-def _robust_deviation(x: NDArray[np.float64]) -> float:
+def _measure_robust_deviation(x: NDArray[np.float64]) -> float:
     return NORMAL * float(np.median(np.abs(x)))

@@ -14,7 +14,7 @@ SMOOTHED = 0.1
 MANOEUVRE_UNITS = {"stopping_distance": "m", "peak_pitch": "deg"}
 
 
-def manoeuvre_errors(
+def measure_manoeuvre_errors(
     measured: NDArray[np.float64],
     predictions: NDArray[np.float64],
     pressure: NDArray[np.float64],

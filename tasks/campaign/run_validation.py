@@ -6,7 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.campaign import LEAST_SAMPLES, MASKED_SPEED, find_motion
-from tasks.campaign.channel_validation import frozen_problem, plausibility_problems, signal_problems
+from tasks.campaign.channel_validation import (
+    find_frozen_problem,
+    find_plausibility_problems,
+    find_signal_problems,
+)
 from tasks.campaign.channels import CHANNELS_BY_NAME
 from tasks.campaign.signals import Signal
 from tasks.campaign.slow_channels import fill_between_samples, mark_samples
@@ -16,7 +20,7 @@ CLOCK_STEP, CLOCK_DRIFT = 0.1, 0.001
 """Share by which a step, and a run, may be longer or shorter than declared [1]."""
 
 
-def run_problems(
+def find_recording_problems(
     columns: Mapping[str, NDArray[np.float64]],
     units: Mapping[str, str],
     interval: float,
@@ -49,7 +53,7 @@ def run_problems(
         if name in misread
     ]
     if "time" in columns and "time" not in misread:
-        problems += _clock_problems(columns["time"], interval)
+        problems += _find_clock_problems(columns["time"], interval)
     clock = interval * np.arange(count, dtype=np.float64)
     usable, signals = dict[str, NDArray[np.float64]](), dict[str, Signal]()
     for name in COLUMN_UNITS:
@@ -57,18 +61,18 @@ def run_problems(
             continue
         own = mark_samples(name, columns[name])
         signal = Signal(time=clock[own], values=columns[name][own])
-        gaps = signal_problems(signal)
+        gaps = find_signal_problems(signal)
         problems += [f"channel {name} has a gap: it {problem}" for problem in gaps]
         if not gaps and name not in misread:
             usable[name], signals[name] = fill_between_samples(name, columns[name]), signal
     for name, signal in signals.items():
-        frozen = frozen_problem(name, signal, signals.get("speed"))
+        frozen = find_frozen_problem(name, signal, signals.get("speed"))
         problems += [] if frozen is None else [f"channel {name} {frozen}"]
     taken = COLUMN_UNITS | ({"brake_pressure": "1"} if brake_stands_in else {})
-    return problems + plausibility_problems(usable, interval, taken)
+    return problems + find_plausibility_problems(usable, interval, taken)
 
 
-def motion_problem(speed: NDArray[np.float64], interval: float, has_feature: bool) -> str | None:
+def find_motion_problem(speed: NDArray[np.float64], interval: float, has_feature: bool) -> str | None:
     """Return the problem of a run of which too little is used; None if there is enough.
 
     Parameters
@@ -92,7 +96,7 @@ def motion_problem(speed: NDArray[np.float64], interval: float, has_feature: boo
     return None
 
 
-def _clock_problems(time: NDArray[np.float64], interval: float) -> list[str]:
+def _find_clock_problems(time: NDArray[np.float64], interval: float) -> list[str]:
     bad = ~np.isfinite(time)
     if bad.any():
         return [

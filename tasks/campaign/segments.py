@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tasks.campaign.brake_validation import MOVING
-from tasks.campaign.channel_validation import clock_problems
+from tasks.campaign.channel_validation import find_clock_problems
 from tasks.campaign.channels import BRAKE_SIGNALS
-from tasks.campaign.episodes import Episode, pressure_episodes
+from tasks.campaign.episodes import Episode, find_pressure_episodes
 from tasks.campaign.held_inputs import take_samples
 from tasks.campaign.signals import ChannelRule, Signal, average_sources, convert_to_channel
 
@@ -84,7 +84,9 @@ def cut_segments(
             f" more than it idles at; it is {cut.threshold:g}"
         )
         return [Segment(start=float(applied.time[0]), end=float(applied.time[-1]), fault=fault)]
-    episodes = pressure_episodes(applied.time, pressure, threshold=cut.threshold, merge_gap=cut.merge_gap)
+    episodes = find_pressure_episodes(
+        applied.time, pressure, threshold=cut.threshold, merge_gap=cut.merge_gap
+    )
     parts = _convert_signals(signals, rules)
     speed = next((signal for channel, signal in parts if channel == "speed"), None)
     first, last = float(applied.time[0]), float(applied.time[-1])
@@ -116,7 +118,7 @@ def _judge_segment(
         inside = signal.cut_window(segment.start, segment.end)
         if len(inside.time) < 2:
             return replace(segment, fault=f"channel {channel} has {len(inside.time)} samples in it")
-        if problems := clock_problems(inside):
+        if problems := find_clock_problems(inside):
             return replace(segment, fault=f"channel {channel} {problems[0]}")
     return segment
 

@@ -25,20 +25,20 @@ class Quantity:
     measure: Callable[[Event], float]
 
 
-def _percentile_95(event: Event, channel: str, window: Window) -> float:
+def _find_percentile_95(event: Event, channel: str, window: Window) -> float:
     return float(np.percentile(np.abs(event.columns[channel][event.mask_window(window)]), 95))
 
 
-def _largest_rise(event: Event, channel: str, sign: float) -> float:
+def _find_largest_rise(event: Event, channel: str, sign: float) -> float:
     inside = event.mask_window(event.protocol.evaluation)
     return max(float(np.max(sign * event.subtract_baseline(channel)[inside])), 0.0)
 
 
-def _onset_residual(event: Event) -> float:
+def _compute_onset_residual(event: Event) -> float:
     return float(abs(event.dive[int(np.argmin(np.abs(event.time)))]))
 
 
-def _pitch_deviation(event: Event) -> float:
+def _measure_pitch_deviation(event: Event) -> float:
     return float(np.std(event.columns["pitch"][event.mask_window(event.protocol.baseline)]))
 
 
@@ -46,7 +46,7 @@ def _percentile_quantity(channel: str, unit: str) -> Quantity:
     return Quantity(
         unit=unit,
         channels=(channel,),
-        measure=lambda event: _percentile_95(event, channel, event.protocol.quality),
+        measure=lambda event: _find_percentile_95(event, channel, event.protocol.quality),
     )
 
 
@@ -54,26 +54,26 @@ QUANTITIES: dict[str, Quantity] = {
     "pressure_duration": Quantity(unit="s", channels=(), measure=lambda event: event.duration),
     "start_speed": Quantity(unit="m/s", channels=("speed",), measure=lambda event: event.start_speed),
     "pressure_increase": Quantity(
-        unit="MPa", channels=(), measure=lambda event: _largest_rise(event, "brake_pressure", 1.0)
+        unit="MPa", channels=(), measure=lambda event: _find_largest_rise(event, "brake_pressure", 1.0)
     ),
     "deceleration_increase": Quantity(
         unit="m/s^2",
         channels=("longitudinal_acceleration",),
-        measure=lambda event: _largest_rise(event, "longitudinal_acceleration", -1.0),
+        measure=lambda event: _find_largest_rise(event, "longitudinal_acceleration", -1.0),
     ),
     "steering_p95": _percentile_quantity("steering_angle", "deg"),
     "yaw_rate_p95": _percentile_quantity("yaw_rate", "deg/s"),
     "pitch_slope": Quantity(
         unit="deg/s", channels=("pitch",), measure=lambda event: abs(event.pitch_baseline[0])
     ),
-    "pitch_deviation": Quantity(unit="deg", channels=("pitch",), measure=_pitch_deviation),
-    "onset_residual": Quantity(unit="deg", channels=("pitch",), measure=_onset_residual),
+    "pitch_deviation": Quantity(unit="deg", channels=("pitch",), measure=_measure_pitch_deviation),
+    "onset_residual": Quantity(unit="deg", channels=("pitch",), measure=_compute_onset_residual),
     "vertical_acceleration_p95": _percentile_quantity("vertical_acceleration", "m/s^2"),
     "roll_rate_p95": _percentile_quantity("roll_rate", "deg/s"),
     "pressure_before_p95": Quantity(
         unit="MPa",
         channels=(),
-        measure=lambda event: _percentile_95(event, "brake_pressure", event.protocol.baseline),
+        measure=lambda event: _find_percentile_95(event, "brake_pressure", event.protocol.baseline),
     ),
 }
 """Quantities that selection rules may limit (paper, Appendix C.5)."""

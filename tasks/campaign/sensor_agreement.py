@@ -44,7 +44,7 @@ def measure_sensor_agreement(
     """
     if len(columns["speed"]) * interval < 2.0 * EDGE_S + SHORTEST_S:
         return None
-    smooth = {name: _moving_mean(columns[name], interval) for name in
+    smooth = {name: _compute_moving_mean(columns[name], interval) for name in
               ("speed", "longitudinal_acceleration", "pitch", "pitch_rate")}  # fmt: skip
     inner = slice(round(EDGE_S / interval), -round(EDGE_S / interval))
     rate = np.gradient(smooth["pitch"], interval)[inner]
@@ -63,6 +63,6 @@ def _regress(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, flo
     return float(np.polyfit(x, y, 1)[0]), float(np.corrcoef(x, y)[0, 1])
 
 
-def _moving_mean(values: NDArray[np.float64], interval: float) -> NDArray[np.float64]:
+def _compute_moving_mean(values: NDArray[np.float64], interval: float) -> NDArray[np.float64]:
     width = max(round(SMOOTHING_S / interval), 1)
     return np.convolve(values, np.ones(width) / width, mode="same")

@@ -23,7 +23,7 @@ MASS_TIMES_RADIUS = (50.0, 25000.0)
 """Torque per rate of speed of a vehicle, from a small car to a truck [kg m]; outside it something else moves it."""
 
 
-def torque_problems(
+def find_torque_problems(
     smooth: Mapping[str, NDArray[np.float64]], interval: float, *, stands_in: bool
 ) -> list[str]:
     """Return the problem of an ``engine_torque`` that runs against the motion; none where too little changes to tell.

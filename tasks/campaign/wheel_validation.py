@@ -21,7 +21,7 @@ FREE = 1.0
 """Deceleration up to which a wheel rolls without slip that counts [m/s^2]."""
 
 
-def radius_problems(columns: Mapping[str, NDArray[np.float64]], interval: float) -> list[str]:
+def find_radius_problems(columns: Mapping[str, NDArray[np.float64]], interval: float) -> list[str]:
     """Return the problems of wheel speeds whose rolling radius is none of a road car's.
 
     Parameters

@@ -53,7 +53,7 @@ class Route:
             )
         if not (np.isfinite(self.station).all() and np.isfinite(self.T_world_rig).all()):
             raise InputError("a route's stations and poses must be finite; some are not")
-        problems += _range_problems(self.T_world_rig[:, :3, 3])
+        problems += _find_range_problems(self.T_world_rig[:, :3, 3])
         if not self.station[-1] <= LONGEST_ROUTE:
             problems.append(f"a route must be at most {LONGEST_ROUTE:g} m long; it is {self.station[-1]:g} m")
         steps = np.diff(self.station)
@@ -191,7 +191,7 @@ def route_from_poses(T_world_rig: NDArray[np.float64], standstill: float = 0.01)
     InputError
         If fewer than two poses remain.
     """
-    if problems := _range_problems(T_world_rig[:, :3, 3]):
+    if problems := _find_range_problems(T_world_rig[:, :3, 3]):
         raise InputError(problems)
     poses = T_world_rig[_drop_standstill(T_world_rig[:, :3, 3], standstill)]
     steps = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)
@@ -211,7 +211,7 @@ def route_from_positions(positions: NDArray[np.float64], standstill: float = 0.0
     InputError
         If fewer than two points remain, or the route stands upright somewhere.
     """
-    if problems := _range_problems(positions):
+    if problems := _find_range_problems(positions):
         raise InputError(problems)
     kept = positions[_drop_standstill(positions, standstill)]
     if len(kept) < 2:
@@ -231,7 +231,7 @@ def route_from_positions(positions: NDArray[np.float64], standstill: float = 0.0
     return Route(station=station, T_world_rig=poses)
 
 
-def _range_problems(positions: NDArray[np.float64]) -> list[str]:
+def _find_range_problems(positions: NDArray[np.float64]) -> list[str]:
     if (np.abs(positions) <= FARTHEST).all():
         return []
     bad = int(np.flatnonzero(~(np.abs(positions) <= FARTHEST).all(axis=1))[0])

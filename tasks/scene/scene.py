@@ -47,7 +47,7 @@ class Scene:
         return np.array((flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)))
 
 
-def sun_problems(sun_direction_deg: tuple[float, float] | None) -> list[str]:
+def find_sun_problems(sun_direction_deg: tuple[float, float] | None) -> list[str]:
     """Return the problems of a sun's azimuth and elevation [deg], one sentence each; empty when there are none."""
     if sun_direction_deg is None or (
         np.isfinite(sun_direction_deg).all() and LOWEST_SUN_DEG <= sun_direction_deg[1] <= 90

@@ -7,7 +7,7 @@ from math import nan
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.episodes import pressure_episodes
+from tasks.campaign.episodes import find_pressure_episodes
 from tasks.campaign.events import RecordedRun
 
 ACTIVE = 0.12
@@ -81,7 +81,7 @@ def stop_of(drive: RecordedRun, lead: float) -> Stop | None:
     lead_samples = round(lead / drive.interval)
     episodes = [
         episode
-        for episode in pressure_episodes(time, pressure, threshold=ACTIVE, merge_gap=0.08)
+        for episode in find_pressure_episodes(time, pressure, threshold=ACTIVE, merge_gap=0.08)
         if speed[episode.onset] > MASKED_SPEED
         and episode.onset >= lead_samples
         and bool((speed[episode.onset :] < STANDING_SPEED).any())

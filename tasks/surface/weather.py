@@ -242,7 +242,7 @@ WEATHERS: Mapping[str, WeatherKind] = {
 """Every kind of weather there is, by its name."""
 
 
-def weather_problem(name: str) -> str | None:
+def find_weather_problem(name: str) -> str | None:
     """The rest of a sentence on a name that is no kind of weather; None where it is one."""
     if name in WEATHERS:
         return None
@@ -262,7 +262,7 @@ def find_weather(name: str) -> WeatherKind:
     InputError
         If there is no such kind; the sentence lists those that exist.
     """
-    if problem := weather_problem(name):
+    if problem := find_weather_problem(name):
         raise InputError(f"weather {problem}")
     return WEATHERS[name]
 

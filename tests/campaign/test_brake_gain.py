@@ -6,7 +6,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from tasks.campaign.brake_gain import gain_problems
+from tasks.campaign.brake_gain import find_gain_problems
 
 Runs = dict[str, dict[str, np.ndarray]]
 INTERVAL = 0.01
@@ -45,7 +45,7 @@ SLIDING = [make_stop(p, most=1.6) for p in (1.0, 2.0, 4.0)]
     "stops", [PLAIN, BLENDED, SLIDING, [*PLAIN, *SLIDING], [*PLAIN, make_stop(0.02, motor=2.0)]]
 )
 def test_engine_motor_and_friction_are_no_fault_of_the_gauge(stops: list[dict[str, np.ndarray]]) -> None:
-    assert gain_problems(make_runs(*stops), INTERVAL) == []
+    assert find_gain_problems(make_runs(*stops), INTERVAL) == []
 
 
 @pytest.mark.parametrize(
@@ -61,7 +61,7 @@ def test_engine_motor_and_friction_are_no_fault_of_the_gauge(stops: list[dict[st
 def test_a_pressure_ten_times_off_is_named_with_its_runs(
     stops: list[dict[str, np.ndarray]], scale: float, words: str
 ) -> None:
-    (problem,) = gain_problems(make_runs(*stops, scale=scale), INTERVAL)
+    (problem,) = find_gain_problems(make_runs(*stops, scale=scale), INTERVAL)
     assert words in problem
     assert ("map the motor's torque as engine_torque" in problem) == (scale < 1.0)
 
@@ -70,7 +70,7 @@ def test_a_pressure_ten_times_off_is_named_with_its_runs(
 def test_one_recording_of_its_own_scale_is_named(factor: float) -> None:
     runs = make_runs(*PLAIN, *PLAIN)
     runs["s3"]["brake_pressure"] = factor * runs["s3"]["brake_pressure"]
-    (problem,) = gain_problems(runs, INTERVAL)
+    (problem,) = find_gain_problems(runs, INTERVAL)
     assert "over the braking of s3, which" in problem
 
 
@@ -81,15 +81,15 @@ def test_anti_lock_stops_on_a_slippery_road_are_no_fault_of_the_gauge(
     snow = [make_stop(15.0, most=2.0), make_stop(14.0, most=3.5)]
     runs = make_runs(*dry, *snow)
     slippery = list(runs)[len(dry) :]
-    assert gain_problems(runs, INTERVAL, slippery=slippery) == []
-    (problem,) = gain_problems(runs, INTERVAL)
+    assert find_gain_problems(runs, INTERVAL, slippery=slippery) == []
+    (problem,) = find_gain_problems(runs, INTERVAL)
     assert f"over the braking of {', '.join(slippery)}, which" in problem
 
 
 @pytest.mark.parametrize(("scale", "named"), [(12.0, "s1, s2, s3, which"), (0.1, "s1, s2, s3, s4, which")])
 def test_a_stop_on_a_slippery_road_hides_no_wrong_scale(scale: float, named: str) -> None:
     runs = make_runs(*PLAIN, make_stop(1.0, most=1.6), scale=scale)
-    (problem,) = gain_problems(runs, INTERVAL, slippery=["s4"])
+    (problem,) = find_gain_problems(runs, INTERVAL, slippery=["s4"])
     assert named in problem
 
 
@@ -97,9 +97,9 @@ def test_a_measured_motor_is_no_fault_of_the_gauge_even_at_one_pressure() -> Non
     alike = [make_stop(0.1, motor=1.0)] * 3
     for stop in alike:
         stop["brake_pressure"] = np.where(stop["brake_pressure"] > 0.09, 0.1, 0.0)
-    (problem,) = gain_problems(make_runs(*alike), INTERVAL)
+    (problem,) = find_gain_problems(make_runs(*alike), INTERVAL)
     assert "map the motor's torque as engine_torque" in problem
-    assert gain_problems(make_runs(*alike, with_torque=True), INTERVAL) == []
+    assert find_gain_problems(make_runs(*alike, with_torque=True), INTERVAL) == []
 
 
 @pytest.mark.parametrize("factor", [0.1, 10.0])
@@ -113,7 +113,7 @@ def test_a_pressure_ten_times_off_is_found_in_measured_campaigns(factor: float, 
             name: {channel: table.column(channel).to_numpy() for channel in ("brake_pressure", "speed")}
             for name, table in tables.items()
         }
-        assert gain_problems(runs, INTERVAL) == []
+        assert find_gain_problems(runs, INTERVAL) == []
         for run in runs.values():
             run["brake_pressure"] = factor * run["brake_pressure"]
-        assert len(gain_problems(runs, INTERVAL)) == 1
+        assert len(find_gain_problems(runs, INTERVAL)) == 1

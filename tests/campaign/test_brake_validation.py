@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tasks.campaign.channel_validation import plausibility_problems
+from tasks.campaign.channel_validation import find_plausibility_problems
 from tasks.campaign.channels import CHANNELS_BY_NAME
 
 INTERVAL = 0.05
@@ -16,7 +16,7 @@ UNIT = {"brake_pressure": 3.0, "brake_torque": 3000.0, "brake_command": 0.6, "pe
 
 def problems_of(name: str, brake: NDArray[np.float64], deceleration: NDArray[np.float64]) -> list[str]:
     speed = 45.0 - np.cumsum(deceleration) * INTERVAL
-    return plausibility_problems(
+    return find_plausibility_problems(
         {name: UNIT[name] * brake, "speed": speed},
         INTERVAL,
         {name: CHANNELS_BY_NAME[name].unit, "speed": "m/s"},
@@ -61,5 +61,7 @@ def test_a_sound_brake_raises_no_alarm(name: str, deceleration: NDArray[np.float
 def test_a_stop_of_an_hour_is_a_time_in_ms(slower: float, told: bool) -> None:
     speed = 45.0 - 9.0 * np.cumsum(BRAKE) * INTERVAL
     columns = {"brake_pressure": 3.0 * BRAKE, "speed": speed}
-    problems = plausibility_problems(columns, slower * INTERVAL, {"brake_pressure": "MPa", "speed": "m/s"})
+    problems = find_plausibility_problems(
+        columns, slower * INTERVAL, {"brake_pressure": "MPa", "speed": "m/s"}
+    )
     assert any("correct the unit of time" in problem for problem in problems) == told

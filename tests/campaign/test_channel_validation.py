@@ -8,10 +8,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from tasks.campaign.channel_validation import (
-    clock_problems,
-    frozen_problem,
-    plausibility_problems,
-    signal_problems,
+    find_clock_problems,
+    find_frozen_problem,
+    find_plausibility_problems,
+    find_signal_problems,
 )
 from tasks.campaign.channels import CHANNELS_BY_NAME
 from tasks.campaign.signals import Signal
@@ -25,21 +25,21 @@ INTERVAL = 0.01
 )
 def test_a_clock_that_repeats_a_stamp_is_told_the_key_for_it(step: float, told: str) -> None:
     time = np.concatenate((INTERVAL * np.arange(50), INTERVAL * (49 + np.arange(50)) + step))
-    (problem,) = clock_problems(Signal(time=time, values=0.0 * time))
+    (problem,) = find_clock_problems(Signal(time=time, values=0.0 * time))
     assert "does not advance" in problem and told in problem and ("keep_first" in problem) == (step == 0.0)
 
 
 def problems_of(columns: Columns) -> list[str]:
     time = columns["time"]
     channels = {name: values for name, values in columns.items() if name != "time"}
-    found = plausibility_problems(
+    found = find_plausibility_problems(
         channels, INTERVAL, {name: CHANNELS_BY_NAME[name].unit for name in channels}
     )
     speed = Signal(time=time, values=channels["speed"])
     for name, values in channels.items():
         signal = Signal(time=time, values=values)
-        found += signal_problems(signal)
-        frozen = frozen_problem(name, signal, speed)
+        found += find_signal_problems(signal)
+        frozen = find_frozen_problem(name, signal, speed)
         found += [] if frozen is None else [frozen]
     return found
 
@@ -112,7 +112,7 @@ def test_a_run_that_begins_within_a_split_step_shows_no_finer_sensor() -> None:
     for share in (0.3, 0.5, 0.64):
         clock = time[:-1] + 0.2 * share
         signal = Signal(time=clock, values=np.interp(clock, time, logged))
-        assert frozen_problem("speed", signal, signal) is None
+        assert find_frozen_problem("speed", signal, signal) is None
 
 
 def test_rounding_is_no_step_of_a_coarse_sensor() -> None:
@@ -125,8 +125,8 @@ def test_rounding_is_no_step_of_a_coarse_sensor() -> None:
     uneven = np.interp(time, time + 0.02 * np.sin(np.arange(len(time))), driven)  # put on an even clock
     for values in (driven, rounded, uneven):
         signal = Signal(time=time, values=values)
-        assert frozen_problem("speed", signal, signal) is None
+        assert find_frozen_problem("speed", signal, signal) is None
     lost = Signal(time=time, values=np.where(driven < 80.0 / 3.6, rounded - 5.0, rounded))
-    problem = frozen_problem("speed", lost, lost)
+    problem = find_frozen_problem("speed", lost, lost)
     assert problem is not None and "holds 22.22 for" in problem
     assert problem.endswith("cut the run there, or leave the channel out")

@@ -7,7 +7,7 @@ import pytest
 
 from catalogs.effects import load_effects
 from tasks.campaign.campaign import CHANNELS, Run
-from tasks.campaign.run_validation import motion_problem, run_problems
+from tasks.campaign.run_validation import find_motion_problem, find_recording_problems
 from tasks.identification.inference.forward import predict_channels, prepare_run
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.table import EFFECT_TABLE
@@ -26,7 +26,7 @@ def columns_of(run: Run, theta: np.ndarray) -> dict[str, np.ndarray]:
 
 def test_a_stop_that_a_slow_log_leaves_with_few_samples_is_no_car_that_stands() -> None:
     city_stop = np.concatenate((np.full(8, 14.0), np.linspace(14.0, 0.0, 8), np.zeros(4)))
-    problem = motion_problem(city_stop, 0.5, False)
+    problem = find_motion_problem(city_stop, 0.5, False)
     assert problem is not None and "for 20 samples, which take 10 s at 2 Hz" in problem
     assert "where it drives, log faster or take a longer run" in problem
 
@@ -37,7 +37,7 @@ def test_a_run_shorter_than_the_smoothing_is_checked_as_any_other(count: int, in
     run = replace(plain_run(20.0, 2.0), interval=interval)
     columns = {name: values[:count] for name, values in columns_of(run, np.zeros(len(EFFECT_TABLE))).items()}
     columns["brake_pressure"] = np.linspace(0.0, 0.5, count)
-    assert run_problems(columns, {}, interval, CHANNELS) == []
+    assert find_recording_problems(columns, {}, interval, CHANNELS) == []
 
 
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
@@ -49,4 +49,4 @@ def test_an_effect_that_the_model_lacks_is_no_fault(effect: Effect, share: float
         theta[parameter.index] = abs(share) * bound if k == 0 else parameter.start
     for speed, peak in ((6.0, 1.0), (15.0, 1.5), (20.0, 4.0)):
         run = replace(plain_run(speed, peak), disc_rise=150.0)
-        assert run_problems(columns_of(run, theta), {}, run.interval, CHANNELS) == []
+        assert find_recording_problems(columns_of(run, theta), {}, run.interval, CHANNELS) == []

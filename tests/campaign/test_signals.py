@@ -5,7 +5,7 @@ import pytest
 
 from tasks.campaign.assembly import assemble_run
 from tasks.campaign.channels import UNITS, guess_unit, unit_factor
-from tasks.campaign.episodes import pressure_episodes
+from tasks.campaign.episodes import find_pressure_episodes
 from tasks.campaign.signals import (
     ChannelRule,
     Gain,
@@ -107,8 +107,8 @@ def test_active_samples_up_to_the_gap_apart_are_one_episode() -> None:
     t = np.arange(100) * 0.02
     pressure = np.zeros(100)
     pressure[10:15] = pressure[18:20] = pressure[30:33] = 0.2
-    near, far = pressure_episodes(t, pressure, threshold=0.12, merge_gap=0.08)
+    near, far = find_pressure_episodes(t, pressure, threshold=0.12, merge_gap=0.08)
     assert (near.onset, near.onset_time, near.end_time) == (10, t[10], t[19])
     assert far.onset == 30 and far.duration == pytest.approx(0.04)
-    assert len(pressure_episodes(t, pressure, threshold=0.12, merge_gap=0.079)) == 3
-    assert pressure_episodes(t, pressure, threshold=0.3, merge_gap=0.08) == ()
+    assert len(find_pressure_episodes(t, pressure, threshold=0.12, merge_gap=0.079)) == 3
+    assert find_pressure_episodes(t, pressure, threshold=0.3, merge_gap=0.08) == ()

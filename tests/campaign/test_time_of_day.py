@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tasks.campaign.channel_validation import clock_problems
+from tasks.campaign.channel_validation import find_clock_problems
 from tasks.campaign.signals import Signal
 from tasks.campaign.time_of_day import has_digits_of_day, looks_like_time_of_day, read_time_of_day
 from tests.campaign.recorded import braking_columns, log_signal
@@ -31,7 +31,7 @@ def test_a_drive_goes_on_after_midnight() -> None:
 @pytest.mark.parametrize("start", [37435.0, 39595.0])  # over a minute, over an hour
 def test_digits_that_are_taken_for_seconds_are_told(start: float) -> None:
     stamps = write_digits(start + 0.05 * np.arange(400))
-    (problem,) = clock_problems(Signal(time=stamps, values=0.0 * stamps))
+    (problem,) = find_clock_problems(Signal(time=stamps, values=0.0 * stamps))
     assert "digits of hours, minutes and seconds: give unit: HHMMSS under time" in problem
 
 

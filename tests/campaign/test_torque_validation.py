@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tasks.campaign.channel_validation import plausibility_problems
+from tasks.campaign.channel_validation import find_plausibility_problems
 from tasks.campaign.channels import CHANNELS_BY_NAME
 
 INTERVAL = 0.02
@@ -27,7 +27,9 @@ def problems_of(
     }
     if "slope" in more:
         columns["road_slope"] = np.degrees(more["slope"])
-    found = plausibility_problems(columns, INTERVAL, {name: CHANNELS_BY_NAME[name].unit for name in columns})
+    found = find_plausibility_problems(
+        columns, INTERVAL, {name: CHANNELS_BY_NAME[name].unit for name in columns}
+    )
     return [problem for problem in found if "engine_torque" in problem]
 
 
@@ -70,7 +72,7 @@ def test_a_slope_that_is_driven_up_with_more_torque_is_no_fault() -> None:
         "speed": 25.0 + np.cumsum(rate) * INTERVAL,
         "engine_torque": torque,
     }
-    assert plausibility_problems(columns, INTERVAL, dict.fromkeys(columns, "MPa")) == []
+    assert find_plausibility_problems(columns, INTERVAL, dict.fromkeys(columns, "MPa")) == []
 
 
 def test_a_signal_in_place_of_the_pressure_does_not_say_when_the_brake_is_released() -> None:
@@ -82,10 +84,10 @@ def test_a_signal_in_place_of_the_pressure_does_not_say_when_the_brake_is_releas
         "engine_torque": 900.0 * BRAKE - 900.0,
     }
     units = {"brake_pressure": "N m", "speed": "m/s", "engine_torque": "N m"}
-    assert plausibility_problems(columns, INTERVAL, units) == []
+    assert find_plausibility_problems(columns, INTERVAL, units) == []
 
 
 def test_without_a_signal_of_the_brake_nothing_is_told() -> None:
     speed = 25.0 + np.cumsum(DRIVE / (MASS * RADIUS)) * INTERVAL
     columns = {"speed": speed, "engine_torque": -DRIVE}
-    assert plausibility_problems(columns, INTERVAL, {"speed": "m/s", "engine_torque": "N m"}) == []
+    assert find_plausibility_problems(columns, INTERVAL, {"speed": "m/s", "engine_torque": "N m"}) == []

@@ -4,7 +4,7 @@ import pytest
 
 from catalogs.entries import entry_names
 from catalogs.grids import load_grid
-from catalogs.scenario import Scenario, route_problems, scenario_problems
+from catalogs.scenario import Scenario, find_route_problems, find_scenario_problems
 from tasks.errors import InputError
 
 
@@ -129,12 +129,15 @@ def test_an_unknown_grid_lists_those_that_exist():
     ],
 )
 def test_each_rule_of_a_scenario_is_enforced(fields, rule):
-    problems = scenario_problems(Scenario(**fields))
+    problems = find_scenario_problems(Scenario(**fields))
     assert any(rule in problem for problem in problems), problems
 
 
 def test_a_sound_scenario_has_no_problems():
-    assert scenario_problems(Scenario(weather="snow", precipitation_mm_h=1.0, snow_accumulation_h=1.0)) == []
+    assert (
+        find_scenario_problems(Scenario(weather="snow", precipitation_mm_h=1.0, snow_accumulation_h=1.0))
+        == []
+    )
 
 
 @pytest.mark.parametrize(
@@ -142,4 +145,4 @@ def test_a_sound_scenario_has_no_problems():
 )
 def test_a_hazard_must_lie_on_the_route(center, length, fits):
     scenario = Scenario(hazard_center_m=center, hazard_length_m=length, hazard_height_m=0.1)
-    assert (route_problems(scenario, 100.0, "s") == []) == fits
+    assert (find_route_problems(scenario, 100.0, "s") == []) == fits

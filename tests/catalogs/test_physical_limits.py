@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from catalogs.physical_limits import PHYSICAL_LIMITS, load_physical_limits
-from catalogs.scenario import Scenario, scenario_problems
+from catalogs.scenario import Scenario, find_scenario_problems
 from catalogs.studies import load_conditions
 from catalogs.studies.ablation import load_ablation
 
@@ -25,7 +25,7 @@ def test_the_heaviest_rain_is_that_of_one_minute_in_an_hour():
 def test_the_papers_scenarios_lie_within_the_limits():
     scenarios = [condition.scenario for condition in load_conditions()]
     scenarios += [scenario for stops in load_ablation().stops.values() for scenario in stops]
-    assert [scenario_problems(scenario) for scenario in scenarios] == [[]] * len(scenarios)
+    assert [find_scenario_problems(scenario) for scenario in scenarios] == [[]] * len(scenarios)
 
 
 @pytest.mark.parametrize(
@@ -55,14 +55,14 @@ def test_the_papers_scenarios_lie_within_the_limits():
     ],
 )
 def test_what_lies_beyond_a_limit_is_refused_with_the_limits_reason(scenario, words):
-    (problem,) = scenario_problems(scenario)
+    (problem,) = find_scenario_problems(scenario)
     assert words in problem
     assert any(limit.source in problem for _, limit in load_physical_limits())
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])
 def test_a_number_that_is_not_finite_is_refused(value):
-    problems = scenario_problems(replace(SNOW, precipitation_mm_h=value))
+    problems = find_scenario_problems(replace(SNOW, precipitation_mm_h=value))
     assert f"precipitation_mm_h must be a finite number; it is {value}" in problems
 
 

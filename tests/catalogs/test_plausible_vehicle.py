@@ -10,8 +10,8 @@ from catalogs.entries import entry_names
 from catalogs.plausible_vehicle import (
     PLAUSIBLE_VEHICLE,
     PlausibleVehicle,
+    find_plausibility_problems,
     load_plausible_vehicle,
-    plausibility_problems,
 )
 from catalogs.vehicles import load_tolerances, load_vehicle, vehicle_units
 from tasks.vehicle.figures import FIGURES, compute_figures
@@ -56,13 +56,13 @@ def named(problems):
 
 @pytest.mark.parametrize("name", entry_names("vehicle"))
 def test_every_vehicle_that_ships_is_plausible(name):
-    assert plausibility_problems(compute_figures(load_vehicle(name)), load_tolerances(name)) == []
+    assert find_plausibility_problems(compute_figures(load_vehicle(name)), load_tolerances(name)) == []
 
 
 @pytest.mark.parametrize("slip", SLIPS)
 def test_a_slip_of_a_number_is_told(slip):
     fields, figures = SLIPS[slip]
-    assert figures <= named(plausibility_problems(compute_figures(replace(REFERENCE, **fields)), {}))
+    assert figures <= named(find_plausibility_problems(compute_figures(replace(REFERENCE, **fields)), {}))
 
 
 def test_every_figure_is_told_by_some_slip():
@@ -70,7 +70,7 @@ def test_every_figure_is_told_by_some_slip():
 
 
 def test_a_sentence_has_rule_value_reason_and_what_to_look_at():
-    (problem,) = plausibility_problems(compute_figures(replace(REFERENCE, front_brake_share=0.35)), {})
+    (problem,) = find_plausibility_problems(compute_figures(replace(REFERENCE, front_brake_share=0.35)), {})
     limits = load_plausible_vehicle().figures["front_brake_share"]
     assert problem == (
         f"front_brake_share must lie within 0.45 to 0.85 ({limits.source}); it is 0.35: check {limits.check}"
@@ -78,12 +78,16 @@ def test_a_sentence_has_rule_value_reason_and_what_to_look_at():
 
 
 def test_a_figure_that_is_no_number_is_told():
-    assert "mass" in named(plausibility_problems(compute_figures(REFERENCE) | {"mass": float("nan")}, {}))
+    assert "mass" in named(
+        find_plausibility_problems(compute_figures(REFERENCE) | {"mass": float("nan")}, {})
+    )
 
 
 @pytest.mark.parametrize("share", [1e-4, 5.0])
 def test_a_tolerance_that_is_a_percentage_or_nothing_is_told(share):
-    (problem,) = plausibility_problems(compute_figures(REFERENCE), {"cg_height": share, "sprung_mass": 0.02})
+    (problem,) = find_plausibility_problems(
+        compute_figures(REFERENCE), {"cg_height": share, "sprung_mass": 0.02}
+    )
     assert problem.startswith(
         "tolerance of cg_height over its value must lie within 0.0005 to 0.5 (own choice"
     )
@@ -93,7 +97,7 @@ def test_usual_tolerances_are_of_numbers_that_exist_and_plausible():
     ranges = load_plausible_vehicle()
     shares = {name: number.value for name, number in ranges.usual_tolerances.items()}
     assert shares.keys() <= vehicle_units().keys()
-    assert not plausibility_problems({}, shares)
+    assert not find_plausibility_problems({}, shares)
 
 
 def test_the_catalogue_has_every_figure_in_its_unit_and_says_why():

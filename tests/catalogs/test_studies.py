@@ -4,7 +4,7 @@ from decimal import Decimal
 
 import pytest
 
-from catalogs.scenario import scenario_problems
+from catalogs.scenario import find_scenario_problems
 from catalogs.studies import load_conditions, load_sensitivity_study
 from catalogs.studies.agreement import printed_agreement, put_beside_print
 
@@ -17,7 +17,7 @@ def test_there_are_nineteen_development_and_twelve_held_out_conditions():
 
 def test_every_condition_is_a_sound_scenario():
     assert not [
-        problem for condition in load_conditions() for problem in scenario_problems(condition.scenario)
+        problem for condition in load_conditions() for problem in find_scenario_problems(condition.scenario)
     ]
 
 

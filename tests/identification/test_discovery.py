@@ -10,7 +10,7 @@ from catalogs.decision_rules import load_decision_rules
 from tasks.identification.decision import discovery
 from tasks.identification.decision.attribution import Candidate
 from tasks.identification.decision.search import Round, SearchState
-from tasks.identification.decision.verdict import _verdict_name
+from tasks.identification.decision.verdict import _choose_verdict_name
 
 RULES = load_decision_rules()
 RUNS = SimpleNamespace(rules=RULES, session_sigma=np.ones(7))
@@ -73,8 +73,8 @@ def test_an_effect_of_a_forms_port_and_variable_that_was_tried_in_vain_is_held_a
 def test_a_form_whose_rival_the_library_holds_is_no_unknown_form(kind: str, port: str, verdict: str) -> None:
     form = SimpleNamespace(name="a tanh(4x)", effect_class="form", port="suspension_force", variable="speed")
     rival = SimpleNamespace(name="other", effect_class=kind, port=port, variable="speed")
-    assert _verdict_name([form], [(form.name, rival)]) == verdict  # type: ignore[list-item]
-    assert _verdict_name([form], [("another name", rival)]) == "UNKNOWN_FORM"  # type: ignore[list-item]
+    assert _choose_verdict_name([form], [(form.name, rival)]) == verdict  # type: ignore[list-item]
+    assert _choose_verdict_name([form], [("another name", rival)]) == "UNKNOWN_FORM"  # type: ignore[list-item]
 
 
 @pytest.mark.parametrize(("score", "added"), [(46.0, True), (19.0, False)])

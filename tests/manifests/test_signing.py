@@ -24,9 +24,9 @@ from manifests.signing import (
     LARGEST_ENVELOPE,
     PAYLOAD_TYPE,
     add_signature,
+    find_signature_problems,
     load_signer,
     load_verifier,
-    signature_problems,
     state_manifest,
 )
 from tasks.errors import InputError
@@ -59,7 +59,7 @@ def signed_by(key, manifest=MANIFEST, envelope=None) -> bytes:
 
 
 def problems(envelope, key=OWNER, manifest=MANIFEST) -> str:
-    return "; ".join(signature_problems(manifest, envelope, load_verifier(public_pem(key), "key")))
+    return "; ".join(find_signature_problems(manifest, envelope, load_verifier(public_pem(key), "key")))
 
 
 def pre_authentication_encoding(envelope: bytes) -> tuple[bytes, bytes]:
@@ -97,7 +97,7 @@ def test_openssl_makes_the_keys_and_agrees_with_the_signature(tmp_path):
     subprocess.run(["openssl", "genpkey", "-algorithm", "ed25519", "-out", private], check=True)
     subprocess.run(["openssl", "pkey", "-in", private, "-pubout", "-out", public], check=True)
     envelope = add_signature(MANIFEST, None, load_signer(private.read_bytes(), private))
-    assert signature_problems(MANIFEST, envelope, load_verifier(public.read_bytes(), public)) == []
+    assert find_signature_problems(MANIFEST, envelope, load_verifier(public.read_bytes(), public)) == []
     encoded, signature = pre_authentication_encoding(envelope)
     (tmp_path / "encoded").write_bytes(encoded)
     (tmp_path / "signature").write_bytes(signature)

@@ -5,7 +5,7 @@ import pytest
 
 from catalogs.entries import entry_names
 from catalogs.grids import load_grid
-from catalogs.scenario import Scenario, scenario_problems
+from catalogs.scenario import Scenario, find_scenario_problems
 from catalogs.studies import load_sensitivity_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
@@ -34,8 +34,8 @@ STOP = Controls(
 
 def test_ice_is_a_film_that_nothing_falls_on():
     assert SurfaceState(kind="ice", film_depth_mm=0.4, friction=0.1) == ICE
-    assert scenario_problems(Scenario(weather="ice")) == []
-    (problem,) = scenario_problems(Scenario(weather="ice", precipitation_mm_h=2.0))
+    assert find_scenario_problems(Scenario(weather="ice")) == []
+    (problem,) = find_scenario_problems(Scenario(weather="ice", precipitation_mm_h=2.0))
     assert problem.startswith("weather ice has no precipitation; precipitation_mm_h is 2")
 
 

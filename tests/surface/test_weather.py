@@ -5,7 +5,7 @@ from dataclasses import fields
 import pytest
 
 from catalogs.physical_limits import PhysicalLimits, load_physical_limits
-from catalogs.scenario import Scenario, scenario_problems
+from catalogs.scenario import Scenario, find_scenario_problems
 from catalogs.surfaces import load_surface
 from flows.making.driving import weather_of
 from tasks.campaign.planned_runs import RunPlan, make_planned_run
@@ -30,17 +30,17 @@ def sound(kind: str) -> Scenario:
 @pytest.mark.parametrize("kind", WEATHERS)
 def test_a_row_says_what_its_scenarios_give(kind):
     row, limits = WEATHERS[kind], load_physical_limits()
-    assert row.name == kind and scenario_problems(sound(kind)) == []
+    assert row.name == kind and find_scenario_problems(sound(kind)) == []
     wrong = Scenario(
         weather=kind,
         precipitation_mm_h=0.0 if row.rate_limit else 1.5,
         snow_accumulation_h=0.0 if row.accumulates else 0.7,
     )
-    assert len(scenario_problems(wrong)) == 2
+    assert len(find_scenario_problems(wrong)) == 2
     assert row.rate_limit is None or row.rate_limit in PhysicalLimits.model_fields
     if row.rate_limit:
         beyond = getattr(limits, row.rate_limit).value + 1
-        (found,) = scenario_problems(Scenario(**sound(kind).as_row() | {"precipitation_mm_h": beyond}))
+        (found,) = find_scenario_problems(Scenario(**sound(kind).as_row() | {"precipitation_mm_h": beyond}))
         assert found.startswith("precipitation_mm_h must be at most")
 
 
@@ -72,7 +72,7 @@ def test_the_judge_finds_the_same_surface_and_the_derivation_names_what_moved(ki
         lambda: find_weather("hail"),
         lambda: surface_state(Weather(kind="hail"), ASPHALT),
         lambda: make_planned_run(RunPlan(weather="hail", speed=10.0, peak=2.0), "a"),
-        lambda: scenario_problems(Scenario(weather="hail")),
+        lambda: find_scenario_problems(Scenario(weather="hail")),
     ],
 )
 def test_an_unknown_kind_is_refused_and_the_known_are_listed(use):

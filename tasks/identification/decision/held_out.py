@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
-from tasks.campaign.manoeuvres import MANOEUVRE_UNITS, manoeuvre_errors
+from tasks.campaign.manoeuvres import MANOEUVRE_UNITS, measure_manoeuvre_errors
 from tasks.identification.decision.answer import ChannelError
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.fit import Fit, fit_hypotheses
@@ -50,7 +50,7 @@ def compute_held_out_errors(
         y = np.array([predict_channels(model, theta, slots=slots) for theta, slots in models])
         names.append(model.run.name)
         square.append(model.compute_square_error(y))
-        errors = manoeuvre_errors(model.measured, y, model.pressure, model.run.interval)
+        errors = measure_manoeuvre_errors(model.measured, y, model.pressure, model.run.interval)
         if errors is not None:
             braked.append(model.run.name)
             manoeuvres.append(errors**2)

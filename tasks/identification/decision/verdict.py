@@ -164,7 +164,7 @@ def find_missing_effects(
         )
     calibrated, wrong = tell_calibrated(found.base, effects, hardly_known, campaign.tolerances, rules)
     named += wrong
-    kind = _verdict_name(named, near)
+    kind = _choose_verdict_name(named, near)
     if kind == "SET" and len(near) > len(others):
         reasons.append(
             f"{len(near) - len(others)} other explanation(s) lie within {rules.rival_span:g} units, make good"
@@ -245,7 +245,7 @@ def _to_tell_apart(
     return own.fitted, other.fitted
 
 
-def _verdict_name(named: list[NamedEffect], near: list[tuple[str, NamedEffect]]) -> VerdictName:
+def _choose_verdict_name(named: list[NamedEffect], near: list[tuple[str, NamedEffect]]) -> VerdictName:
     forms = {(e.name, e.port, e.variable) for e in named if e.effect_class == "form"}
     if forms:
         # an effect of the library that explains as much at the same port by the same variable is not unknown

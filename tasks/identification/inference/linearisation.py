@@ -59,7 +59,7 @@ def prepare_evidence(
     hardly_known : numbers of the session that the vehicle's file hardly knows: a first value, and the prior's sigma
     """
     rho, sigma = estimate_channel_noise(campaign)
-    tolerances = _without_unseen(campaign).with_session({n: wide for n, (_, wide) in hardly_known.items()})
+    tolerances = _leave_out_unseen(campaign).with_session({n: wide for n, (_, wide) in hardly_known.items()})
     first = np.array([hardly_known.get(name, (0.0, 0.0))[0] for name in SESSION])
     guess = Disturbance()
     models = [
@@ -95,7 +95,7 @@ def prepare_evidence(
     return evidence, null
 
 
-def _without_unseen(campaign: Campaign) -> Tolerances:
+def _leave_out_unseen(campaign: Campaign) -> Tolerances:
     """Return the tolerances, with the suspension fixed where no channel depends on the body's motion."""
     if any(name in campaign.channels for name in BODY_CHANNELS):
         return campaign.tolerances

@@ -11,11 +11,11 @@ from tasks.identification.joint.fit import JointFit, describe_fit, fit_jointly
 from tasks.identification.joint.numbers import FRICTION, JointNumber
 from tasks.identification.joint.stops import Stop
 from tasks.identification.joint.uncertainty import (
-    certain_from,
     compute_interval_reach,
+    compute_naming_distance,
+    compute_standard_errors,
     measure_certainty,
     measure_worst_misfit,
-    standard_errors,
     weigh_robustly,
 )
 from tasks.identification.rules import JointRules
@@ -69,7 +69,7 @@ def eliminate_uncertain_numbers(stops: Sequence[Stop], fitted: JointFit, rules: 
     fitted : with every number free
     rules : of the joint fit
     """
-    unstable = {n.name for n in fitted.numbers if n.removable} - _stable_names(fitted, rules)
+    unstable = {n.name for n in fitted.numbers if n.removable} - _find_stable_names(fitted, rules)
     if unstable:
         fitted = _refit_without(stops, fitted, unstable)
     # a friction that nobody needs makes the certain uncertain
@@ -117,11 +117,11 @@ def _drop_unknown_frictions(stops: Sequence[Stop], fitted: JointFit, rules: Join
     Tyres at their limit and the brake's curve stand in for each other, so that neither may be certain where one of them
     is needed: a friction goes only if the runs are explained as well without it.
     """
-    errors = standard_errors(fitted, rules)
+    errors = compute_standard_errors(fitted, rules)
     for number, error in zip(fitted.numbers, errors, strict=True):
         if number.group == FRICTION and error > KNOWN_SHARE * number.sigma:
             without = refit_numbers(stops, fitted, tuple(n for n in fitted.numbers if n is not number))
-            if without.cost - fitted.cost < 0.5 * certain_from(len(stops), rules) ** 2:
+            if without.cost - fitted.cost < 0.5 * compute_naming_distance(len(stops), rules) ** 2:
                 return _drop_unknown_frictions(stops, without, rules)
     return fitted
 
@@ -195,7 +195,7 @@ def add_certain_numbers(
     falls = foresee_falls(stops, fitted, others) if others else np.empty(0)
     for place in np.argsort(-falls)[:MOST_ADDED]:
         number = others[place]
-        if falls[place] < PROMISED * certain_from(len(stops), rules) ** 2:
+        if falls[place] < PROMISED * compute_naming_distance(len(stops), rules) ** 2:
             break
         wider = refit_numbers(stops, fitted, (*fitted.numbers, number), {number.name: 0.5 * number.sigma})
         if measure_certainty(wider, rules)[-1] < 1.0 or number.is_at_bound(wider.by_name[number.name]):
@@ -206,16 +206,16 @@ def add_certain_numbers(
     return fitted
 
 
-def _stable_names(fitted: JointFit, rules: JointRules) -> set[str]:
+def _find_stable_names(fitted: JointFit, rules: JointRules) -> set[str]:
     """Return the removable numbers that a linear elimination keeps with all runs, and without any one of them."""
     runs = range(len(fitted.residuals))
     samples = [tuple(runs)]
     if len(samples[0]) >= rules.fewest_scatter_runs:
         samples += [tuple(i for i in runs if i != gone) for gone in runs]
-    return set.intersection(*(_kept_linearly(fitted, sample, rules) for sample in samples))
+    return set.intersection(*(_eliminate_linearly(fitted, sample, rules) for sample in samples))
 
 
-def _kept_linearly(fitted: JointFit, runs: tuple[int, ...], rules: JointRules) -> set[str]:
+def _eliminate_linearly(fitted: JointFit, runs: tuple[int, ...], rules: JointRules) -> set[str]:
     """Return the removable numbers that backward elimination keeps on some runs, linear about the fit."""
     residual = [weigh_robustly(fitted.residuals[i]) for i in runs]
     slopes = [fitted.slopes[i] for i in runs]
@@ -233,7 +233,7 @@ def _kept_linearly(fitted: JointFit, runs: tuple[int, ...], rules: JointRules) -
         values = inverse @ right[left]
         sure = np.abs(values) / np.sqrt(np.diag(inverse) * wide)
         weak = [(float(s), j) for s, j in zip(sure, left, strict=True) if fitted.numbers[j].removable]
-        if not weak or min(weak)[0] >= certain_from(len(fitted.residuals), rules):
+        if not weak or min(weak)[0] >= compute_naming_distance(len(fitted.residuals), rules):
             return {fitted.numbers[j].name for j in left if fitted.numbers[j].removable}
         left.remove(min(weak)[1])
 

@@ -231,7 +231,7 @@ def describe_fit(
     cost : robust misfit with the priors, over 2
     """
     k = len(numbers)
-    slopes = tuple(_without_offsets(columns[:, :k], columns[:, k:]) for _, columns in runs)
+    slopes = tuple(_take_out_offsets(columns[:, :k], columns[:, k:]) for _, columns in runs)
     information = np.diag([1.0 / n.sigma**2 for n in numbers]) + sum(a.T @ a for a in slopes)
     return JointFit(
         numbers=numbers, values=values, offsets=offsets, cost=cost, residuals=tuple(left for left, _ in runs),
@@ -240,13 +240,13 @@ def describe_fit(
     )  # fmt: skip
 
 
-def _without_offsets(numbers: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.float64]:
+def _take_out_offsets(numbers: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return derivatives by the numbers with what the run's own offsets can take from them taken out."""
     inner = offsets.T @ offsets + np.diag(1.0 / OFFSET_SIGMA**2)
     return np.asarray(numbers - offsets @ np.linalg.solve(inner, offsets.T @ numbers), dtype=np.float64)
 
 
-def misfit_scales(fitted: JointFit, stops: Sequence[Stop]) -> NDArray[np.float64]:
+def choose_misfit_scales(fitted: JointFit, stops: Sequence[Stop]) -> NDArray[np.float64]:
     """Return the size of a misfit that counts one, by each channel's residuals; float64 [7] [the channel's unit].
 
     Noise and what the model does not know count together: no channel weighs more than the model can follow it.

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
-from tasks.campaign.manoeuvres import MANOEUVRE_UNITS, manoeuvre_errors
+from tasks.campaign.manoeuvres import MANOEUVRE_UNITS, measure_manoeuvre_errors
 from tasks.identification.decision.answer import ChannelError
 from tasks.identification.decision.held_out import is_noticed, summarise_errors
 from tasks.identification.decision.words import join_phrases
@@ -154,7 +154,9 @@ def summarise_held_out(
     channels = summarise_errors(square, names, units, rules.error_resamples)
     braked, distances = [], []
     for stop, y in zip(held_out, predicted, strict=True):
-        figures = manoeuvre_errors(stop.model.measured, y, stop.model.pressure, stop.model.run.interval)
+        figures = measure_manoeuvre_errors(
+            stop.model.measured, y, stop.model.pressure, stop.model.run.interval
+        )
         if figures is not None:
             braked.append(stop.model.run.name)
             distances.append(figures[:, :1] ** 2)

@@ -84,7 +84,7 @@ def make_stop(
     ]
     return Stop(
         model=model,
-        drive=_drive_share(model, onset),
+        drive=_compute_drive_share(model, onset),
         onset=onset,
         channels=np.array([CHANNELS.index(name) for name in seen]),
     )
@@ -96,7 +96,7 @@ def _is_copy(model: RunModel, one: str, other: str) -> bool:
     return bool(np.array_equal(a, b))
 
 
-def _drive_share(model: RunModel, onset: int) -> NDArray[np.float64]:
+def _compute_drive_share(model: RunModel, onset: int) -> NDArray[np.float64]:
     """Return how much of the drive force before the brake acts: by the throttle, else until the brake is pressed."""
     run, count = model.run, model.samples
     if run.drive_torque is not None:

@@ -14,7 +14,7 @@ from tasks.identification.joint.fit import JointFit
 from tasks.identification.rules import JointRules
 
 
-def standard_errors(fitted: JointFit, rules: JointRules) -> NDArray[np.float64]:
+def compute_standard_errors(fitted: JointFit, rules: JointRules) -> NDArray[np.float64]:
     """Return the standard error of each number, float64 [K] [unit of the table].
 
     The curvature with the misfit of the run that is followed worst counts; from `fewest_scatter_runs` runs on the
@@ -69,7 +69,7 @@ def compute_interval_reach(fitted: JointFit, rules: JointRules) -> NDArray[np.fl
     rules : of the joint fit
     """
     runs = len(fitted.residuals)
-    reach = compute_student_quantile(runs) * standard_errors(fitted, rules)
+    reach = compute_student_quantile(runs) * compute_standard_errors(fitted, rules)
     if runs >= rules.fewest_scatter_runs:
         return np.asarray(reach)
     score = np.diag([1.0 / n.sigma**2 for n in fitted.numbers])
@@ -118,7 +118,7 @@ def weigh_robustly(residual: NDArray[np.float64]) -> NDArray[np.float64]:
     return residual / np.sqrt(1.0 + residual**2)
 
 
-def certain_from(runs: int, rules: JointRules) -> float:
+def compute_naming_distance(runs: int, rules: JointRules) -> float:
     """Return the standard errors from 0 from which a number is named: Student's t, for few runs tell their scatter ill.
 
     Parameters
@@ -139,5 +139,5 @@ def measure_certainty(fitted: JointFit, rules: JointRules) -> NDArray[np.float64
     fitted : the fit
     rules : of the joint fit
     """
-    needed = certain_from(len(fitted.residuals), rules) * standard_errors(fitted, rules)
+    needed = compute_naming_distance(len(fitted.residuals), rules) * compute_standard_errors(fitted, rules)
     return np.asarray(np.abs(fitted.values) / np.maximum(needed, compute_interval_reach(fitted, rules)))

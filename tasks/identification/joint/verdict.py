@@ -32,9 +32,9 @@ from tasks.identification.joint.elimination import (
 )
 from tasks.identification.joint.fit import (
     JointFit,
+    choose_misfit_scales,
     fit_jointly,
     measure_misfit,
-    misfit_scales,
     suggest_starts,
 )
 from tasks.identification.joint.held_out import (
@@ -59,7 +59,7 @@ from tasks.identification.joint.numbers import (
 from tasks.identification.joint.stops import FITTED, Stop, complete_numbers, make_stop
 from tasks.identification.joint.uncertainty import (
     compute_interval_reach,
-    standard_errors,
+    compute_standard_errors,
 )
 from tasks.identification.joint.words import tell_lumped_resistance, tell_rivals, tell_what_was_used
 from tasks.identification.rules import DecisionRules, JointRules
@@ -138,6 +138,7 @@ def judge_jointly(
     fitted = drop_contradicted_instruments(train, fitted, joint, reasons)
     fitted = drop_at_bounds(train, fitted, joint, reasons)
     fitted = drop_what_predicts_worse(train, held_out, fitted, joint, reasons)
+    fitted = drop_at_bounds(train, fitted, joint, reasons)
     retuned = refit_numbers(train, fitted, tuple(n for n in fitted.numbers if n.group in CALIBRATED))
 
     def predict_with(grown: JointFit) -> tuple[Predicted, Errors, Errors]:
@@ -212,7 +213,7 @@ def judge_jointly(
         verdict=verdict,
         calibrated=calibrated if effects or is_lowered(error["speed"]) else (),
         fitted=fitted,
-        errors=standard_errors(fitted, joint),
+        errors=compute_standard_errors(fitted, joint),
         train=train,
         held_out=held_out,
         predicted=predicted,
@@ -229,7 +230,7 @@ def _fit_everything(
     Sets are compared without `BENDS_RESISTANCE`, which makes a resistance of one shape look like that of another.
     """
     best = fit_first_numbers(train, {n.name: n for numbers in sets for n in numbers}.values(), starts)
-    scales = misfit_scales(best, train)
+    scales = choose_misfit_scales(best, train)
 
     def fit_set(numbers: Sequence[JointNumber], start: JointFit) -> JointFit:
         return fit_jointly(train, tuple(numbers), [start.by_name], scales=scales, offsets=start.offsets)[0]
@@ -250,7 +251,7 @@ def _settle(
     fits = fit_jointly(train, fitted.numbers, begins, scales=fitted.scales)
     # runs whose own numbers start anew may end in a worse minimum than where they are
     best = min((fitted, *fits), key=lambda fit: fit.cost)
-    near = rules.same_fit_errors * standard_errors(best, rules)
+    near = rules.same_fit_errors * compute_standard_errors(best, rules)
     same = sum(bool(np.all(np.abs(f.values - best.values) < near)) for f in fits)
     return best, (same, len(fits))
 
@@ -281,7 +282,7 @@ def _name_rivals(
 
 def _named_effect(fitted: JointFit, number: JointNumber, rules: JointRules) -> NamedEffect:
     place = fitted.numbers.index(number)
-    value, error = float(fitted.values[place]), float(standard_errors(fitted, rules)[place])
+    value, error = float(fitted.values[place]), float(compute_standard_errors(fitted, rules)[place])
     reach = float(compute_interval_reach(fitted, rules)[place])
     estimate = Parameter(
         name=number.name, value=value, ci_low=max(value - reach, number.lower),

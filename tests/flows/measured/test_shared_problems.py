@@ -11,13 +11,14 @@ from tests.campaign.recorded import braking_columns, log_signal
 from tests.flows.measured.recordings import map_beside, write_csv
 
 
-def place_problem(number: int, sentence: str) -> PlacedProblem:
+def find_place_problem(number: int, sentence: str) -> PlacedProblem:
     return PlacedProblem(name=f"run-{number:02d}", place=f"run-{number:02d} (log.csv)", sentence=sentence)
 
 
 def test_a_shared_fault_is_told_once_with_its_runs_and_the_range_of_its_figures() -> None:
     found = [
-        place_problem(n, f"channel speed reaches {100.0 + n:.4g} m/s, limit 90 m/s^2") for n in range(1, 39)
+        find_place_problem(n, f"channel speed reaches {100.0 + n:.4g} m/s, limit 90 m/s^2")
+        for n in range(1, 39)
     ]
     (told,) = join_shared_problems(found, 40, "runs")
     assert told == (
@@ -28,9 +29,9 @@ def test_a_shared_fault_is_told_once_with_its_runs_and_the_range_of_its_figures(
 
 def test_faults_of_few_runs_and_other_faults_stand_alone() -> None:
     found = [
-        place_problem(1, "is late"),
-        place_problem(2, "is late"),
-        *(place_problem(n, f"falls to -0.{n}") for n in (1, 2, 3)),
+        find_place_problem(1, "is late"),
+        find_place_problem(2, "is late"),
+        *(find_place_problem(n, f"falls to -0.{n}") for n in (1, 2, 3)),
     ]
     assert join_shared_problems(found, 3, "runs") == [
         "run-01 (log.csv): is late",
@@ -40,7 +41,9 @@ def test_faults_of_few_runs_and_other_faults_stand_alone() -> None:
 
 
 def test_two_faults_of_one_run_stay_two() -> None:
-    found = [place_problem(n, f"channel wheel: frozen at {at} s") for n in (1, 2, 3) for at in (n, 10 * n)]
+    found = [
+        find_place_problem(n, f"channel wheel: frozen at {at} s") for n in (1, 2, 3) for at in (n, 10 * n)
+    ]
     first, second = join_shared_problems(found, 3, "runs")
     assert "at 1..3 s" in first and "at 10..30 s" in second
 

@@ -11,7 +11,7 @@ from flows.reading.film import through_film, write_film
 from flows.reading.previews import make_films, name_films
 from flows.store.frames import read_clip
 from flows.store.layout import read_json
-from flows.store.outputs import name_problem
+from flows.store.outputs import find_name_problem
 from tasks.errors import InputError
 from tasks.render.traces import STRIP_HEIGHT
 
@@ -56,7 +56,7 @@ def test_labels_that_differ_have_films_of_their_own_with_names_that_stay_in_the_
     rows = [{"clip_id": f"{k:016x}", "label": label} for k, label in enumerate(labels)]
     names = name_films(rows)
     assert len({name.casefold() for name in names.values()}) == len(labels)
-    assert all(name_problem(name) is None and "/" not in name for name in names.values())
+    assert all(find_name_problem(name) is None and "/" not in name for name in names.values())
     assert not any(name.startswith((".", "-")) for name in names.values())
     assert names[f"{labels.index('snow-3/hump'):016x}"] == "snow-3_hump.mp4"
     assert names["0000000000000000"] == "a_b-0000000000000000.mp4"

@@ -22,8 +22,8 @@ from flows.running.cluster import (
     check_cluster,
     check_joining,
     facts_here,
+    find_version_problems,
     gpu_for,
-    version_problems,
     warm_cluster,
 )
 from flows.running.runner import open_executor
@@ -34,20 +34,20 @@ HERE = {"muSync": "0.1.0", "python": "3.11", "numpy": "2.4.6"}
 
 
 def test_equal_workers_have_no_problem():
-    assert version_problems(HERE, {"tcp://a:1": dict(HERE)}) == []
+    assert find_version_problems(HERE, {"tcp://a:1": dict(HERE)}) == []
 
 
 def test_each_difference_is_told_once_with_both_versions_and_the_workers():
     there = {f"tcp://{name}:1": {**HERE, "numpy": "2.3.0"} for name in "abcde"}
     there["tcp://a:1"] = {**HERE, "python": "3.12"}
-    assert version_problems(HERE, there) == [
+    assert find_version_problems(HERE, there) == [
         "worker tcp://a:1: python is 3.12 there and 3.11 here: install the same",
         "workers tcp://b:1, tcp://c:1, tcp://d:1 and 1 more: numpy is 2.3.0 there and 2.4.6 here: install the same",
     ]
 
 
 def test_a_worker_without_musync_is_told():
-    (problem,) = version_problems(HERE, {"tcp://a:1": ModuleNotFoundError("No module named 'flows'")})
+    (problem,) = find_version_problems(HERE, {"tcp://a:1": ModuleNotFoundError("No module named 'flows'")})
     assert "cannot run muSync" in problem and "install this version there" in problem
 
 

@@ -149,7 +149,9 @@ def test_an_unusable_cache_sends_the_traceback_to_the_temporary_folder(tmp_path,
     assert file is not None and file.parent == tmp_path / "temporary"
 
 
-def test_without_a_home_the_cache_has_to_be_named_and_the_command_says_so(monkeypatch):
+def test_without_a_home_the_cache_has_to_be_named_and_the_command_says_so(tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+
     def no_home() -> Path:
         raise RuntimeError("Could not determine home directory.")
 
@@ -158,7 +160,7 @@ def test_without_a_home_the_cache_has_to_be_named_and_the_command_says_so(monkey
         monkeypatch.delenv(name, raising=False)
     with pytest.raises(InputError, match="set MUSYNC_CACHE"):
         cache_root()
-    assert keep_traceback(KeyError("x"), []) is not None
+    assert keep_traceback(KeyError("x"), []).parent == tmp_path
     assert explain_end(oserror(errno.EACCES), [])[0] == 2
 
 

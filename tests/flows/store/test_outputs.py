@@ -9,7 +9,7 @@ import pytest
 
 from flows.store.journal import append_line, read_lines
 from flows.store.layout import PARTIAL
-from flows.store.outputs import MARKER, Outputs, name_problem, read_marker
+from flows.store.outputs import MARKER, Outputs, find_name_problem, read_marker
 from tasks.errors import InputError
 
 
@@ -140,7 +140,7 @@ def test_a_marker_that_is_no_file_is_refused(tmp_path, kind):
     ],
 )
 def test_a_name_stays_inside_the_folder(tmp_path, name):
-    assert name_problem(name) is not None
+    assert find_name_problem(name) is not None
     with pytest.raises(InputError):
         Outputs(tmp_path, "calibrate", name)
 

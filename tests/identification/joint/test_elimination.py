@@ -20,7 +20,7 @@ from tasks.identification.joint.elimination import (
     foresee_falls,
     refit_numbers,
 )
-from tasks.identification.joint.uncertainty import standard_errors
+from tasks.identification.joint.uncertainty import compute_standard_errors
 from tests.identification.joint.known_car import fit_of, slow_brakes
 
 RULES = load_decision_rules().joint
@@ -106,7 +106,7 @@ def test_a_friction_of_which_the_runs_say_little_more_than_its_prior_goes():
     stops = slow_brakes().train
     free = (numbers["pressure_gain"], numbers["friction"], numbers["lag"])
     fitted = refit_numbers(stops, slow_brakes().fitted, free)
-    error = float(standard_errors(fitted, RULES)[1])
+    error = float(compute_standard_errors(fitted, RULES)[1])
     for sigma, left in ((1.9 * error, {"pressure_gain", "lag"}), (2.1 * error, {n.name for n in free})):
         wide = replace(fitted, numbers=(free[0], replace(free[1], sigma=sigma), free[2]))
         assert {n.name for n in eliminate_uncertain_numbers(stops, wide, RULES).numbers} == left
@@ -118,7 +118,7 @@ def test_a_friction_that_the_runs_need_stays_though_they_tell_it_badly():
     stops, begun = slow_brakes().train, slow_brakes().fitted
     gain, lag = numbers["pressure_gain"], replace(numbers["lag"], group="friction", removable=False)
     fitted = refit_numbers(stops, begun, (gain, lag))
-    badly = replace(lag, sigma=float(standard_errors(fitted, RULES)[1]))
+    badly = replace(lag, sigma=float(compute_standard_errors(fitted, RULES)[1]))
     left = eliminate_uncertain_numbers(stops, replace(fitted, numbers=(gain, badly)), RULES)
     assert left.numbers == (gain, badly)
 
@@ -143,8 +143,8 @@ def test_a_friction_that_nobody_needs_takes_no_other_number_away(monkeypatch):
 
     monkeypatch.setattr(elimination, "refit_numbers", refit)
     monkeypatch.setattr(elimination, "measure_certainty", measure)
-    monkeypatch.setattr(elimination, "standard_errors", errors)
-    monkeypatch.setattr(elimination, "_stable_names", lambda *_: {"lag"})
+    monkeypatch.setattr(elimination, "compute_standard_errors", errors)
+    monkeypatch.setattr(elimination, "_find_stable_names", lambda *_: {"lag"})
     left = eliminate_uncertain_numbers((), both, RULES)
     assert [n.name for n in left.numbers] == ["lag"] and refits == [["lag"]]
 
@@ -170,8 +170,10 @@ def test_a_number_stays_that_is_certain_or_that_takes_a_quarter_off_the_cost(
     monkeypatch.setattr(elimination, "refit_numbers", refit)
     monkeypatch.setattr(elimination, "measure_certainty", measure)
     monkeypatch.setattr(elimination, "compute_interval_reach", lambda *_: np.array([0.01, reach]))
-    monkeypatch.setattr(elimination, "standard_errors", lambda fit, _rules: np.zeros(len(fit.numbers)))
-    monkeypatch.setattr(elimination, "_stable_names", lambda *_: {"lag", "fade"})
+    monkeypatch.setattr(
+        elimination, "compute_standard_errors", lambda fit, _rules: np.zeros(len(fit.numbers))
+    )
+    monkeypatch.setattr(elimination, "_find_stable_names", lambda *_: {"lag", "fade"})
     left = eliminate_uncertain_numbers((), four, RULES)
     assert ("fade" in {n.name for n in left.numbers}) is stays
 
@@ -198,8 +200,10 @@ def test_what_was_needed_beside_a_number_is_asked_again_without_it(monkeypatch):
     monkeypatch.setattr(elimination, "refit_numbers", refit)
     monkeypatch.setattr(elimination, "measure_certainty", measure)
     monkeypatch.setattr(elimination, "compute_interval_reach", reach)
-    monkeypatch.setattr(elimination, "standard_errors", lambda fit, _rules: np.zeros(len(fit.numbers)))
-    monkeypatch.setattr(elimination, "_stable_names", lambda *_: set(names))
+    monkeypatch.setattr(
+        elimination, "compute_standard_errors", lambda fit, _rules: np.zeros(len(fit.numbers))
+    )
+    monkeypatch.setattr(elimination, "_find_stable_names", lambda *_: set(names))
     assert eliminate_uncertain_numbers((), both, RULES).numbers == ()
 
 
@@ -231,7 +235,7 @@ def test_the_stability_of_a_number_counts_how_badly_a_run_is_followed():
     for size, stable in ((1.0, {"lag"}), (12.0, set())):
         noise = [size * rng.standard_normal(100) for _ in range(4)]
         fitted = replace(fit_of([x - np.mean(noise) for x in noise]), values=np.array([0.8]))
-        assert elimination._stable_names(fitted, RULES) == stable
+        assert elimination._find_stable_names(fitted, RULES) == stable
 
 
 @pytest.mark.parametrize(

@@ -9,10 +9,10 @@ from scipy.stats import t as student
 
 from catalogs.decision_rules import load_decision_rules
 from tasks.identification.joint.uncertainty import (
-    certain_from,
     compute_interval_reach,
+    compute_naming_distance,
+    compute_standard_errors,
     measure_certainty,
-    standard_errors,
     weigh_robustly,
 )
 from tests.identification.joint.known_car import fit_of
@@ -28,14 +28,14 @@ def make_correlated_noise(rng: np.random.Generator, count: int, kept: float) -> 
 
 def test_the_misfit_of_the_run_that_is_followed_worst_widens_an_error():
     fitted = fit_of([np.resize([3.0, -3.0], 100), np.resize([0.5, -0.5], 100)])
-    assert standard_errors(fitted, RULES)[0] == pytest.approx(np.sqrt(9.0 / 200.0))
-    assert standard_errors(fit_of([np.zeros(100)]), RULES)[0] == pytest.approx(np.sqrt(1.0 / 100.0))
+    assert compute_standard_errors(fitted, RULES)[0] == pytest.approx(np.sqrt(9.0 / 200.0))
+    assert compute_standard_errors(fit_of([np.zeros(100)]), RULES)[0] == pytest.approx(np.sqrt(1.0 / 100.0))
 
 
 def test_the_scatter_of_runs_counts_where_there_are_enough_of_them():
     runs = [np.resize([level, -level], 100) + level for level in (0.4, -0.4, 0.4, -0.4)]
-    (alone,) = standard_errors(fit_of(runs), replace(RULES, fewest_scatter_runs=len(runs) + 1))
-    (scattered,) = standard_errors(fit_of(runs), replace(RULES, fewest_scatter_runs=len(runs)))
+    (alone,) = compute_standard_errors(fit_of(runs), replace(RULES, fewest_scatter_runs=len(runs) + 1))
+    (scattered,) = compute_standard_errors(fit_of(runs), replace(RULES, fewest_scatter_runs=len(runs)))
     assert scattered > 2.0 * alone
 
 
@@ -102,7 +102,7 @@ def test_a_number_is_certain_from_the_chance_of_a_false_name():
     for chance in (RULES.false_name_chance, 0.01):
         rules = replace(RULES, false_name_chance=chance)
         for runs, freedom in ((2, 3), (4, 3), (9, 8)):
-            assert certain_from(runs, rules) == pytest.approx(student.ppf(1.0 - chance, freedom))
+            assert compute_naming_distance(runs, rules) == pytest.approx(student.ppf(1.0 - chance, freedom))
 
 
 @pytest.mark.parametrize(("runs", "kept"), [(2, 0.0), (3, 0.98), (5, 0.0)])
@@ -110,8 +110,8 @@ def test_no_number_is_certain_whose_interval_holds_0(runs: int, kept: float):
     misfit = make_correlated_noise(np.random.default_rng(6), 400, kept)
     fitted = fit_of([misfit] * runs)
     (reach,) = compute_interval_reach(fitted, RULES)
-    (error,) = standard_errors(fitted, RULES)
-    needed = max(reach, certain_from(runs, RULES) * error)
+    (error,) = compute_standard_errors(fitted, RULES)
+    needed = max(reach, compute_naming_distance(runs, RULES) * error)
     for share in (0.99, 1.01):
         (certainty,) = measure_certainty(replace(fitted, values=np.array([share * needed])), RULES)
         assert certainty == pytest.approx(share)
