@@ -34,9 +34,10 @@ def judge_by_two_searches(
 ) -> Trace | JointTrace:
     """Look for one effect at a time where the car is the model's but for its brake gain; else fit all numbers at once.
 
-    Where the first misses the held-out stops and names nothing, or names something and misses them by much more, both
-    judge, and the better prediction counts. Numbers of the vehicle's file alone are no discovery then: the whole
-    library was held against the runs, and what it does not hold may stand behind them.
+    Where the first misses the held-out stops and names nothing, or names something and misses them by much more, or
+    only with numbers of the session far off their tolerances, both judge, and the better prediction counts. Numbers of
+    the vehicle's file alone are no discovery then: the whole library was held against the runs, and what it does not
+    hold may stand behind them.
 
     Parameters
     ----------
@@ -61,7 +62,8 @@ def judge_by_two_searches(
         return fit_all(str(error))
     single = replace(found, verdict=tell_miss(found.verdict, campaign, joint.foreign_misfit))
     names, left = [effect.name for effect in single.verdict.effects], single.verdict.error
-    followed = joint.questioned_misfit if names else joint.foreign_misfit
+    pulled = any(abs(after) > rules.retune_pull for _, after in single.verdict.session_pulls.values())
+    followed = joint.questioned_misfit if names and not pulled else joint.foreign_misfit
     if compare_with_noise(campaign, left) <= followed:
         return single
     fitted = fit_all(names_numbers=False)

@@ -101,6 +101,18 @@ def test_stops_that_are_followed_are_left_to_the_single_search_and_a_name_leaves
             assert named == ("brake_lag" if names else "nothing") or not by_both
 
 
+@pytest.mark.parametrize(("pull", "by_both"), [(-3.9, False), (3.9, False), (-4.1, True), (4.1, True)])
+def test_a_name_that_stands_on_a_session_far_off_its_tolerances_is_held_against_a_joint_fit(
+    monkeypatch, pull: float, by_both: bool
+):
+    """A racing car's lag of 0.12 s was 0.075 s beside a road that fell by 8 %, eight of its tolerances."""
+    for share, missed in ((0.8, False), (1.2, True)):
+        named = make_verdict(share * LIMIT * NOISE, names=True)
+        single = replace(named, session_pulls={"slope": (0.0, pull), "mass": (9.0, 0.0)})
+        trace, asked = judge_answers(monkeypatch, single, make_verdict(0.0))
+        assert isinstance(trace, JointTrace) is (by_both and missed) is bool(asked)
+
+
 @pytest.mark.parametrize(("share", "is_better"), [(0.99 * SHARE, True), (1.01 * SHARE, False)])
 def test_where_nothing_is_named_and_stops_are_missed_the_better_prediction_counts(
     monkeypatch, share, is_better
