@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from tasks.campaign.campaign import CHANNELS
+from tasks.identification.inference.driver import LIFT
 from tasks.identification.joint.derivatives import (
     differentiate_run,
     name_values,
     weigh_misfit,
 )
 from tasks.identification.joint.last_point import keep_last
-from tasks.identification.joint.numbers import JointNumber
+from tasks.identification.joint.numbers import JointNumber, peak_deceleration
 from tasks.identification.joint.stops import (
     FITTED,
     OFFSET_LIMIT,
@@ -53,6 +54,7 @@ class JointFit:
     interval : between the instants of a run [s]
     information : float64 [K, K] of the numbers, offsets taken out, priors included
     scales : size of a misfit that counts one, by place in `CHANNELS` [the channel's unit]
+    delay_doubt : standard deviation of how late the brakes answer, for nobody knows when the driver lifts [s]
     """
 
     numbers: tuple[JointNumber, ...]
@@ -65,6 +67,7 @@ class JointFit:
     interval: float
     information: NDArray[np.float64]
     scales: NDArray[np.float64]
+    delay_doubt: float
 
     @property
     def removable_numbers(self) -> tuple[JointNumber, ...]:
@@ -237,7 +240,24 @@ def describe_fit(
         numbers=numbers, values=values, offsets=offsets, cost=cost, residuals=tuple(left for left, _ in runs),
         slopes=slopes, grids=tuple(stop.grid for stop in stops),
         interval=stops[0].model.run.interval, information=np.asarray(information), scales=scales,
+        delay_doubt=_doubt_delays(stops, offsets),
     )  # fmt: skip
+
+
+def _doubt_delays(stops: Sequence[Stop], offsets: NDArray[np.float64]) -> float:
+    """Return by how much late brakes may be told wrong because no channel says when the driver lifts [s].
+
+    A drive force that goes a moment later takes as much off the speed as brakes that answer later by its share of
+    theirs. A driver has one habit: it does not average out over the runs.
+    """
+    drives = np.abs(offsets[:, OFFSETS.index("drive")])
+    guessed = [
+        (float(drive), peak_deceleration(stop.model))
+        for stop, drive in zip(stops, drives, strict=True)
+        if stop.guesses_lift
+    ]
+    shares = [drive / peak for drive, peak in guessed if peak > 0.0]
+    return 0.5 * LIFT * float(np.median(shares)) if shares else 0.0
 
 
 def _take_out_offsets(numbers: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.float64]:

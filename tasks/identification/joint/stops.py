@@ -57,6 +57,11 @@ class Stop:
         return self.model.measured[:, self.channels]
 
     @property
+    def guesses_lift(self) -> bool:
+        """Whether no channel says when the driver lifts, and he brakes."""
+        return self.model.run.throttle is None and bool(self.drive.any())
+
+    @property
     def grid(self) -> NDArray[np.bool_]:
         """bool [N, C] instants at which each of them has a sample."""
         sampled, shape = self.model.sampled, (self.model.samples, len(self.channels))

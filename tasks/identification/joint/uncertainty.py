@@ -61,7 +61,7 @@ def compute_interval_reach(fitted: JointFit, rules: JointRules) -> NDArray[np.fl
 
     That is Student's t with the runs less one, at least one. Fewer than `fewest_scatter_runs` runs do not tell how they
     scatter: there the misfit counts as what remembers, if that is more (the sandwich of White 1980,
-    doi:10.2307/1912934).
+    doi:10.2307/1912934). A delay is no surer than when the driver lifts.
 
     Parameters
     ----------
@@ -70,14 +70,19 @@ def compute_interval_reach(fitted: JointFit, rules: JointRules) -> NDArray[np.fl
     """
     runs = len(fitted.residuals)
     reach = compute_student_quantile(runs) * compute_standard_errors(fitted, rules)
-    if runs >= rules.fewest_scatter_runs:
-        return np.asarray(reach)
+    if runs < rules.fewest_scatter_runs:
+        reach = np.maximum(reach, NORMAL_QUANTILE * _measure_what_remembers(fitted, rules))
+    doubts = [fitted.delay_doubt if n.group == "delay" else 0.0 for n in fitted.numbers]
+    return np.hypot(reach, NORMAL_QUANTILE * np.array(doubts))
+
+
+def _measure_what_remembers(fitted: JointFit, rules: JointRules) -> NDArray[np.float64]:
+    """Return the standard errors by a misfit that is correlated from sample to sample, float64 [K]."""
     score = np.diag([1.0 / n.sigma**2 for n in fitted.numbers])
     for residual, slope, grid in zip(fitted.residuals, fitted.slopes, fitted.grids, strict=True):
         score = score + _compute_score_covariance(residual, slope, grid, fitted.interval, rules)
     inverse = np.linalg.inv(fitted.information)
-    remembers = np.sqrt(np.diag(inverse @ score @ inverse))
-    return np.maximum(reach, NORMAL_QUANTILE * remembers)
+    return np.asarray(np.sqrt(np.diag(inverse @ score @ inverse)))
 
 
 def _compute_score_covariance(

@@ -61,7 +61,12 @@ from tasks.identification.joint.uncertainty import (
     compute_interval_reach,
     compute_standard_errors,
 )
-from tasks.identification.joint.words import tell_lumped_resistance, tell_rivals, tell_what_was_used
+from tasks.identification.joint.words import (
+    tell_guessed_lift,
+    tell_lumped_resistance,
+    tell_rivals,
+    tell_what_was_used,
+)
 from tasks.identification.rules import DecisionRules, JointRules
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.table import PARAMETERS, build_parameter_vector
@@ -186,6 +191,7 @@ def judge_jointly(
     reasons += tell_rivals(effects, rivals, shown)
     reasons += tell_log_faults(campaign, effects, [rival.name for _, rival in rivals])
     reasons += tell_lumped_resistance(fitted.numbers, [stop.model for stop in train], joint)
+    reasons += tell_guessed_lift(fitted.numbers, fitted.delay_doubt)
     verdict = Verdict(
         verdict=kind,
         effects=tuple(effects),

@@ -128,6 +128,22 @@ def tell_lumped_resistance(
     ]
 
 
+def tell_guessed_lift(fitted: Sequence[JointNumber], doubt: float) -> list[str]:
+    """Return a sentence where a delay is no surer than when the driver lifts, which no channel says.
+
+    Parameters
+    ----------
+    fitted : numbers that are left
+    doubt : standard deviation that this leaves a delay [s]
+    """
+    if doubt == 0.0 or not any(n.group == "delay" for n in fitted):
+        return []
+    return [
+        "no channel says when the driver lifts, which leaves a delay of the brakes a standard deviation of"
+        f" {doubt:.2g} s: log the throttle or the engine's torque, or coast for a second before the brake"
+    ]
+
+
 def find_separating_run(numbers: Sequence[JointNumber]) -> str | None:
     """Return the run that tells numbers apart, the first of `SEPARATE` for a group of theirs; None where none is known.
 

@@ -80,6 +80,7 @@ def fit_of(residuals: Sequence[np.ndarray], grids: Sequence[np.ndarray] | None =
         residuals=tuple(residuals), slopes=tuple(np.ones((len(r), 1)) for r in residuals),
         grids=tuple(grids or [np.ones((len(r), 1), dtype=bool) for r in residuals]),
         information=np.array([[sum(len(r) for r in residuals) + 1e-9]]), scales=np.ones(7), interval=0.01,
+        delay_doubt=0.0,
     )  # fmt: skip
 
 

@@ -34,3 +34,18 @@ def test_what_only_instruments_show_leaves_the_motion_as_it_is(name: str, engine
     still = simulate_stop(stop, {}, np.zeros(3)).history
     moved = simulate_stop(stop, numbers, offsets).history
     assert is_only_read(stop, name) == np.array_equal(still, moved)
+
+
+@pytest.mark.parametrize(
+    ("logged", "guessed"),
+    [({}, True), ({"throttle": 0.3}, False), ({"drive_torque": -80.0}, False), ({"pressure": 0.0}, False)],
+)
+def test_when_the_driver_lifts_is_guessed_where_he_brakes_and_neither_throttle_nor_engine_was_logged(
+    logged: dict[str, float], guessed: bool
+):
+    run = plain_run(25.0, 2.0)
+    run = replace(run, **{name: np.full(len(run.pressure), value) for name, value in logged.items()})
+    model = measured(run, build_parameter_vector({}), 3)
+    assert (
+        make_stop(model.run, VEHICLE, SURFACE, CHANNELS, load_decision_rules().joint).guesses_lift is guessed
+    )

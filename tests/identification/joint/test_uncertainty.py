@@ -115,3 +115,14 @@ def test_no_number_is_certain_whose_interval_holds_0(runs: int, kept: float):
     for share in (0.99, 1.01):
         (certainty,) = measure_certainty(replace(fitted, values=np.array([share * needed])), RULES)
         assert certainty == pytest.approx(share)
+
+
+@pytest.mark.parametrize("runs", [2, 12])
+def test_a_delay_is_no_surer_than_when_the_driver_lifts_and_other_numbers_are(runs: int):
+    fitted = fit_of([np.resize([1.0, -1.0], 100)] * runs)
+    (known,), (guessed,) = (
+        compute_interval_reach(replace(fitted, delay_doubt=doubt), RULES) for doubt in (0.0, 0.02)
+    )
+    assert guessed == pytest.approx(np.hypot(known, 1.96 * 0.02), rel=1e-3)
+    fade = tuple(replace(n, group="curve") for n in fitted.numbers)
+    assert compute_interval_reach(replace(fitted, numbers=fade, delay_doubt=0.02), RULES) == [known]

@@ -13,6 +13,7 @@ from tasks.identification.joint.calibration import needs_joint_fit
 from tasks.identification.joint.elimination import (
     Substitute,
 )
+from tasks.identification.joint.numbers import peak_deceleration
 from tasks.identification.joint.verdict import JointTrace, judge_jointly
 from tasks.vehicle.effects.table import build_parameter_vector
 from tests.identification.joint.known_car import FEW, RULES, campaign_of, judge_car, own_channels, slow_brakes
@@ -75,6 +76,34 @@ def test_a_car_that_is_as_its_file_says_lacks_nothing():
     trace = judge_car(campaign_of({}))
     assert trace.verdict.verdict == "NOTHING" and not named_intervals(trace)
     assert trace.fitted.by_name["pressure_gain"] == pytest.approx(0.0, abs=0.01)
+
+
+def driven_campaign(earlier: float, *, logged: bool) -> Campaign:
+    """Slow brakes of a car that is driven with 1 m/s2 until its driver lifts [s before he brakes]."""
+    flat, runs = campaign_of({}), []
+    for i, run in enumerate(flat.runs):
+        braked = int(np.flatnonzero(run.pressure > 0.05)[0])
+        late = (np.arange(len(run.pressure)) - braked) * run.interval + earlier
+        pushed = np.clip(0.5 - late / 0.2, 0.0, 1.0)
+        pulled = replace(run, drive_torque=VEHICLE.mass * VEHICLE.wheel_radius * pushed)
+        driven = measured(pulled, build_parameter_vector({"lag": 0.15}), 70 + i).run
+        seen = own_channels(driven, flat.channels, run.held_out)
+        runs.append(replace(seen, drive_torque=None, throttle=pushed if logged else None))
+    return replace(flat, runs=tuple(runs))
+
+
+@pytest.mark.parametrize("earlier", [-0.1, 0.1])
+def test_a_lag_is_no_surer_than_when_the_driver_lifts_where_no_throttle_was_logged(earlier: float):
+    """A racing car's lag of 0.12 s had the interval [0.085, 0.10]."""
+    numbers = [n for n in load_joint_numbers() if n.name in {"pressure_gain", "lag"}]
+    trace = judge_car(driven_campaign(earlier, logged=False), numbers=numbers)
+    low, value, high = named_intervals(trace)["brake_lag"]
+    assert low < 0.15 < high and 0.01 < abs(value - 0.15) < trace.fitted.delay_doubt
+    shares = [1.0 / peak_deceleration(stop.model) for stop in trace.train]
+    assert trace.fitted.delay_doubt == pytest.approx(0.1 * float(np.median(shares)), rel=0.2)
+    sure = judge_car(driven_campaign(earlier, logged=True), numbers=numbers)
+    assert named_intervals(sure)["brake_lag"][1] == pytest.approx(0.15, abs=0.005)
+    assert sure.fitted.delay_doubt == 0.0
 
 
 def hilly_campaign(common: float, tolerance: float = 0.01) -> Campaign:

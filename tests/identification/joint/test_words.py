@@ -12,7 +12,12 @@ from tasks.campaign.campaign import Campaign
 from tasks.identification.decision.answer import NamedEffect, Parameter
 from tasks.identification.inference.forward import prepare_run
 from tasks.identification.joint.stops import make_stop
-from tasks.identification.joint.words import tell_lumped_resistance, tell_rivals, tell_what_was_used
+from tasks.identification.joint.words import (
+    tell_guessed_lift,
+    tell_lumped_resistance,
+    tell_rivals,
+    tell_what_was_used,
+)
 from tests.identification.joint.test_calibration import make_campaign
 from tests.identification.synthetic import SURFACE, TOLERANCES, VEHICLE, plain_run
 
@@ -145,3 +150,11 @@ def test_a_signal_that_a_map_turns_into_a_pressure_is_told_by_its_unit_alone() -
     stop = make_stop(run, VEHICLE, SURFACE, campaign.channels, rules)
     told = tell_what_was_used(campaign, [stop], (1, 1), rules)
     assert told[0] == "inputs that were measured: a signal in N m; compared: speed"
+
+
+def test_a_delay_says_that_nobody_knows_when_the_driver_lifts_where_that_is_so():
+    numbers = {n.name: n for n in load_joint_numbers()}
+    (told,) = tell_guessed_lift([numbers["drag_area"], numbers["dead_time"]], 0.031)
+    assert "when the driver lifts" in told and "a standard deviation of 0.031 s: log the throttle" in told
+    assert tell_guessed_lift([numbers["dead_time"]], 0.0) == []
+    assert tell_guessed_lift([numbers["drag_area"]], 0.031) == []
