@@ -184,7 +184,7 @@ class ChannelMap(CatalogueEntry):
                     f"signal {shorten(signal, 60)} must be one measurement; it stands for {', '.join(names)}: correct a"
                     " source, or list a channel under not_measured"
                 )
-        return _find_note_problems(channels, problems)
+        return _raise_problems(channels, problems)
 
     @field_validator("not_measured")
     @classmethod
@@ -199,7 +199,7 @@ class ChannelMap(CatalogueEntry):
                 for channel in MAIN_CHANNELS
                 if (channel.name in info.data["channels"]) == (channel.name in names)
             ]
-        return _find_note_problems(names, problems)
+        return _raise_problems(names, problems)
 
     @field_validator("runs")
     @classmethod
@@ -215,13 +215,13 @@ class ChannelMap(CatalogueEntry):
                 for place, conditions in laid.items()
                 for problem in find_condition_problems(conditions.model_dump())
             ]
-        return _find_note_problems(runs, problems)
+        return _raise_problems(runs, problems)
 
     @field_validator("segment")
     @classmethod
     def _is_in_place_of_runs(cls, segment: SegmentEntry | None, info: ValidationInfo) -> SegmentEntry | None:
         both = segment is not None and bool(info.data.get("runs"))
-        return _find_note_problems(
+        return _raise_problems(
             segment, ["a map has either runs or segment; this one has both"] if both else []
         )
 
@@ -252,7 +252,7 @@ def _unknown_channels(names: Iterable[str]) -> list[str]:
     ]
 
 
-def _find_note_problems(value: Kept, problems: list[str]) -> Kept:
+def _raise_problems(value: Kept, problems: list[str]) -> Kept:
     if problems:
         raise ValueError("; ".join(problems))
     return value

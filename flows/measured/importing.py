@@ -87,7 +87,7 @@ def import_measurements(
         for run in planned
     ]
     problems = join_shared_problems(
-        [_find_place_problem(run, problem) for run, found in made for problem in found.problems],
+        [_place_problem(run, problem) for run, found in made for problem in found.problems],
         len(made),
         "runs",
     )
@@ -97,7 +97,7 @@ def import_measurements(
         slippery = [run.name for run, _ in made if run.conditions.weather != DRY]
         problems += find_gain_problems(readable, interval, slippery=slippery)
     still = [
-        _find_place_problem(run, problem)
+        _place_problem(run, problem)
         for run, found in made
         if "speed" in found.readable
         and (
@@ -275,5 +275,5 @@ def _read_all(files: tuple[Path, ...], channel_map: ChannelMap) -> dict[Path, di
     return recordings
 
 
-def _find_place_problem(run: PlannedRun, problem: str) -> PlacedProblem:
+def _place_problem(run: PlannedRun, problem: str) -> PlacedProblem:
     return PlacedProblem(name=run.name, place=f"{run.name} ({run.file.name})", sentence=problem)

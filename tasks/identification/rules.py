@@ -93,7 +93,8 @@ class DecisionRules:
     explored_candidates : candidates refined while only the disturbances are to be scaled [1]
     relinearised_candidates : candidates of a round that are linearised anew, if their gain is large [1]
     relinearisation_change : relative change of parameters below which a second relinearisation is not needed [1]
-    retune_pull : pull of a session nuisance, in prior sigmas, from which it is a wrong number of the vehicle [1]
+    retune_pull : pull of a session nuisance, in prior sigmas, from which it is a wrong number of the
+        vehicle, and a name beside it is held against a joint fit [1]
     negligible_share : change of a number that no session re-tunes, below which it is not wrong [1]
     relinearisation_pull : pull, in prior sigmas, from which the runs are linearised anew at the session [1]
     disagreement : inflation of a named effect from which a single form is compared with it; of the runs without any

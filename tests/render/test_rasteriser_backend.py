@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tasks.errors import InputError
 from tasks.render.rasterise import backend
 from tasks.render.rasterise.backend import CpuBackend, compare_with_cpu, probe_scene, select_backend
-from tasks.render.rasterise.front_torch import first_below_half
+from tasks.render.rasterise.front_torch import find_first_below_half
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tests.render.clouds import HEIGHT, WIDTH, K, camera_at, random_cloud, rotation_matrix
@@ -84,7 +84,14 @@ def test_gsplats_class_is_found_where_light_falls_below_one_half() -> None:
     alpha = torch.tensor([0.3, 0.2, 0.9, 0.6, 0.9, 0.2, 0.2, 0.5, 0.1])
     pixel = torch.tensor([0, 0, 0, 3, 3, 4, 4, 6, 6])
     wanted = [False, False, True, True, False, False, False, False, True]
-    assert first_below_half(alpha, pixel).tolist() == wanted
+    assert find_first_below_half(alpha, pixel).tolist() == wanted
+    # behind a picture's worth of other pixels, whose sum rounds
+    many = 800_000
+    before = torch.arange(100, 100 + many)
+    found = find_first_below_half(
+        torch.cat((torch.full((many,), 0.9999), alpha)), torch.cat((before, before[-1] + 1 + pixel))
+    )
+    assert found[:many].all() and found[many:].tolist() == wanted
 
 
 @pytest.mark.gpu

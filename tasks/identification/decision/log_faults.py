@@ -34,7 +34,7 @@ def tell_log_faults(campaign: Campaign, named: Sequence[NamedEffect], rivals: Co
         slopes = [100.0 * sin(run.felt_slope) for run in campaign.runs]
         told.append(
             f"no slope of the road was mapped: by what the accelerometer reads beyond the rate of speed the runs are on"
-            f" slopes of {min(slopes):.1f} to {max(slopes):.1f} %, each run on one"
+            f" slopes of {min(slopes):.1f} to {max(slopes):.1f} %, each run on one, beside what all have in common"
         )
     if campaign.throttle_rest:
         told.append(

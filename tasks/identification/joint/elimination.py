@@ -55,7 +55,7 @@ class Substitute:
 
 
 def eliminate_uncertain_numbers(stops: Sequence[Stop], fitted: JointFit, rules: JointRules) -> JointFit:
-    """Return the fit of what is left when every number that may go and is not certain has gone.
+    """Return the fit of what is left when every removable number that is not certain has gone.
 
     What is named must not hang on one run: from `fewest_scatter_runs` runs on, a number goes that elimination about the
     same fit would take away without any one of them (stability selection, Meinshausen and Buehlmann 2010,
@@ -140,7 +140,7 @@ def vary_grip(fitted: JointFit) -> list[dict[str, float]]:
 def drop_at_bounds(
     stops: Sequence[Stop], fitted: JointFit, rules: JointRules, reasons: list[str]
 ) -> JointFit:
-    """Return the fit without the numbers that would have to be larger than any car's, and say so.
+    """Return the fit without the numbers that it takes as far as they may go, and say so.
 
     Parameters
     ----------

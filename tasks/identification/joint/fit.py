@@ -15,7 +15,7 @@ from tasks.identification.joint.derivatives import (
     weigh_misfit,
 )
 from tasks.identification.joint.last_point import keep_last
-from tasks.identification.joint.numbers import JointNumber, peak_deceleration
+from tasks.identification.joint.numbers import JointNumber, measure_peak_deceleration
 from tasks.identification.joint.stops import (
     FITTED,
     OFFSET_LIMIT,
@@ -252,7 +252,7 @@ def _doubt_delays(stops: Sequence[Stop], offsets: NDArray[np.float64]) -> float:
     """
     drives = np.abs(offsets[:, OFFSETS.index("drive")])
     guessed = [
-        (float(drive), peak_deceleration(stop.model))
+        (float(drive), measure_peak_deceleration(stop.model))
         for stop, drive in zip(stops, drives, strict=True)
         if stop.guesses_lift
     ]

@@ -24,7 +24,7 @@ from tasks.identification.rules import JointRules
 
 ACCELERATION = CHANNELS.index("longitudinal_acceleration")
 LEFT = 0.5
-"""Share of what the two disagree by that an error of one of them may leave [1]."""
+"""Share of the disagreement of measured and predicted relation that an instrument's error may leave [1]."""
 
 
 def relate_instruments(
@@ -48,7 +48,9 @@ def relate_instruments(
 
 
 def make_instrument_check(stops: Sequence[Stop]) -> Callable[[JointFit, str], bool]:
-    """Return the question whether speed and accelerometer contradict a number of a fit: they agree better without it.
+    """Return the question whether speed and accelerometer contradict a number of a fit.
+
+    They do where more than `LEFT` of what they disagree by stays with it, or comes from beyond.
 
     Parameters
     ----------
@@ -91,8 +93,8 @@ def drop_contradicted_instruments(
     if not wrong:
         return fitted
     reasons += [
-        f"the fit suggests that {number.say(fitted.by_name[number.name])}, but speed and accelerometer agree better"
-        " with each other without that: not named"
+        f"the fit suggests that {number.say(fitted.by_name[number.name])}, but that makes good less than half of"
+        " what speed and accelerometer disagree by: not named"
         for number in wrong
     ]
     left = eliminate_without(stops, fitted, wrong, rules)

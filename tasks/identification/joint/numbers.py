@@ -64,7 +64,7 @@ class JointNumber:
 
     @property
     def may_go(self) -> bool:
-        """Whether it may be taken away: it must earn its place, or other physics may stand behind it."""
+        """Whether it is taken away at a bound or where prediction contradicts it: other physics may stand behind it."""
         return self.removable or self.group == ROAD
 
     def is_at_bound(self, value: float) -> bool:
@@ -190,7 +190,7 @@ def shows_brake_curve(model: RunModel, rules: JointRules) -> bool:
     model : the run
     rules : of the joint fit
     """
-    return peak_deceleration(model) > rules.braking_deceleration
+    return measure_peak_deceleration(model) > rules.braking_deceleration
 
 
 def _find_runs_on(
@@ -242,10 +242,10 @@ def saturates_tyres(model: RunModel, rules: JointRules) -> bool:
     rules : of the joint fit
     """
     tyre = compute_surface_response(model.vehicle, model.run.weather, model.surface_friction).tyre
-    return peak_deceleration(model) > rules.saturation_ratio * tyre.peak * model.vehicle.gravity
+    return measure_peak_deceleration(model) > rules.saturation_ratio * tyre.peak * model.vehicle.gravity
 
 
-def peak_deceleration(model: RunModel) -> float:
+def measure_peak_deceleration(model: RunModel) -> float:
     """Return the largest measured decrease of speed over a short time [m/s2].
 
     Parameters

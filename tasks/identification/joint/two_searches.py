@@ -34,10 +34,10 @@ def judge_by_two_searches(
 ) -> Trace | JointTrace:
     """Look for one effect at a time where the car is the model's but for its brake gain; else fit all numbers at once.
 
-    Where the first misses the held-out stops and names nothing, or names something and misses them by much more, or
-    only with numbers of the session far off their tolerances, both judge, and the better prediction counts. Numbers of
-    the vehicle's file alone are no discovery then: the whole library was held against the runs, and what it does not
-    hold may stand behind them.
+    Where the first misses the held-out stops and names nothing, or names something beside numbers of the session that
+    are far off their tolerances, or names something and misses them by much more, both judge, and the better prediction
+    counts. Numbers of the vehicle's file alone are no discovery then: the whole library was held against the runs, and
+    what it does not hold may stand behind them.
 
     Parameters
     ----------

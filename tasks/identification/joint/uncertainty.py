@@ -72,8 +72,17 @@ def compute_interval_reach(fitted: JointFit, rules: JointRules) -> NDArray[np.fl
     reach = compute_student_quantile(runs) * compute_standard_errors(fitted, rules)
     if runs < rules.fewest_scatter_runs:
         reach = np.maximum(reach, NORMAL_QUANTILE * _measure_what_remembers(fitted, rules))
-    doubts = [fitted.delay_doubt if n.group == "delay" else 0.0 for n in fitted.numbers]
-    return np.hypot(reach, NORMAL_QUANTILE * np.array(doubts))
+    return np.hypot(reach, NORMAL_QUANTILE * collect_doubts(fitted))
+
+
+def collect_doubts(fitted: JointFit) -> NDArray[np.float64]:
+    """Return what no run tells of each number, as a standard deviation beside its error, float64 [K] [its unit].
+
+    Parameters
+    ----------
+    fitted : the fit
+    """
+    return np.array([fitted.delay_doubt if n.group == "delay" else 0.0 for n in fitted.numbers])
 
 
 def _measure_what_remembers(fitted: JointFit, rules: JointRules) -> NDArray[np.float64]:

@@ -58,6 +58,7 @@ from tasks.identification.joint.numbers import (
 )
 from tasks.identification.joint.stops import FITTED, Stop, complete_numbers, make_stop
 from tasks.identification.joint.uncertainty import (
+    collect_doubts,
     compute_interval_reach,
     compute_standard_errors,
 )
@@ -145,6 +146,7 @@ def judge_jointly(
     fitted = drop_what_predicts_worse(train, held_out, fitted, joint, reasons)
     fitted = drop_at_bounds(train, fitted, joint, reasons)
     retuned = refit_numbers(train, fitted, tuple(n for n in fitted.numbers if n.group in CALIBRATED))
+    retuned = drop_at_bounds(train, retuned, joint, [])
 
     def predict_with(grown: JointFit) -> tuple[Predicted, Errors, Errors]:
         predicted = predict_held_out(held_out, retuned, grown)
@@ -219,7 +221,7 @@ def judge_jointly(
         verdict=verdict,
         calibrated=calibrated if effects or is_lowered(error["speed"]) else (),
         fitted=fitted,
-        errors=compute_standard_errors(fitted, joint),
+        errors=np.hypot(compute_standard_errors(fitted, joint), collect_doubts(fitted)),
         train=train,
         held_out=held_out,
         predicted=predicted,
@@ -288,7 +290,8 @@ def _name_rivals(
 
 def _named_effect(fitted: JointFit, number: JointNumber, rules: JointRules) -> NamedEffect:
     place = fitted.numbers.index(number)
-    value, error = float(fitted.values[place]), float(compute_standard_errors(fitted, rules)[place])
+    errors = np.hypot(compute_standard_errors(fitted, rules), collect_doubts(fitted))
+    value, error = float(fitted.values[place]), float(errors[place])
     reach = float(compute_interval_reach(fitted, rules)[place])
     estimate = Parameter(
         name=number.name, value=value, ci_low=max(value - reach, number.lower),

@@ -22,6 +22,9 @@ SEPARATE = {
 }
 """The run that tells numbers of one group apart."""
 
+LEAST_DOUBT = 0.005
+"""Standard deviation of a delay from which it is told that nobody knows when the driver lifts [s]."""
+
 
 def tell_what_was_used(
     campaign: Campaign, train: Sequence[Stop], agreeing: tuple[int, int], rules: JointRules
@@ -136,7 +139,7 @@ def tell_guessed_lift(fitted: Sequence[JointNumber], doubt: float) -> list[str]:
     fitted : numbers that are left
     doubt : standard deviation that this leaves a delay [s]
     """
-    if doubt == 0.0 or not any(n.group == "delay" for n in fitted):
+    if doubt < LEAST_DOUBT or not any(n.group == "delay" for n in fitted):
         return []
     return [
         "no channel says when the driver lifts, which leaves a delay of the brakes a standard deviation of"

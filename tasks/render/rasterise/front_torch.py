@@ -4,11 +4,11 @@ from math import log
 
 import torch
 
-ROUNDING = 1e-9
+ROUNDING = 1e-7
 """Optical depth by which sums over a whole picture may be off: a splat that leaves one half is not below it [1]."""
 
 
-def first_below_half(alpha: torch.Tensor, pixel: torch.Tensor) -> torch.Tensor:
+def find_first_below_half(alpha: torch.Tensor, pixel: torch.Tensor) -> torch.Tensor:
     """Return the splats that bring their pixel's transmittance from one half or more to less.
 
     Parameters

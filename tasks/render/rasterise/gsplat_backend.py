@@ -14,7 +14,7 @@ import torch
 from numpy.typing import NDArray
 
 from tasks.render.rasterise.blending import SURFACE_RATIO
-from tasks.render.rasterise.front_torch import first_below_half
+from tasks.render.rasterise.front_torch import find_first_below_half
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.rasterise.painters_bias_torch import move_nearer
 from tasks.render.rasterise.preparation import morton_order
@@ -167,7 +167,7 @@ class GsplatBackend:
         dy = pixel // width + 0.5 - splats["means2d"][0, gaussian, 1]
         power = 0.5 * (a * dx * dx + c * dy * dy) + b * dx * dy
         alpha = (splats["opacities"][0, gaussian] * torch.exp(-power)).clamp_max(MAX_ALPHA)
-        halves = first_below_half(alpha, pixel)
+        halves = find_first_below_half(alpha, pixel)
         front = torch.full((height * width,), -1, dtype=torch.int64, device=self.device)
         front[pixel[halves]] = gaussian[halves]
         return front.reshape(height, width)

@@ -10,7 +10,12 @@ from catalogs.decision_rules import load_decision_rules
 from catalogs.joint_numbers import load_joint_numbers
 from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
 from tasks.identification.inference.forward import RunModel, simulate_run
-from tasks.identification.joint.numbers import choose_numbers, coasts_down, free_numbers, peak_deceleration
+from tasks.identification.joint.numbers import (
+    choose_numbers,
+    coasts_down,
+    free_numbers,
+    measure_peak_deceleration,
+)
 from tasks.identification.joint.stops import make_stop
 from tasks.identification.rules import JointRules
 from tasks.vehicle.effects.table import build_parameter_vector
@@ -51,7 +56,7 @@ def chosen_priors(
 
 
 def test_the_curve_of_the_brake_needs_enough_runs_that_brake_hard_enough():
-    slowest = min(map(peak_deceleration, stops()))
+    slowest = min(map(measure_peak_deceleration, stops()))
     assert "pressure_curve" in chosen_priors(stops(), RULES)
     assert "pressure_curve" not in chosen_priors(stops(), replace(RULES, fewest_curve_stops=4))
     assert "pressure_curve" not in chosen_priors(stops(), replace(RULES, braking_deceleration=slowest))
@@ -62,7 +67,7 @@ def test_friction_is_free_only_where_a_run_passes_the_limit_of_the_models_tyres(
     table = VEHICLE.find_tyre_family("dry")
     sticky = replace(table, efficiency=tuple(2.0 * e for e in table.efficiency))
     slicks = replace(VEHICLE, families={**VEHICLE.families, "dry": sticky})
-    hardest = max(map(peak_deceleration, stops())) / VEHICLE.gravity
+    hardest = max(map(measure_peak_deceleration, stops())) / VEHICLE.gravity
     for vehicle, grip in ((VEHICLE, 1.0), (slicks, 2.0)):
         runs = [replace(model, vehicle=vehicle) for model in stops()]
         (model, *_) = runs

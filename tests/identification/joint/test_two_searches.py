@@ -105,7 +105,7 @@ def test_stops_that_are_followed_are_left_to_the_single_search_and_a_name_leaves
 def test_a_name_that_stands_on_a_session_far_off_its_tolerances_is_held_against_a_joint_fit(
     monkeypatch, pull: float, by_both: bool
 ):
-    """A racing car's lag of 0.12 s was 0.075 s beside a road that fell by 8 %, eight of its tolerances."""
+    """A racing car's lag of 0.12 s was a dead time of 0.075 s beside a road that fell by eight tolerances."""
     for share, missed in ((0.8, False), (1.2, True)):
         named = make_verdict(share * LIMIT * NOISE, names=True)
         single = replace(named, session_pulls={"slope": (0.0, pull), "mass": (9.0, 0.0)})

@@ -13,7 +13,7 @@ from tasks.identification.joint.calibration import needs_joint_fit
 from tasks.identification.joint.elimination import (
     Substitute,
 )
-from tasks.identification.joint.numbers import peak_deceleration
+from tasks.identification.joint.numbers import measure_peak_deceleration
 from tasks.identification.joint.verdict import JointTrace, judge_jointly
 from tasks.vehicle.effects.table import build_parameter_vector
 from tests.identification.joint.known_car import FEW, RULES, campaign_of, judge_car, own_channels, slow_brakes
@@ -99,19 +99,22 @@ def test_a_lag_is_no_surer_than_when_the_driver_lifts_where_no_throttle_was_logg
     trace = judge_car(driven_campaign(earlier, logged=False), numbers=numbers)
     low, value, high = named_intervals(trace)["brake_lag"]
     assert low < 0.15 < high and 0.01 < abs(value - 0.15) < trace.fitted.delay_doubt
-    shares = [1.0 / peak_deceleration(stop.model) for stop in trace.train]
+    shares = [1.0 / measure_peak_deceleration(stop.model) for stop in trace.train]
     assert trace.fitted.delay_doubt == pytest.approx(0.1 * float(np.median(shares)), rel=0.2)
+    errors = dict(zip(trace.fitted.by_name, trace.errors, strict=True))
+    assert errors["lag"] > trace.fitted.delay_doubt
     sure = judge_car(driven_campaign(earlier, logged=True), numbers=numbers)
     assert named_intervals(sure)["brake_lag"][1] == pytest.approx(0.15, abs=0.005)
     assert sure.fitted.delay_doubt == 0.0
 
 
-def hilly_campaign(common: float, tolerance: float = 0.01) -> Campaign:
+def hilly_campaign(common: float, tolerance: float = 0.01, lag: float = 0.0) -> Campaign:
     """Runs on three slopes, of which an import knows all but what they have in common [rad]."""
     flat, slopes = campaign_of({}), (-0.01, 0.0, 0.02)
     runs = []
     for i, (run, slope) in enumerate(zip(flat.runs, slopes, strict=True)):
-        driven = measured(replace(run, felt_slope=slope + common), build_parameter_vector({}), 70 + i).run
+        steep = replace(run, felt_slope=slope + common)
+        driven = measured(steep, build_parameter_vector({"lag": lag}), 70 + i).run
         seen = own_channels(driven, flat.channels, run.held_out)
         runs.append(replace(seen, felt_slope=slope))
     session = (*flat.tolerances.session[:-1], tolerance)
@@ -141,6 +144,17 @@ def test_a_common_slope_that_would_be_steeper_than_two_tolerances_is_none():
     trace = judge_car(hilly_campaign(-0.03), numbers=BRAKES_AND_ROAD)
     assert "slope" not in trace.fitted.by_name
     assert any("the road falls or climbs by -0.02" in reason for reason in trace.verdict.reasons)
+
+
+def test_a_re_tuned_slope_that_makes_up_for_a_name_is_given_up_at_its_bound_too(monkeypatch):
+    retuned = []
+    predict = verdict.predict_held_out
+    monkeypatch.setattr(
+        verdict, "predict_held_out", lambda runs, fit, grown: retuned.append(fit) or predict(runs, fit, grown)
+    )
+    trace = judge_car(hilly_campaign(-0.008, tolerance=0.005, lag=0.3), numbers=BRAKES_AND_ROAD)
+    assert {"slope", "lag"} <= trace.fitted.by_name.keys()
+    assert "slope" not in retuned[0].by_name
 
 
 def test_a_number_of_the_file_is_wrong_only_beyond_as_many_tolerances_as_the_rules_say():
