@@ -8,11 +8,13 @@ import pytest
 from catalogs.joint_numbers import load_joint_numbers
 from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
 from tasks.identification.decision.answer import NamedEffect
+from tasks.identification.decision.missed import compare_with_noise
 from tasks.identification.joint import verdict
 from tasks.identification.joint.calibration import needs_joint_fit
 from tasks.identification.joint.elimination import (
     Substitute,
 )
+from tasks.identification.joint.fit import measure_misfit
 from tasks.identification.joint.numbers import measure_peak_deceleration
 from tasks.identification.joint.verdict import JointTrace, judge_jointly
 from tasks.vehicle.effects.table import build_parameter_vector
@@ -155,6 +157,16 @@ def test_a_re_tuned_slope_that_makes_up_for_a_name_is_given_up_at_its_bound_too(
     trace = judge_car(hilly_campaign(-0.008, tolerance=0.005, lag=0.3), numbers=BRAKES_AND_ROAD)
     assert {"slope", "lag"} <= trace.fitted.by_name.keys()
     assert "slope" not in retuned[0].by_name
+
+
+def test_how_much_a_name_must_explain_is_asked_by_the_noise_of_the_speed_or_what_a_fit_follows(monkeypatch):
+    asked, keep = [], verdict.makes_difference
+    monkeypatch.setattr(verdict, "makes_difference", lambda *given: asked.append(given) or keep(*given))
+    campaign = campaign_of({"pressure_gain": 0.3, "lag": 0.09})
+    trace = judge_car(campaign, numbers=FEW)
+    ((_, error, _, _, over_noise),) = asked
+    follows = float(measure_misfit(trace.fitted, trace.train)[CHANNELS.index("speed")])
+    assert over_noise == pytest.approx(compare_with_noise(campaign, error, follows)) and over_noise > 0.5
 
 
 def test_a_number_of_the_file_is_wrong_only_beyond_as_many_tolerances_as_the_rules_say():
