@@ -23,7 +23,7 @@ from tasks.identification.joint.stops import Stop, predict_stop
 from tasks.identification.rules import JointRules
 
 ACCELERATION = CHANNELS.index("longitudinal_acceleration")
-LEFT = 0.5
+LARGEST_SHARE_LEFT = 0.5
 """Share of the disagreement of measured and predicted relation that an instrument's error may leave [1]."""
 
 
@@ -50,7 +50,7 @@ def relate_instruments(
 def make_instrument_check(stops: Sequence[Stop]) -> Callable[[JointFit, str], bool]:
     """Return the question whether speed and accelerometer contradict a number of a fit.
 
-    They do where more than `LEFT` of what they disagree by stays with it, or comes from beyond.
+    They do where more than `LARGEST_SHARE_LEFT` of what they disagree by stays with it, or comes from beyond.
 
     Parameters
     ----------
@@ -70,8 +70,8 @@ def make_instrument_check(stops: Sequence[Stop]) -> Callable[[JointFit, str], bo
         if told is None or plain is None:
             return False
         if name == "speed_delay":
-            return abs(told.delay - measured.delay) > LEFT * abs(plain.delay - measured.delay)
-        return abs(told.scale - measured.scale) > LEFT * abs(plain.scale - measured.scale)
+            return abs(told.delay - measured.delay) > LARGEST_SHARE_LEFT * abs(plain.delay - measured.delay)
+        return abs(told.scale - measured.scale) > LARGEST_SHARE_LEFT * abs(plain.scale - measured.scale)
 
     return contradicts
 

@@ -72,16 +72,22 @@ def compute_interval_reach(fitted: JointFit, rules: JointRules) -> NDArray[np.fl
     reach = compute_student_quantile(runs) * compute_standard_errors(fitted, rules)
     if runs < rules.fewest_scatter_runs:
         reach = np.maximum(reach, NORMAL_QUANTILE * _measure_what_remembers(fitted, rules))
-    return np.hypot(reach, NORMAL_QUANTILE * collect_doubts(fitted))
+    return np.hypot(reach, NORMAL_QUANTILE * _collect_doubts(fitted))
 
 
-def collect_doubts(fitted: JointFit) -> NDArray[np.float64]:
-    """Return what no run tells of each number, as a standard deviation beside its error, float64 [K] [its unit].
+def compute_told_errors(fitted: JointFit, rules: JointRules) -> NDArray[np.float64]:
+    """Return the standard errors that a verdict tells, with what no run can tell, float64 [K] [unit of the table].
 
     Parameters
     ----------
     fitted : the fit
+    rules : of the joint fit
     """
+    return np.hypot(compute_standard_errors(fitted, rules), _collect_doubts(fitted))
+
+
+def _collect_doubts(fitted: JointFit) -> NDArray[np.float64]:
+    """Return the standard deviation of each number that no run lowers, float64 [K] [unit of the table]."""
     return np.array([fitted.delay_doubt if n.group == "delay" else 0.0 for n in fitted.numbers])
 
 

@@ -58,9 +58,9 @@ from tasks.identification.joint.numbers import (
 )
 from tasks.identification.joint.stops import FITTED, Stop, complete_numbers, make_stop
 from tasks.identification.joint.uncertainty import (
-    collect_doubts,
     compute_interval_reach,
     compute_standard_errors,
+    compute_told_errors,
 )
 from tasks.identification.joint.words import (
     tell_guessed_lift,
@@ -221,7 +221,7 @@ def judge_jointly(
         verdict=verdict,
         calibrated=calibrated if effects or is_lowered(error["speed"]) else (),
         fitted=fitted,
-        errors=np.hypot(compute_standard_errors(fitted, joint), collect_doubts(fitted)),
+        errors=compute_told_errors(fitted, joint),
         train=train,
         held_out=held_out,
         predicted=predicted,
@@ -290,8 +290,7 @@ def _name_rivals(
 
 def _named_effect(fitted: JointFit, number: JointNumber, rules: JointRules) -> NamedEffect:
     place = fitted.numbers.index(number)
-    errors = np.hypot(compute_standard_errors(fitted, rules), collect_doubts(fitted))
-    value, error = float(fitted.values[place]), float(errors[place])
+    value, error = float(fitted.values[place]), float(compute_told_errors(fitted, rules)[place])
     reach = float(compute_interval_reach(fitted, rules)[place])
     estimate = Parameter(
         name=number.name, value=value, ci_low=max(value - reach, number.lower),

@@ -87,3 +87,10 @@ def fit_of(residuals: Sequence[np.ndarray], grids: Sequence[np.ndarray] | None =
 @cache
 def slow_brakes() -> JointTrace:
     return judge_car(campaign_of({"pressure_gain": 0.3, "lag": 0.09}))
+
+
+def named_intervals(trace: JointTrace) -> dict[str, tuple[float, float, float]]:
+    return {
+        effect.name: (effect.parameters[0].ci_low, effect.parameters[0].value, effect.parameters[0].ci_high)
+        for effect in (*trace.verdict.effects, *trace.calibrated)
+    }
