@@ -1,13 +1,10 @@
 """Backward elimination: what does not earn its place goes, the least certain first, each time with a new fit."""
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tasks.identification.joint.derivatives import differentiate_run
-from tasks.identification.joint.fit import JointFit, describe_fit, fit_jointly
+from tasks.identification.joint.fit import JointFit, fit_jointly
 from tasks.identification.joint.numbers import FRICTION, JointNumber
 from tasks.identification.joint.stops import Stop
 from tasks.identification.joint.uncertainty import (
@@ -20,11 +17,6 @@ from tasks.identification.joint.uncertainty import (
 )
 from tasks.identification.rules import JointRules
 
-MOST_ADDED = 2
-"""Numbers that are tried beside what is left, of those whose derivatives promise most [1]."""
-PROMISED = 0.05
-"""Fall of the cost that they must promise, over the square of the standard errors that a name needs [1]: a tenth of
-what such a number makes good, for a brake's curve makes good four times what its derivatives foresee."""
 RESTART_COST = 1.2
 """Cost of a fit over that with the numbers that went from which other starts are tried [1]."""
 NEEDED_COST = 0.75
@@ -33,25 +25,6 @@ GRIPS = (0.0, 0.2, 0.5)
 """Friction from which fits start, where runs saturate the tyres [1]."""
 KNOWN_SHARE = 0.5
 """Share of its prior's sigma up to which the runs must tell a friction for it to stay whatever its value [1]."""
-FORESEEN_SHARE = 0.05
-"""Share of what a substitute must make good, from which on it is fitted [1]; a fit of a late brake makes good ten times
-what its derivatives foresee where no delay is free."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Substitute:
-    """A number that explains nearly as much as a named one in its place.
-
-    Parameters
-    ----------
-    of : the named number
-    fitted : the fit with the substitute
-    name : of the substitute
-    """
-
-    of: str
-    name: str
-    fitted: JointFit
 
 
 def eliminate_uncertain_numbers(stops: Sequence[Stop], fitted: JointFit, rules: JointRules) -> JointFit:
@@ -175,37 +148,6 @@ def eliminate_without(
     return eliminate_uncertain_numbers(stops, left, rules)
 
 
-def add_certain_numbers(
-    stops: Sequence[Stop], fitted: JointFit, everything: Sequence[JointNumber], rules: JointRules
-) -> JointFit:
-    """Return the fit with those numbers that are certain beside what is left, of the few that promise most.
-
-    Where all numbers are free, those that stand in for each other are uncertain, and elimination may take the wrong one
-    away: of four stops of a race car it took the brake's curve, of four others it kept it.
-
-    Parameters
-    ----------
-    stops : training runs
-    fitted : after elimination
-    everything : numbers that were free before it
-    rules : of the joint fit
-    """
-    left = {n.name for n in fitted.numbers}
-    others = [n for n in everything if n.removable and n.name not in left]
-    falls = foresee_falls(stops, fitted, others) if others else np.empty(0)
-    for place in np.argsort(-falls)[:MOST_ADDED]:
-        number = others[place]
-        if falls[place] < PROMISED * compute_naming_distance(len(stops), rules) ** 2:
-            break
-        wider = refit_numbers(stops, fitted, (*fitted.numbers, number), {number.name: 0.5 * number.sigma})
-        if measure_certainty(wider, rules)[-1] < 1.0 or number.is_at_bound(wider.by_name[number.name]):
-            continue
-        wider = eliminate_uncertain_numbers(stops, wider, rules)
-        if number.name in wider.by_name and wider.cost < fitted.cost:
-            return add_certain_numbers(stops, wider, everything, rules)
-    return fitted
-
-
 def _find_stable_names(fitted: JointFit, rules: JointRules) -> set[str]:
     """Return the removable numbers that a linear elimination keeps with all runs, and without any one of them."""
     runs = range(len(fitted.residuals))
@@ -255,76 +197,3 @@ def refit_numbers(
     """
     begin = fitted.by_name | (start or {})
     return fit_jointly(stops, numbers, [begin], scales=fitted.scales, offsets=fitted.offsets)[0]
-
-
-def foresee_falls(
-    stops: Sequence[Stop], fitted: JointFit, others: Sequence[JointNumber]
-) -> NDArray[np.float64]:
-    """Return by how much the cost of a fit would fall with each other number free beside it, linearly, float64 [O].
-
-    A number moves no further than its bounds.
-
-    Parameters
-    ----------
-    stops : its runs
-    fitted : the fit
-    others : that are not free in it
-    """
-    numbers = (*fitted.numbers, *others)
-    values = np.append(fitted.values, np.zeros(len(others)))
-    runs = [
-        differentiate_run(stop, numbers, values, own, fitted.scales)
-        for stop, own in zip(stops, fitted.offsets, strict=True)
-    ]
-    beside = describe_fit(stops, runs, numbers, values, fitted.offsets, fitted.scales, fitted.cost)
-    information = np.diag([1.0 / n.sigma**2 for n in numbers])
-    gradient = np.zeros(len(numbers))
-    for residual, slope in zip(beside.residuals, beside.slopes, strict=True):
-        weighted = slope.T / np.sqrt(1.0 + residual**2)  # as the robust loss weighs them
-        information += weighted @ slope
-        gradient += weighted @ residual
-    falls = np.zeros(len(others))
-    for i, other in enumerate(others):
-        free = [*range(len(fitted.numbers)), len(fitted.numbers) + i]
-        variance = np.linalg.inv(information[np.ix_(free, free)])[-1, -1]
-        move = np.clip(-variance * gradient[free[-1]], other.lower, other.upper)
-        falls[i] = -move * (gradient[free[-1]] + 0.5 * move / variance)
-    return falls
-
-
-def find_substitutes(
-    stops: Sequence[Stop],
-    fitted: JointFit,
-    everything: Sequence[JointNumber],
-    share: float,
-    doubted: Collection[str] = (),
-) -> list[Substitute]:
-    """Return what explains nearly as much as each named number in its place.
-
-    A number is worth what the fit loses without it. Another that makes good nearly all of that is no worse an
-    explanation on these runs, whatever the likelihood of a model that is not exact says between them.
-
-    Parameters
-    ----------
-    stops : training runs
-    fitted : after elimination
-    everything : numbers that the campaign could show
-    share : of what a number explains from which a substitute is as good [1]
-    doubted : numbers that every car needs anew, but that the file claims to know: they too may stand for another
-    """
-    left = {n.name for n in fitted.numbers}
-    found = []
-    for number in fitted.numbers:
-        others = [n for n in everything if n.removable and n.name not in left]
-        if not (number.removable or number.name in doubted) or not others:
-            continue
-        rest = tuple(n for n in fitted.numbers if n is not number)
-        without = refit_numbers(stops, fitted, rest)
-        worth = without.cost - fitted.cost
-        for other, fall in zip(others, foresee_falls(stops, without, others), strict=True):
-            if fall < FORESEEN_SHARE * share * worth:
-                continue
-            instead = refit_numbers(stops, without, (*rest, other), {other.name: 0.5 * other.sigma})
-            if instead.cost < fitted.cost + (1.0 - share) * worth:
-                found.append(Substitute(of=number.name, name=other.name, fitted=instead))
-    return found

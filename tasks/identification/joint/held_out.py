@@ -11,9 +11,10 @@ from tasks.campaign.manoeuvres import MANOEUVRE_UNITS, measure_manoeuvre_errors
 from tasks.identification.decision.answer import ChannelError
 from tasks.identification.decision.held_out import is_noticed, summarise_errors
 from tasks.identification.decision.words import join_phrases
-from tasks.identification.joint.elimination import Substitute, eliminate_uncertain_numbers, refit_numbers
+from tasks.identification.joint.elimination import eliminate_uncertain_numbers, refit_numbers
 from tasks.identification.joint.fit import JointFit, lead_offsets
 from tasks.identification.joint.stops import Stop, predict_stop
+from tasks.identification.joint.substitutes import Substitute
 from tasks.identification.rules import DecisionRules, JointRules
 
 

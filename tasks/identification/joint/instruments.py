@@ -17,9 +17,10 @@ from tasks.campaign.speed_by_acceleration import (
 )
 from tasks.identification.inference.driver import SPEED
 from tasks.identification.inference.forward import RunModel
-from tasks.identification.joint.elimination import Substitute, eliminate_without
+from tasks.identification.joint.elimination import eliminate_without
 from tasks.identification.joint.fit import JointFit
 from tasks.identification.joint.stops import Stop, predict_stop
+from tasks.identification.joint.substitutes import Substitute
 from tasks.identification.rules import JointRules
 
 ACCELERATION = CHANNELS.index("longitudinal_acceleration")

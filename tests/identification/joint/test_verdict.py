@@ -11,10 +11,9 @@ from tasks.identification.decision.answer import NamedEffect
 from tasks.identification.decision.missed import compare_with_noise
 from tasks.identification.joint import verdict
 from tasks.identification.joint.calibration import needs_joint_fit
-from tasks.identification.joint.elimination import (
-    Substitute,
-)
 from tasks.identification.joint.fit import measure_misfit
+from tasks.identification.joint.names import collect_tolerances, name_rivals
+from tasks.identification.joint.substitutes import Substitute
 from tasks.identification.joint.verdict import judge_jointly
 from tasks.vehicle.effects.table import build_parameter_vector
 from tests.identification.joint.known_car import (
@@ -61,7 +60,7 @@ def test_why_single_effects_could_not_be_told_is_the_first_reason():
 def test_a_mass_and_frictions_are_wrong_by_the_tolerances_of_their_campaign():
     numbers = {n.name: n for n in load_joint_numbers()}
     campaign = campaign_of({})
-    found = verdict._tolerances(campaign, [numbers["wet_friction"], numbers["lag"]])
+    found = collect_tolerances(campaign, [numbers["wet_friction"], numbers["lag"]])
     session = dict(zip(SESSION, campaign.tolerances.session, strict=True))
     named = {name: session[name] for name in ("pressure_gain", "wheel_radius", "mass", "slope")}
     assert found == named | {"wet_friction": campaign.tolerances.friction}
@@ -158,7 +157,7 @@ def test_tyres_at_their_limit_are_a_rival_of_the_brakes_curve():
         information=1e6 * np.eye(2), residuals=(np.zeros(10),) * 2,
         slopes=(np.zeros((10, 2)),) * 2, grids=(np.ones((10, 1), dtype=bool),) * 2,
     )  # fmt: skip
-    found = verdict._name_rivals(fitted, [], [curve], RULES.joint)
+    found = name_rivals(fitted, [], [curve], RULES.joint)
     assert [rival.name for _, rival in found] == ["retuned_wet_friction"]
 
 
@@ -184,7 +183,7 @@ def test_a_number_within_its_tolerance_that_other_physics_explains_as_well_is_na
     assert ("brake_lag", "brake_dead_time") in [
         (of, rival.name) for of, rival in slow_brakes().verdict.rivals
     ]
-    monkeypatch.setattr(verdict, "_tolerances", lambda *_: {"lag": 1.0, "pressure_gain": 0.2})
+    monkeypatch.setattr(verdict, "collect_tolerances", lambda *_: {"lag": 1.0, "pressure_gain": 0.2})
     trace = judge_car(campaign_of({"lag": 0.09}))
     assert trace.verdict.verdict == "SET" and [e.name for e in trace.verdict.effects] == ["brake_lag"]
     assert "brake_lag" not in [e.name for e in trace.calibrated]
@@ -253,17 +252,6 @@ def test_what_the_training_runs_had_in_common_is_not_named_where_the_held_out_ru
         "suggest that the air holds" in reason and "not named" in reason
         for reason in contradicted.verdict.reasons
     )
-
-
-@pytest.mark.parametrize("falls", [1.0, -1.0])
-def test_a_fit_is_given_up_for_a_better_one_alone(monkeypatch, falls: float):
-    """Runs whose own numbers started anew ended in a worse minimum, in which a dead band was no longer certain."""
-    here = slow_brakes()
-    moved = replace(here.fitted, cost=here.fitted.cost - falls, values=0.5 * here.fitted.values)
-    monkeypatch.setattr(verdict, "fit_jointly", lambda *_, **__: [moved])
-    best, agreeing = verdict._settle(here.train, here.fitted, [{}], RULES.joint)
-    assert best is (moved if falls > 0.0 else here.fitted)
-    assert agreeing == (int(falls > 0.0), 1)
 
 
 def test_every_start_is_tried_though_no_friction_is_free():
