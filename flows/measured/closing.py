@@ -25,9 +25,9 @@ from tasks.campaign.braking_heat import estimate_disc_temperatures
 from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
 from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter, Verdict
 from tasks.identification.decision.excitation import find_reached_range
-from tasks.identification.decision.verdict import Trace
+from tasks.identification.decision.verdict import SearchOutcome
 from tasks.identification.decision.words import join_phrases, say_effect, tell_verdict
-from tasks.identification.joint.verdict import JointTrace
+from tasks.identification.joint.verdict import JointOutcome
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.table import PARAMETERS
 
@@ -64,8 +64,8 @@ def close_loop(
     results.write_json("split.json", split_of(measured))
     earlier = record_reading(measured, sha256_of([vehicle_content(name)]))
     measured = replace(measured, tolerances=measured.tolerances.with_session(session_tolerances(name)))
-    trace = judge_campaign(measured, model, road, load_effects())
-    result = verdict_json(trace.verdict) | tell_search(trace)
+    outcome = judge_campaign(measured, model, road, load_effects())
+    result = verdict_json(outcome.verdict) | tell_search(outcome)
     result = tell_friction_pulls(result, measured.tolerances.friction)
     result["held_out_readings_before"] = earlier
     if earlier:
@@ -76,8 +76,8 @@ def close_loop(
         result["reasons"].append(
             f"the file's tolerances of {', '.join(held)} move nothing: a verdict holds these numbers"
         )
-    found = replace(trace.verdict, effects=(*trace.verdict.effects, *trace.calibrated))
-    text, missing = grown_vehicle(name, found, _reached_ranges(trace))
+    found = replace(outcome.verdict, effects=(*outcome.verdict.effects, *outcome.calibrated))
+    text, missing = grown_vehicle(name, found, _reached_ranges(outcome))
     result["vehicle_file"] = None
     if text is not None:
         for file, content in beside.items():
@@ -87,7 +87,7 @@ def close_loop(
         result["vehicle_file"] = str(results.path(grown))
     result["not_carried_by_coupled_mode"] = missing
     results.write_json("verdict.json", result)
-    results.write("report.html", write_verdict_page(trace, result, replace(measured, vehicle=name)))
+    results.write("report.html", write_verdict_page(outcome, result, replace(measured, vehicle=name)))
     result["report"] = str(results.path("report.html"))
     return result
 
@@ -120,52 +120,52 @@ def find_unused_tolerances(vehicle: str) -> list[str]:
     return [name for name in load_tolerances(vehicle) if name not in moved]
 
 
-def _reached_ranges(trace: Trace | JointTrace) -> dict[str, tuple[float, float]]:
+def _reached_ranges(outcome: SearchOutcome | JointOutcome) -> dict[str, tuple[float, float]]:
     """Return what the training runs reached of the variable of each form that is named."""
-    if isinstance(trace, JointTrace):
+    if isinstance(outcome, JointOutcome):
         return {}  # a joint fit names no forms
-    verdict, runs = trace.verdict, [run.model for run in trace.end.evidence.train]
+    verdict, runs = outcome.verdict, [run.model for run in outcome.end.evidence.train]
     forms = {effect.variable for effect in verdict.effects if effect.effect_class == "form"}
     return {variable: find_reached_range(runs, verdict.theta, verdict.slots, variable) for variable in forms}
 
 
-def tell_search(trace: Trace | JointTrace) -> dict[str, Any]:
+def tell_search(outcome: SearchOutcome | JointOutcome) -> dict[str, Any]:
     """Return what a search says beside its verdict, as plain values: in words, and what is left over.
 
     Parameters
     ----------
-    trace : the verdict and what it stands on
+    outcome : the verdict and what it stands on
     """
-    library, verdict = load_effects(), trace.verdict
-    train, held_out = predict_runs(trace)
+    library, verdict = load_effects(), outcome.verdict
+    train, held_out = predict_runs(outcome)
     rivals = [rival for _, rival in verdict.rivals]
     planned_for = verdict.experiment.between[0] if verdict.experiment else None
     suggested = next((effect for effect in verdict.tried if effect.name == planned_for), None)
     sentence = tell_verdict(
         verdict.effects, rivals, library, verdict.error, verdict.manoeuvre_error, suggested,
-        verdict.misses or bool(verdict.disagreement and not verdict.effects), _say_own_numbers(trace, library),
+        verdict.misses or bool(verdict.disagreement and not verdict.effects), _say_own_numbers(outcome, library),
     )  # fmt: skip
     told = {
         "channels": [CHANNELS[c] for c in train[0].channels],
         "sentence": sentence,
-        "calibrated": [effect_json(effect, library) for effect in trace.calibrated],
+        "calibrated": [effect_json(effect, library) for effect in outcome.calibrated],
     }
-    if isinstance(trace, Trace):
+    if isinstance(outcome, SearchOutcome):
         residual = compute_residual_rmse((*train, *held_out))
-        pulls = compute_friction_pulls(trace)
+        pulls = compute_friction_pulls(outcome)
         return {
             "search": SEARCHES[0],
             **told,
-            "numbers": _number_json(SESSION, trace.end.base.session, trace.end.base.session_error),
+            "numbers": _number_json(SESSION, outcome.end.base.session, outcome.end.base.session_error),
             "residual_rmse": residual,
             "friction_pulls_sigma": pulls,
         }
-    names = [number.name for number in trace.fitted.numbers]
+    names = [number.name for number in outcome.fitted.numbers]
     return {
         "search": SEARCHES[1],
         **told,
-        "numbers": _number_json(names, trace.fitted.values, trace.errors),
-        "starts_agreeing": {"agreeing": trace.agreeing[0], "of": trace.agreeing[1]},
+        "numbers": _number_json(names, outcome.fitted.values, outcome.errors),
+        "starts_agreeing": {"agreeing": outcome.agreeing[0], "of": outcome.agreeing[1]},
         "residual_rmse": compute_residual_rmse(held_out),
     }  # fmt: skip
 
@@ -180,13 +180,13 @@ def _number_json(
     }
 
 
-def _say_own_numbers(trace: Trace | JointTrace, library: Sequence[Effect]) -> str:
+def _say_own_numbers(outcome: SearchOutcome | JointOutcome, library: Sequence[Effect]) -> str:
     """Return what the numbers that the file hardly knew say of the car, else the one that the runs pull most."""
-    if trace.calibrated:
-        return join_phrases(say_effect(effect, library) for effect in trace.calibrated)
-    if isinstance(trace, JointTrace):
+    if outcome.calibrated:
+        return join_phrases(say_effect(effect, library) for effect in outcome.calibrated)
+    if isinstance(outcome, JointOutcome):
         return ""
-    base = trace.end.base
+    base = outcome.end.base
     place = int(np.argmax(base.pulls))
     number = next(e for e in library if e.effect_class == "retune" and e.parameters[0].name == SESSION[place])
     return f"most: {number.say({SESSION[place]: float(base.session[place])})}"

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.campaign import CHANNELS
-from tasks.identification.decision.verdict import Trace
+from tasks.identification.decision.verdict import SearchOutcome
 from tasks.identification.inference.forward import RunModel, predict_channels
 from tasks.identification.joint.fit import lead_offsets
 from tasks.identification.joint.stops import predict_stop
-from tasks.identification.joint.verdict import JointTrace
+from tasks.identification.joint.verdict import JointOutcome
 from tasks.vehicle.effects.table import EFFECT_TABLE
 
 MODELS = ("frozen", "retuned", "after")
@@ -34,16 +34,18 @@ class RunPrediction:
     predicted: Mapping[str, NDArray[np.float64]]
 
 
-def predict_runs(trace: Trace | JointTrace) -> tuple[tuple[RunPrediction, ...], tuple[RunPrediction, ...]]:
+def predict_runs(
+    outcome: SearchOutcome | JointOutcome,
+) -> tuple[tuple[RunPrediction, ...], tuple[RunPrediction, ...]]:
     """Return the training runs and the held-out runs with the predictions of the frozen and the grown model.
 
     Parameters
     ----------
-    trace : the verdict and what it stands on; a joint fit has the re-tuned model too on its held-out runs
+    outcome : the verdict and what it stands on; a joint fit has the re-tuned model too on its held-out runs
     """
-    if isinstance(trace, JointTrace):
-        return _predict_stops(trace)
-    evidence = trace.start.evidence
+    if isinstance(outcome, JointOutcome):
+        return _predict_stops(outcome)
+    evidence = outcome.start.evidence
     train, held_out = (
         tuple(
             RunPrediction(
@@ -54,15 +56,15 @@ def predict_runs(trace: Trace | JointTrace) -> tuple[tuple[RunPrediction, ...], 
                     "after": after,
                 },
             )
-            for run, after in zip(runs, trace.predict_readings(runs), strict=True)
+            for run, after in zip(runs, outcome.predict_readings(runs), strict=True)
         )
         for runs in (evidence.train, evidence.held_out)
     )
     return train, held_out
 
 
-def _predict_stops(trace: JointTrace) -> tuple[tuple[RunPrediction, ...], tuple[RunPrediction, ...]]:
-    fitted = trace.fitted
+def _predict_stops(outcome: JointOutcome) -> tuple[tuple[RunPrediction, ...], tuple[RunPrediction, ...]]:
+    fitted = outcome.fitted
     train = tuple(
         RunPrediction(
             model=stop.model,
@@ -72,7 +74,7 @@ def _predict_stops(trace: JointTrace) -> tuple[tuple[RunPrediction, ...], tuple[
                 "after": predict_stop(stop, fitted.by_name, offsets),
             },
         )
-        for stop, offsets in zip(trace.train, fitted.offsets, strict=True)
+        for stop, offsets in zip(outcome.train, fitted.offsets, strict=True)
     )
     held_out = tuple(
         RunPrediction(
@@ -80,7 +82,7 @@ def _predict_stops(trace: JointTrace) -> tuple[tuple[RunPrediction, ...], tuple[
             channels=tuple(stop.channels.tolist()),
             predicted=dict(zip(MODELS, predicted, strict=True)),
         )
-        for stop, predicted in zip(trace.held_out, trace.predicted, strict=True)
+        for stop, predicted in zip(outcome.held_out, outcome.predicted, strict=True)
     )
     return train, held_out
 

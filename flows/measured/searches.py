@@ -3,9 +3,9 @@
 from catalogs.decision_rules import load_decision_rules
 from catalogs.joint_numbers import load_joint_numbers
 from tasks.campaign.campaign import Campaign
-from tasks.identification.decision.verdict import Trace
+from tasks.identification.decision.verdict import SearchOutcome
 from tasks.identification.joint.two_searches import judge_by_two_searches
-from tasks.identification.joint.verdict import JointTrace
+from tasks.identification.joint.verdict import JointOutcome
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.parameters import Vehicle
@@ -16,7 +16,7 @@ SEARCHES = ("one effect at a time", "joint fit")
 
 def judge_campaign(
     measured: Campaign, model: Vehicle, road: SurfaceParameters, effects: tuple[Effect, ...]
-) -> Trace | JointTrace:
+) -> SearchOutcome | JointOutcome:
     """Return what a model lacks, by the rules and the numbers of the catalogues.
 
     Parameters

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from flows.measured.residuals import MODELS, RunPrediction
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
 from tasks.identification.decision.forms import ResidualSpline, fit_residual_splines
-from tasks.identification.decision.verdict import Trace
+from tasks.identification.decision.verdict import SearchOutcome
 from tasks.identification.inference.quantiles import NORMAL_QUANTILE
 from tasks.identification.joint.fit import JointFit
 from tasks.identification.joint.numbers import SMOOTHED
@@ -89,17 +89,21 @@ def _compute_decelerations(run: RunPrediction) -> NDArray[np.float64]:
     return np.vstack((pressure, slower))[:, np.all(speeds[:, lag:] > STANDING, axis=0)]
 
 
-def make_spline_figures(trace: Trace) -> dict[str, Any]:
+def make_spline_figures(outcome: SearchOutcome) -> dict[str, Any]:
     """Return where the residual of the training runs lies: gains of splines, and the spline at the named port.
 
     Parameters
     ----------
-    trace : the verdict and what it stands on
+    outcome : the verdict and what it stands on
     """
-    frozen = fit_residual_splines(trace.start.evidence, trace.start.base)
-    left = frozen if trace.end is trace.start else fit_residual_splines(trace.end.evidence, trace.end.base)
+    frozen = fit_residual_splines(outcome.start.evidence, outcome.start.base)
+    left = (
+        frozen
+        if outcome.end is outcome.start
+        else fit_residual_splines(outcome.end.evidence, outcome.end.base)
+    )
     after = {(s.port, s.variable): s for s in left}
-    ports = [effect.port for effect in trace.verdict.effects]
+    ports = [effect.port for effect in outcome.verdict.effects]
     shown = next((spline for spline in frozen if spline.port in ports), frozen[0])
     return {
         "gains": [

@@ -19,8 +19,8 @@ from flows.measured.verdict_figures import (
 )
 from flows.pages import DATASET_PAGE, make_policy, read_plotly
 from tasks.campaign.campaign import Campaign
-from tasks.identification.decision.verdict import Trace
-from tasks.identification.joint.verdict import JointTrace
+from tasks.identification.decision.verdict import SearchOutcome
+from tasks.identification.joint.verdict import JointOutcome
 from tasks.identification.joint.words import find_separating_run
 
 PAGE = Path(__file__).parent / "verdict_page"
@@ -37,14 +37,16 @@ MISSED = "what is missing cannot be named"
 """Meaning of NOTHING where the runs disagree with the model by more than their noise."""
 
 
-def write_verdict_page(trace: Trace | JointTrace, result: Mapping[str, Any], campaign: Campaign) -> str:
+def write_verdict_page(
+    outcome: SearchOutcome | JointOutcome, result: Mapping[str, Any], campaign: Campaign
+) -> str:
     """Return the page.
 
     Scripts run by their hashes alone: one that got in with a name of the campaign would not, and nothing is fetched.
 
     Parameters
     ----------
-    trace : the verdict and what it stands on
+    outcome : the verdict and what it stands on
     result : the verdict as plain values
     campaign : measured runs
     """
@@ -52,20 +54,20 @@ def write_verdict_page(trace: Trace | JointTrace, result: Mapping[str, Any], cam
     pages.filters |= {"digits": _format_digits, "words": _format_name, "unit": format_plain_unit}
     scripts = (read_plotly(), (PAGE / "page.js").read_text())
     style = "\n".join(sheet.read_text() for sheet in (DATASET_PAGE / "report.css", PAGE / "page.css"))
-    train, held_out = predict_runs(trace)
+    train, held_out = predict_runs(outcome)
     figures = {"runs": make_residual_figures(held_out), "curve": make_brake_curve(train)}
     told: dict[str, Any] = {"separate": [None] * len(result["rivals"])}
     template = "joint_fit.html"
-    if isinstance(trace, JointTrace):
-        told = {"separate": _find_separations(trace), "alike": find_alike_numbers(trace.fitted)}
+    if isinstance(outcome, JointOutcome):
+        told = {"separate": _find_separations(outcome), "alike": find_alike_numbers(outcome.fitted)}
     else:
         template = "one_effect.html"
-        figures |= make_spline_figures(trace) | {"correlation": result["residual_input_correlation"]}
+        figures |= make_spline_figures(outcome) | {"correlation": result["residual_input_correlation"]}
         told |= {
-            "candidates": _list_candidates(trace),
+            "candidates": _list_candidates(outcome),
             "detectable": [
                 (e.name, e.parameters[0], result["minimum_detectable"].get(e.name))
-                for e in trace.start.evidence.effects
+                for e in outcome.start.evidence.effects
             ],
             "error_rates": tell_error_rates([effect["name"] for effect in result["effects"]]),
         }
@@ -127,26 +129,26 @@ def _tell_meaning(result: Mapping[str, Any]) -> str:
     return MISSED if missed else MEANING[result["verdict"]]
 
 
-def _find_separations(trace: JointTrace) -> list[str | None]:
+def _find_separations(outcome: JointOutcome) -> list[str | None]:
     """Return the run that tells each rival from what is named, in the order of the rivals."""
-    fits = (trace.fitted, *(substitute.fitted for substitute in trace.substitutes))
+    fits = (outcome.fitted, *(substitute.fitted for substitute in outcome.substitutes))
     numbers = {n.effect.name: n for fitted in fits for n in fitted.numbers}
     return [
         find_separating_run([numbers[name] for name in (of, rival.name) if name in numbers])
-        for of, rival in trace.verdict.rivals
+        for of, rival in outcome.verdict.rivals
     ]
 
 
-def _list_candidates(trace: Trace) -> list[dict[str, Any]]:
+def _list_candidates(outcome: SearchOutcome) -> list[dict[str, Any]]:
     """Return every candidate that was refined, with what became of it."""
     rows = []
-    for place, compared in enumerate(trace.compared, start=1):
+    for place, compared in enumerate(outcome.compared, start=1):
         near = {id(c) for c, _ in compared.near}
         for candidate, share in ((compared.own, compared.share), *compared.others):
             what = "named" if candidate is compared.own else "rival" if id(candidate) in near else ""
             name = f"{place}. {candidate.hypothesis.name}"
             rows.append({"name": name, "what": what, "share": share, "of": candidate})
-    rows += [{"name": e.name, "what": "not named", "share": None, "of": e} for e in trace.verdict.tried]
+    rows += [{"name": e.name, "what": "not named", "share": None, "of": e} for e in outcome.verdict.tried]
     return rows
 
 

@@ -15,13 +15,13 @@ from tasks.identification.inference.hypothesis import compose_parameters
 from tasks.identification.inference.linearisation import BODY_CHANNELS
 from tasks.vehicle.effects.table import EFFECT_TABLE
 
+HeldOutErrors = tuple[dict[str, ChannelError], dict[str, ChannelError]]
+"""Errors by channel; and of stopping distance and peak pitch, over the runs that brake."""
 HALF = 0.5
 """Share of an error below which it is lowered, whatever resamples of few runs say [1]."""
 
 
-def compute_held_out_errors(
-    evidence: Evidence, null: Fit, base: Fit
-) -> tuple[dict[str, ChannelError], dict[str, ChannelError]]:
+def compute_held_out_errors(evidence: Evidence, null: Fit, base: Fit) -> HeldOutErrors:
     """Return the RMSE on held-out runs under the frozen, the re-tuned and the grown model.
 
     Parameters
@@ -29,10 +29,6 @@ def compute_held_out_errors(
     evidence : the runs
     null : fit without effects, from which re-tuning starts
     base : fit with the accepted effects
-
-    Returns
-    -------
-    Errors by channel; and of stopping distance and peak pitch, over the runs that brake.
     """
     rules = evidence.rules
     retuned = fit_hypotheses(

@@ -22,7 +22,7 @@ from tasks.identification.decision.correlation import correlate_residual_with_pr
 from tasks.identification.decision.discovery import search_library_and_forms
 from tasks.identification.decision.disputes import settle_disputes
 from tasks.identification.decision.experiment import plan_next_experiment
-from tasks.identification.decision.held_out import compute_held_out_errors, is_lowered
+from tasks.identification.decision.held_out import HeldOutErrors, compute_held_out_errors, is_lowered
 from tasks.identification.decision.intervals import (
     compute_curvature_interval,
     compute_profile_interval,
@@ -47,7 +47,7 @@ from tasks.vehicle.parameters import Vehicle
 
 
 @dataclass(frozen=True, kw_only=True)
-class Trace:
+class SearchOutcome:
     """A verdict with what it stands on.
 
     Parameters
@@ -84,7 +84,7 @@ def find_missing_effects(
     rules: DecisionRules,
     *,
     hardly_known: Mapping[str, tuple[float, float]] = MappingProxyType({}),
-) -> Trace:
+) -> SearchOutcome:
     """Trace the residual of a campaign to what the model lacks.
 
     Parameters
@@ -115,53 +115,25 @@ def find_missing_effects(
     )
     reasons: list[str] = []
     start, found, near_form = search_library_and_forms(evidence, null, reasons)
-    compared = compare_with_rivals(found.evidence, found.base, found.rounds)
-    while again := drop_superseded(found, compared):
-        found = again
-        compared = compare_with_rivals(found.evidence, found.base, found.rounds)
-    near_form = None if near_form is None or is_named(near_form, compared) else near_form
-    if (agreed := settle_disputes(found, reasons)) is not found:
-        found, near_form = agreed, None
-        compared = compare_with_rivals(found.evidence, found.base, found.rounds)
-    error, manoeuvres = compute_held_out_errors(start.evidence, start.base, found.base)
-    tried = list(found.tried)
-    least = rules.joint.noticed_share if hardly_known else None
-    while compared and (objection := object_to_last(found, start, error, least)):
-        reasons.append(objection)
-        last, near_form = found.rounds[-1], None
-        tried = [last.accepted, *tried]
-        found = replace(
-            start, base=last.base, rounds=found.rounds[:-1],
-            evidence=found.rounds[-2].evidence if found.rounds[1:] else start.evidence,
-        )  # fmt: skip
-        compared = compare_with_rivals(found.evidence, found.base, found.rounds)
-        error, manoeuvres = compute_held_out_errors(start.evidence, start.base, found.base)
+    found, compared, near_form = _settle_names(found, near_form, reasons)
+    kept, errors = _keep_what_predicts(
+        found, start, rules.joint.noticed_share if hardly_known else None, reasons
+    )
+    tried = [*(r.accepted for r in found.rounds[len(kept.rounds) :]), *found.tried]
+    if kept is not found:
+        found, compared, near_form = kept, compare_with_rivals(kept.evidence, kept.base, kept.rounds), None
     # before derivatives are taken anew: gains compare only about the same ones
     others = (*find_pairs(found, compared), *find_pulled_numbers(found)) if compared else ()
     if compared:
         here, settled, refitted = refit_named(found.evidence, found.base, [c.own for c in compared])
         found = replace(found, evidence=here, base=settled)
         compared = [replace(c, own=own) for c, own in zip(compared, refitted, strict=True)]
-        error, manoeuvres = compute_held_out_errors(start.evidence, start.base, found.base)
+        errors = compute_held_out_errors(start.evidence, start.base, found.base)
     named = [
         make_named_effect(c.own, c.share, compute_profile_interval(c.own, found.evidence)) for c in compared
     ]
-    near = [
-        (c.own.hypothesis.name, make_named_effect(o, wins, compute_curvature_interval(o)))
-        for c in compared
-        for o, wins in c.near
-    ]
-    for other in others:
-        interval = compute_curvature_interval(other.candidate)
-        near.append((named[0].name, make_named_effect(other.candidate, 0.0, interval)))
+    near = _name_rivals(compared, [other.candidate for other in others], near_form)
     reasons += dict.fromkeys(other.reason for other in others)
-    if near_form is not None:
-        near.append(
-            (
-                named[0].name,
-                make_named_effect(near_form, 0.0, compute_curvature_interval(near_form)),
-            )
-        )
     calibrated, wrong = tell_calibrated(found.base, effects, hardly_known, campaign.tolerances, rules)
     named += wrong
     kind = _choose_verdict_name(named, near)
@@ -190,8 +162,8 @@ def find_missing_effects(
         effects=tuple(named),
         rivals=tuple(near),
         tried=tuple(make_named_effect(c, 0.0, compute_curvature_interval(c)) for c in tried[:6]),
-        error=error,
-        manoeuvre_error=manoeuvres,
+        error=errors[0],
+        manoeuvre_error=errors[1],
         correlation=correlate_residual_with_pressure(
             start.evidence.held_out, *found.base.compose(), rules.longest_lag
         ),
@@ -208,14 +180,60 @@ def find_missing_effects(
         step_sensitive=evidence.step_sensitive,
         reasons=tuple(reasons),
     )
-    told = named or is_lowered(error["speed"])
-    return Trace(
+    told = named or is_lowered(errors[0]["speed"])
+    return SearchOutcome(
         verdict=verdict,
         start=start,
         end=found,
         compared=tuple(compared),
         calibrated=calibrated if told else (),
     )
+
+
+def _settle_names(
+    found: SearchState, near_form: Candidate | None, reasons: list[str]
+) -> tuple[SearchState, list[RivalComparison], Candidate | None]:
+    """Take back names that later ones explain and about which the runs disagree, and compare the rest with its rivals.
+
+    Returns
+    -------
+    What is named, each name beside its alternatives, and the single form that still cannot be told from the first.
+    """
+    compared = compare_with_rivals(found.evidence, found.base, found.rounds)
+    while again := drop_superseded(found, compared):
+        found = again
+        compared = compare_with_rivals(found.evidence, found.base, found.rounds)
+    near_form = None if near_form is None or is_named(near_form, compared) else near_form
+    agreed = settle_disputes(found, reasons)
+    if agreed is found:
+        return found, compared, near_form
+    return agreed, compare_with_rivals(agreed.evidence, agreed.base, agreed.rounds), None
+
+
+def _keep_what_predicts(
+    found: SearchState, start: SearchState, least: float | None, reasons: list[str]
+) -> tuple[SearchState, HeldOutErrors]:
+    """Take back the last name for as long as the held-out runs object to it; return what is left and its errors."""
+    errors = compute_held_out_errors(start.evidence, start.base, found.base)
+    while found.rounds and (objection := object_to_last(found, start, errors[0], least)):
+        reasons.append(objection)
+        *left, last = found.rounds
+        evidence = left[-1].evidence if left else start.evidence
+        found = replace(start, base=last.base, rounds=tuple(left), evidence=evidence)
+        errors = compute_held_out_errors(start.evidence, start.base, found.base)
+    return found, errors
+
+
+def _name_rivals(
+    compared: Sequence[RivalComparison], others: Sequence[Candidate], near_form: Candidate | None
+) -> list[tuple[str, NamedEffect]]:
+    """Return what the runs cannot tell from the names, each with the name that it stands in for."""
+    near = [(c.own.hypothesis.name, rival, wins) for c in compared for rival, wins in c.near]
+    beside_first = [*others, *([] if near_form is None else [near_form])]
+    near += [(compared[0].own.hypothesis.name, rival, 0.0) for rival in beside_first]
+    return [
+        (of, make_named_effect(rival, wins, compute_curvature_interval(rival))) for of, rival, wins in near
+    ]
 
 
 def find_pair_to_confirm(tried: Sequence[Candidate], null: Fit) -> tuple[Fit, Fit] | None:

@@ -12,7 +12,7 @@ from tasks.identification.decision.held_out import (
     find_worse_channels,
 )
 from tasks.identification.decision.screening import compute_inflation
-from tasks.identification.decision.verdict import Trace
+from tasks.identification.decision.verdict import SearchOutcome
 from tasks.identification.decision.words import join_phrases
 from tasks.identification.inference.fit import fit_hypotheses
 from tasks.identification.inference.hypothesis import moves_speed
@@ -37,7 +37,7 @@ def find_effects_in_two_looks(
     effects: tuple[Effect, ...],
     numbers: tuple[JointNumber, ...],
     rules: DecisionRules,
-) -> Trace:
+) -> SearchOutcome:
     """Look for single effects by all channels; where they name nothing and the runs disagree, along the road alone.
 
     A car whose tyres, anti-lock brake or suspension are not the model's moves its wheels and its body as no effect of
@@ -58,7 +58,7 @@ def find_effects_in_two_looks(
         If single effects can be told by neither; `judge_jointly` can.
     """
 
-    def search(runs: Campaign) -> Trace:
+    def search(runs: Campaign) -> SearchOutcome:
         return find_single_effects(runs, vehicle, surface, effects, numbers, rules)
 
     try:
@@ -79,8 +79,8 @@ def find_effects_in_two_looks(
 
 
 def _look_along_road(
-    campaign: Campaign, search: Callable[[Campaign], Trace], rules: DecisionRules, why: str
-) -> Trace | None:
+    campaign: Campaign, search: Callable[[Campaign], SearchOutcome], rules: DecisionRules, why: str
+) -> SearchOutcome | None:
     """Return the verdict by speed and accelerometer, with errors of all channels; None if it names nothing that holds.
 
     A name must not act on the body alone, because the channels that show that were not asked, and must not predict

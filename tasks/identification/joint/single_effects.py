@@ -9,7 +9,7 @@ from tasks.campaign.campaign import Campaign
 from tasks.identification.decision.disputes import ForeignCarError
 from tasks.identification.decision.held_out import compute_held_out_errors
 from tasks.identification.decision.missed import compare_with_noise
-from tasks.identification.decision.verdict import Trace, find_missing_effects
+from tasks.identification.decision.verdict import SearchOutcome, find_missing_effects
 from tasks.identification.inference.driver import begin_at_brake, measure_drive
 from tasks.identification.inference.forward import prepare_run
 from tasks.identification.joint.calibration import calibrate_gain
@@ -28,7 +28,7 @@ def find_single_effects(
     effects: tuple[Effect, ...],
     numbers: Sequence[JointNumber],
     rules: DecisionRules,
-) -> Trace:
+) -> SearchOutcome:
     """Look for one effect at a time; where a driver held his speed until he braked, from the brake on.
 
     That he did is seen beside the file's model, or only beside the resistance that a search finds. Taken for coasting,
@@ -50,12 +50,12 @@ def find_single_effects(
     share = rules.joint.brake_onset_share
     train = [prepare_run(run, vehicle, surface) for run in campaign.train]
 
-    def search(runs: Campaign) -> Trace:
+    def search(runs: Campaign) -> SearchOutcome:
         gain = calibrate_gain(runs, vehicle, surface, numbers, rules.joint)
         return find_missing_effects(runs, vehicle, surface, effects, rules, hardly_known=gain)
 
-    def measure_drive_beside(trace: Trace) -> float:
-        found = trace.end.base
+    def measure_drive_beside(outcome: SearchOutcome) -> float:
+        found = outcome.end.base
         return measure_drive(train, *found.compose(), share)
 
     drive = measure_drive(train, np.zeros(len(EFFECT_TABLE)), (), share)
@@ -72,23 +72,23 @@ def find_single_effects(
             if drive >= 0.0
             else whole
         )
-    trace = search(begin_at_brake(campaign, vehicle, surface, share))
-    drive = max(drive, measure_drive_beside(trace))
+    outcome = search(begin_at_brake(campaign, vehicle, surface, share))
+    drive = max(drive, measure_drive_beside(outcome))
     if drive <= rules.joint.driven_acceleration:
         raise foreign
     return replace(
-        trace, verdict=replace(trace.verdict, reasons=(*trace.verdict.reasons, tell_driven(drive)))
+        outcome, verdict=replace(outcome.verdict, reasons=(*outcome.verdict.reasons, tell_driven(drive)))
     )
 
 
 def _prefer_from_brake(
-    whole: Trace,
+    whole: SearchOutcome,
     campaign: Campaign,
     vehicle: Vehicle,
     surface: SurfaceParameters,
-    search: Callable[[Campaign], Trace],
+    search: Callable[[Campaign], SearchOutcome],
     rules: JointRules,
-) -> Trace:
+) -> SearchOutcome:
     """Return the verdict from the brake on where whole runs, which lose no speed before it, are missed without it.
 
     A speed that is held looks like that of a car which nothing holds back, and hides all resistance from a model that

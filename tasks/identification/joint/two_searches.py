@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from tasks.campaign.campaign import Campaign
 from tasks.identification.decision.disputes import ForeignCarError
 from tasks.identification.decision.missed import compare_with_noise, tell_miss
-from tasks.identification.decision.verdict import Trace
+from tasks.identification.decision.verdict import SearchOutcome
 from tasks.identification.decision.words import join_phrases
 from tasks.identification.inference.driver import LIFT, SPEED, find_brake_onset
 from tasks.identification.inference.forward import RunModel
 from tasks.identification.joint.calibration import needs_joint_fit
 from tasks.identification.joint.numbers import JointNumber
 from tasks.identification.joint.second_look import find_effects_in_two_looks
-from tasks.identification.joint.verdict import JointTrace, judge_jointly
+from tasks.identification.joint.verdict import JointOutcome, judge_jointly
 from tasks.identification.rules import DecisionRules
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import Effect
@@ -31,7 +31,7 @@ def judge_by_two_searches(
     effects: tuple[Effect, ...],
     numbers: tuple[JointNumber, ...],
     rules: DecisionRules,
-) -> Trace | JointTrace:
+) -> SearchOutcome | JointOutcome:
     """Look for one effect at a time where the car is the model's but for its brake gain; else fit all numbers at once.
 
     Where the first misses the held-out stops and names nothing, or names something beside numbers of the session that
@@ -49,7 +49,7 @@ def judge_by_two_searches(
     """
     joint = rules.joint
 
-    def fit_all(why: str = "", *, names_numbers: bool = True) -> JointTrace:
+    def fit_all(why: str = "", *, names_numbers: bool = True) -> JointOutcome:
         return judge_jointly(
             campaign, vehicle, surface, numbers, rules, disagreement=why, names_numbers=names_numbers
         )

@@ -66,7 +66,7 @@ class _Prediction:
 
 
 @dataclass(frozen=True, kw_only=True)
-class JointTrace:
+class JointOutcome:
     """A verdict with what it stands on.
 
     Parameters
@@ -101,7 +101,7 @@ def judge_jointly(
     *,
     disagreement: str = "",
     names_numbers: bool = True,
-) -> JointTrace:
+) -> JointOutcome:
     """Calibrate a car on its training runs, take away what does not earn its place, and name what is left.
 
     Parameters
@@ -182,7 +182,7 @@ def judge_jointly(
         reasons=tuple(reasons),
         disagreement=disagreement,
     )  # fmt: skip
-    return JointTrace(
+    return JointOutcome(
         verdict=tell_miss(verdict, campaign, joint.foreign_misfit, left.follows),
         calibrated=tuple(calibrated) if effects or is_lowered(left.error["speed"]) else (),
         fitted=fitted,

@@ -22,7 +22,7 @@ from flows.measured.verdict_report import MISSED, find_next_steps, write_verdict
 from tasks.campaign.campaign import Campaign
 from tasks.campaign.planned_runs import RunPlan
 from tasks.identification.benchmark import make_synthetic_campaign
-from tasks.identification.joint.verdict import JointTrace, judge_jointly
+from tasks.identification.joint.verdict import JointOutcome, judge_jointly
 from tests.browsers import find_barriers, open_chromium
 
 VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
@@ -55,17 +55,17 @@ class Page(HTMLParser):
             self.words += f"{data} "
 
 
-def facts(trace: JointTrace, **more: Any) -> dict[str, Any]:
+def facts(outcome: JointOutcome, **more: Any) -> dict[str, Any]:
     told: dict[str, Any] = {
         "held_out_readings_before": 0,
         "vehicle_file": "out/car-grown.yaml",
         "not_carried_by_coupled_mode": [],
     }
-    return verdict_json(trace.verdict) | tell_search(trace) | told | more
+    return verdict_json(outcome.verdict) | tell_search(outcome) | told | more
 
 
 @pytest.fixture(scope="module")
-def judged() -> tuple[JointTrace, Campaign]:
+def judged() -> tuple[JointOutcome, Campaign]:
     """A campaign of three stops with a lag, whose runs, vehicle and name would like to be more than text."""
     made = make_synthetic_campaign(VEHICLE, SURFACE, {"lag": 0.1}, 7, design=STOPS)
     runs = tuple(replace(r, name=f"{HOSTILE} {k}", held_out=k == 2) for k, r in enumerate(made.runs))
@@ -75,13 +75,13 @@ def judged() -> tuple[JointTrace, Campaign]:
 
 
 @pytest.fixture(scope="module")
-def text(judged: tuple[JointTrace, Campaign]) -> str:
-    trace, campaign = judged
-    return write_verdict_page(trace, facts(trace), campaign)
+def text(judged: tuple[JointOutcome, Campaign]) -> str:
+    outcome, campaign = judged
+    return write_verdict_page(outcome, facts(outcome), campaign)
 
 
 def test_where_nothing_is_named_the_verdict_says_whether_the_model_misses_the_runs(
-    judged: tuple[JointTrace, Campaign],
+    judged: tuple[JointOutcome, Campaign],
 ) -> None:
     nothing = replace(judged[0].verdict, effects=(), rivals=())
     sentences = [
@@ -96,32 +96,32 @@ def test_where_nothing_is_named_the_verdict_says_whether_the_model_misses_the_ru
 
 
 def test_the_first_sentence_says_whether_stops_are_missed_beside_what_is_named(
-    judged: tuple[JointTrace, Campaign],
+    judged: tuple[JointOutcome, Campaign],
 ) -> None:
     """A gain 15 % off took the stops from 7 to 2.6 m, twelve times the noise, and read as if that were all."""
     rest = "The speed is still missed by more than its noise: more is lacking than that."
     for misses in (False, True):
-        trace = replace(judged[0], verdict=replace(judged[0].verdict, misses=misses))
-        assert tell_search(trace)["sentence"].endswith(rest) is misses
+        outcome = replace(judged[0], verdict=replace(judged[0].verdict, misses=misses))
+        assert tell_search(outcome)["sentence"].endswith(rest) is misses
 
 
 def test_the_page_says_the_verdict_its_numbers_rivals_and_what_to_do_next(
-    text: str, judged: tuple[JointTrace, Campaign]
+    text: str, judged: tuple[JointOutcome, Campaign]
 ) -> None:
-    trace, _ = judged
+    outcome, _ = judged
     words = " ".join(Page(text).words.split())
-    assert words.index(facts(trace)["sentence"]) < words.index("Verdict SET")
-    lag = facts(trace)["effects"][0]["parameters"]["lag"]
+    assert words.index(facts(outcome)["sentence"]) < words.index("Verdict SET")
+    lag = facts(outcome)["effects"][0]["parameters"]["lag"]
     assert f"lag {lag['value']:.3g} {lag['ci_low']:.3g} to {lag['ci_high']:.3g} s" in words
-    (gain,) = facts(trace)["calibrated"]
+    (gain,) = facts(outcome)["calibrated"]
     assert f"within what the vehicle file and these runs know of it: {gain['says']}" in words
     assert "brake lag and brake dead time" in words
     assert "The run that separates them: press the brake in steps" in words
     assert "musync generate demo --vehicle out/car-grown.yaml --no-frames --out datasets/car-grown" in words
-    distance = trace.verdict.manoeuvre_error["stopping_distance"]
+    distance = outcome.verdict.manoeuvre_error["stopping_distance"]
     told = f"stopping distance {distance.frozen:.3g} {distance.retuned:.3g} {distance.after:.3g} one run m"
     assert told in words
-    assert all(reason in words for reason in trace.verdict.reasons)
+    assert all(reason in words for reason in outcome.verdict.reasons)
 
 
 def test_names_of_a_campaign_are_text_and_nothing_comes_from_outside(text: str) -> None:
@@ -141,12 +141,12 @@ def test_the_policy_runs_the_scripts_of_the_page_by_hash_and_no_other(text: str)
     assert rules["default-src"] == "'none'" and "http" not in str(policy)
 
 
-def test_figures_are_of_residuals_and_have_a_text(text: str, judged: tuple[JointTrace, Campaign]) -> None:
-    trace, _ = judged
+def test_figures_are_of_residuals_and_have_a_text(text: str, judged: tuple[JointOutcome, Campaign]) -> None:
+    outcome, _ = judged
     page = Page(text)
     (run,) = json.loads(page.scripts[0])["runs"]
     speed = run["channels"][0]
-    left = trace.held_out[0].model.measured[:, 0] - trace.predicted[0][:, :, 0]
+    left = outcome.held_out[0].model.measured[:, 0] - outcome.predicted[0][:, :, 0]
     shown = np.array([speed[key] for key in ("frozen", "retuned", "after")])
     assert speed["name"] == "speed" and np.allclose(shown, left, rtol=1e-4, atol=1e-6)
     plots = [a for _, a in page.elements if a.get("class") == "plot"]
@@ -154,7 +154,7 @@ def test_figures_are_of_residuals_and_have_a_text(text: str, judged: tuple[Joint
 
 
 def test_the_curve_follows_what_was_measured_where_the_frozen_model_does_not(
-    judged: tuple[JointTrace, Campaign],
+    judged: tuple[JointOutcome, Campaign],
 ) -> None:
     curve = {
         name: np.array(values, float) for name, values in make_brake_curve(predict_runs(judged[0])[0]).items()
@@ -166,7 +166,7 @@ def test_the_curve_follows_what_was_measured_where_the_frozen_model_does_not(
 
 
 def test_numbers_that_stand_in_for_each_other_are_told_with_the_run_that_separates_them(
-    judged: tuple[JointTrace, Campaign],
+    judged: tuple[JointOutcome, Campaign],
 ) -> None:
     fitted = judged[0].fitted
     gain, lag = fitted.numbers
@@ -188,19 +188,19 @@ def test_numbers_that_stand_in_for_each_other_are_told_with_the_run_that_separat
     ],
 )
 def test_the_next_step_follows_from_the_verdict(
-    judged: tuple[JointTrace, Campaign], more: dict[str, Any], commands: list[str]
+    judged: tuple[JointOutcome, Campaign], more: dict[str, Any], commands: list[str]
 ) -> None:
-    trace, campaign = judged
-    steps = find_next_steps(facts(trace, **more), replace(campaign, vehicle="a car; rm -r x"))
+    outcome, campaign = judged
+    steps = find_next_steps(facts(outcome, **more), replace(campaign, vehicle="a car; rm -r x"))
     assert [command.split()[1] for _, command in steps] == commands
     assert all("; rm" not in command or "'a car; rm -r x'" in command for _, command in steps)
 
 
 def test_runs_that_do_not_grip_as_the_mapping_says_ask_for_more_stops_at_the_limit(
-    judged: tuple[JointTrace, Campaign],
+    judged: tuple[JointOutcome, Campaign],
 ) -> None:
-    trace, campaign = judged
-    nothing = facts(trace, verdict="NOTHING", rivals=[], vehicle_file=None)
+    outcome, campaign = judged
+    nothing = facts(outcome, verdict="NOTHING", rivals=[], vehicle_file=None)
     first = {
         pull: find_next_steps(nothing | {"friction_pulls_sigma": {"run-1": pull}}, campaign)[0][0]
         for pull in (-2.4, -2.6)

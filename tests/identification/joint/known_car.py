@@ -11,7 +11,7 @@ from catalogs.joint_numbers import load_joint_numbers
 from tasks.campaign.campaign import CHANNELS, Campaign, Run
 from tasks.identification.joint.fit import JointFit
 from tasks.identification.joint.numbers import JointNumber
-from tasks.identification.joint.verdict import JointTrace, judge_jointly
+from tasks.identification.joint.verdict import JointOutcome, judge_jointly
 from tasks.identification.rules import DecisionRules
 from tasks.vehicle.effects.table import build_parameter_vector
 from tasks.vehicle.parameters import Vehicle
@@ -65,7 +65,7 @@ def judge_car(
     vehicle: Vehicle = VEHICLE,
     rules: DecisionRules = RULES,
     numbers: Sequence[JointNumber] = NUMBERS,
-) -> JointTrace:
+) -> JointOutcome:
     return judge_jointly(campaign, vehicle, SURFACE, numbers, rules)
 
 
@@ -85,12 +85,12 @@ def fit_of(residuals: Sequence[np.ndarray], grids: Sequence[np.ndarray] | None =
 
 
 @cache
-def slow_brakes() -> JointTrace:
+def slow_brakes() -> JointOutcome:
     return judge_car(campaign_of({"pressure_gain": 0.3, "lag": 0.09}))
 
 
-def named_intervals(trace: JointTrace) -> dict[str, tuple[float, float, float]]:
+def named_intervals(outcome: JointOutcome) -> dict[str, tuple[float, float, float]]:
     return {
         effect.name: (effect.parameters[0].ci_low, effect.parameters[0].value, effect.parameters[0].ci_high)
-        for effect in (*trace.verdict.effects, *trace.calibrated)
+        for effect in (*outcome.verdict.effects, *outcome.calibrated)
     }

@@ -13,12 +13,14 @@ from tests.identification.joint.known_car import FEW, RULES, campaign_of, judge_
 
 def test_no_claim_that_nothing_is_missing_stands_beside_a_stop_that_is_missed():
     calm, strong = campaign_of({}), campaign_of({"pressure_gain": 0.8})
-    trace = judge_car(replace(calm, runs=(*calm.runs[:-1], strong.runs[-1])), numbers=FEW)
-    why = trace.verdict.disagreement
-    assert trace.verdict.verdict == "NOTHING" and trace.verdict.misses and trace.verdict.reasons[0] == why
-    missed = trace.verdict.error["speed"].after
+    outcome = judge_car(replace(calm, runs=(*calm.runs[:-1], strong.runs[-1])), numbers=FEW)
+    why = outcome.verdict.disagreement
+    assert (
+        outcome.verdict.verdict == "NOTHING" and outcome.verdict.misses and outcome.verdict.reasons[0] == why
+    )
+    missed = outcome.verdict.error["speed"].after
     assert why.startswith(f"the speed of the held-out runs is missed by {missed:.3g} m/s, ")
-    assert compare_with_noise(calm, trace.verdict.error) == pytest.approx(missed / 0.03, rel=0.2)
+    assert compare_with_noise(calm, outcome.verdict.error) == pytest.approx(missed / 0.03, rel=0.2)
 
 
 def test_noise_is_no_larger_than_what_a_fit_leaves_on_its_training_runs(monkeypatch):
@@ -35,12 +37,12 @@ def test_noise_is_no_larger_than_what_a_fit_leaves_on_its_training_runs(monkeypa
 def test_a_stop_that_is_missed_beside_a_name_is_told():
     assert not any("is missed by" in reason for reason in slow_brakes().verdict.reasons)
     late, windy = campaign_of({"lag": 0.2}), campaign_of({"lag": 0.2, "drag_area": 3.0})
-    trace = judge_car(replace(late, runs=(*late.runs[:-1], windy.runs[-1])), numbers=FEW)
-    assert trace.verdict.effects and trace.verdict.disagreement == ""
+    outcome = judge_car(replace(late, runs=(*late.runs[:-1], windy.runs[-1])), numbers=FEW)
+    assert outcome.verdict.effects and outcome.verdict.disagreement == ""
     said = "what is named is not all that the model lacks"
-    assert trace.verdict.reasons[-1].endswith(said)
+    assert outcome.verdict.reasons[-1].endswith(said)
     # why single effects could not be told does not say that these stops are missed
-    foreign = replace(trace.verdict, reasons=("the runs disagree",), disagreement="the runs disagree")
+    foreign = replace(outcome.verdict, reasons=("the runs disagree",), disagreement="the runs disagree")
     assert tell_miss(foreign, late, RULES.joint.foreign_misfit).reasons[-1].endswith(said)
     nothing = replace(foreign, effects=())
     assert tell_miss(nothing, late, RULES.joint.foreign_misfit) is nothing

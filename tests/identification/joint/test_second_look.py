@@ -14,7 +14,7 @@ from tasks.campaign.planned_runs import plan_experiments
 from tasks.identification.decision import experiment
 from tasks.identification.decision.disputes import ForeignCarError
 from tasks.identification.decision.screening import compute_inflation
-from tasks.identification.decision.verdict import Trace, find_missing_effects
+from tasks.identification.decision.verdict import SearchOutcome, find_missing_effects
 from tasks.identification.inference.fit import fit_hypotheses
 from tasks.identification.inference.hypothesis import make_library_hypothesis
 from tasks.identification.inference.linearisation import observe_channels
@@ -55,21 +55,21 @@ def campaign() -> Campaign:
 
 
 @pytest.fixture(scope="module")
-def lag_found(campaign) -> Trace:
+def lag_found(campaign) -> SearchOutcome:
     """The lag, found by speed and accelerometer alone."""
     bare = replace(campaign, channels=ALONG_ROAD)
     return find_missing_effects(bare, VEHICLE, SURFACE, LIBRARY, RULES)
 
 
 @pytest.fixture(scope="module")
-def no_name(lag_found) -> Trace:
+def no_name(lag_found) -> SearchOutcome:
     """A verdict that names no_name."""
     verdict = replace(lag_found.verdict, verdict="NOTHING", effects=())
     return replace(lag_found, verdict=verdict, end=lag_found.start, compared=())
 
 
 def answer_searches(
-    monkeypatch, *answers: Trace | ForeignCarError, disagreement: float = 3.0
+    monkeypatch, *answers: SearchOutcome | ForeignCarError, disagreement: float = 3.0
 ) -> list[tuple[str, ...]]:
     """Answers in place of searches, one after the other, and the channels that each was asked about."""
     asked, left = [], list(answers)
@@ -86,7 +86,7 @@ def answer_searches(
     return asked
 
 
-def look_twice(campaign: Campaign) -> Trace:
+def look_twice(campaign: Campaign) -> SearchOutcome:
     return find_effects_in_two_looks(campaign, VEHICLE, SURFACE, LIBRARY, NUMBERS, RULES)
 
 

@@ -14,7 +14,7 @@ from tasks.campaign.campaign import CHANNELS, Campaign
 from tasks.campaign.planned_runs import plan_experiments
 from tasks.identification.decision import experiment
 from tasks.identification.decision.disputes import ForeignCarError
-from tasks.identification.decision.verdict import Trace
+from tasks.identification.decision.verdict import SearchOutcome
 from tasks.identification.inference.driver import begin_at_brake, find_brake_onset, measure_drive
 from tasks.identification.inference.forward import compute_instrument_readings, prepare_run, simulate_run
 from tasks.identification.joint import single_effects
@@ -106,12 +106,12 @@ def test_runs_begin_as_the_foot_changes_to_the_brake_and_coasting_runs_stay_whol
 def test_an_effect_of_the_brake_is_found_although_the_speed_was_held_and_the_verdict_says_from_where():
     library = tuple(e for e in load_effects() if e.name in ("brake_lag", "aerodynamic_drag", "pad_drag"))
     campaign = make_campaign(LAG, held=True)
-    trace = find_single_effects(campaign, KNOWN, SURFACE, library, load_joint_numbers(), RULES)
-    (found,) = trace.verdict.effects
+    outcome = find_single_effects(campaign, KNOWN, SURFACE, library, load_joint_numbers(), RULES)
+    (found,) = outcome.verdict.effects
     assert found.name == "brake_lag"
     assert found.parameters[0].ci_low < LAG["lag"] < found.parameters[0].ci_high
-    assert "before the brake the car was driven with 0.3" in trace.verdict.reasons[-1]
-    assert all(np.argmax(run.model.run.pressure > 0.0) < 10 for run in trace.start.evidence.train)
+    assert "before the brake the car was driven with 0.3" in outcome.verdict.reasons[-1]
+    assert all(np.argmax(run.model.run.pressure > 0.0) < 10 for run in outcome.start.evidence.train)
 
 
 def test_a_held_speed_hides_no_resistance_from_a_file_that_has_none():
@@ -119,12 +119,12 @@ def test_a_held_speed_hides_no_resistance_from_a_file_that_has_none():
     library = tuple(e for e in load_effects() if e.name in ("brake_lag", "aerodynamic_drag"))
     campaign = make_campaign(LAG, held=True, seconds=4.0)
     assert abs(measure(campaign, VEHICLE)) < 0.02
-    trace = find_single_effects(campaign, VEHICLE, SURFACE, library, load_joint_numbers(), RULES)
-    found = {effect.name: effect.parameters[0] for effect in trace.verdict.effects}
+    outcome = find_single_effects(campaign, VEHICLE, SURFACE, library, load_joint_numbers(), RULES)
+    found = {effect.name: effect.parameters[0] for effect in outcome.verdict.effects}
     assert found.keys() == {"brake_lag", "aerodynamic_drag"}
     assert found["brake_lag"].ci_low < LAG["lag"] < found["brake_lag"].ci_high
     assert found["aerodynamic_drag"].value == pytest.approx(0.95, abs=0.1), "air and tyres together"
-    assert "taken for coasting before the brake" in trace.verdict.reasons[-1]
+    assert "taken for coasting before the brake" in outcome.verdict.reasons[-1]
 
 
 @pytest.mark.parametrize(
@@ -142,9 +142,9 @@ def test_runs_are_searched_from_the_brake_on_where_their_driver_held_the_speed(
     monkeypatch, drives, whole_is_foreign, searched
 ):
     tried = answer_in_turn(monkeypatch, drives, whole_is_foreign)
-    trace = find_single_effects(make_campaign({}, held=False), KNOWN, SURFACE, (), (), RULES)
+    outcome = find_single_effects(make_campaign({}, held=False), KNOWN, SURFACE, (), (), RULES)
     assert tried == searched
-    assert bool(trace.verdict.reasons) == (searched[-1] == "begun")
+    assert bool(outcome.verdict.reasons) == (searched[-1] == "begun")
 
 
 def test_a_foreign_car_that_coasts_is_left_to_the_joint_fit(monkeypatch):
@@ -168,9 +168,9 @@ def test_missed_runs_that_lose_no_speed_before_the_brake_are_judged_from_it_wher
 ):
     """The noise of the speed is 0.03 m/s, and a run is missed from five times that on."""
     tried = answer_in_turn(monkeypatch, (drive, drive), False, after={"whole": whole, "begun": begun})
-    trace = find_single_effects(make_campaign({}, held=False), KNOWN, SURFACE, (), (), RULES)
-    assert tried == searched and trace.verdict.after == (begun if is_begun else whole)
-    assert any("from the brake on one of 0.1 m/s" in reason for reason in trace.verdict.reasons) is is_begun
+    outcome = find_single_effects(make_campaign({}, held=False), KNOWN, SURFACE, (), (), RULES)
+    assert tried == searched and outcome.verdict.after == (begun if is_begun else whole)
+    assert any("from the brake on one of 0.1 m/s" in reason for reason in outcome.verdict.reasons) is is_begun
 
 
 def answer_in_turn(
@@ -187,7 +187,7 @@ def answer_in_turn(
             raise ForeignCarError("the runs disagree")
         base = SimpleNamespace(parts=(), compose=lambda: (np.zeros(1), ()))
         state = SimpleNamespace(base=base, evidence=None)
-        return Trace(verdict=told, start=state, end=state, compared=())
+        return SearchOutcome(verdict=told, start=state, end=state, compared=())
 
     monkeypatch.setattr(single_effects, "calibrate_gain", lambda *_: {})
     monkeypatch.setattr(single_effects, "find_missing_effects", answer)

@@ -32,13 +32,13 @@ def driven_campaign(earlier: float, *, logged: bool) -> Campaign:
 def test_a_lag_is_no_surer_than_when_the_driver_lifts_where_no_throttle_was_logged(earlier: float):
     """A racing car's lag of 0.12 s had the interval [0.085, 0.10]."""
     numbers = [n for n in load_joint_numbers() if n.name in {"pressure_gain", "lag"}]
-    trace = judge_car(driven_campaign(earlier, logged=False), numbers=numbers)
-    low, value, high = named_intervals(trace)["brake_lag"]
-    assert low < 0.15 < high and 0.01 < abs(value - 0.15) < trace.fitted.delay_doubt
-    shares = [1.0 / measure_peak_deceleration(stop.model) for stop in trace.train]
-    assert trace.fitted.delay_doubt == pytest.approx(0.1 * float(np.median(shares)), rel=0.2)
-    errors = dict(zip(trace.fitted.by_name, trace.errors, strict=True))
-    assert errors["lag"] > trace.fitted.delay_doubt
+    outcome = judge_car(driven_campaign(earlier, logged=False), numbers=numbers)
+    low, value, high = named_intervals(outcome)["brake_lag"]
+    assert low < 0.15 < high and 0.01 < abs(value - 0.15) < outcome.fitted.delay_doubt
+    shares = [1.0 / measure_peak_deceleration(stop.model) for stop in outcome.train]
+    assert outcome.fitted.delay_doubt == pytest.approx(0.1 * float(np.median(shares)), rel=0.2)
+    errors = dict(zip(outcome.fitted.by_name, outcome.errors, strict=True))
+    assert errors["lag"] > outcome.fitted.delay_doubt
     sure = judge_car(driven_campaign(earlier, logged=True), numbers=numbers)
     assert named_intervals(sure)["brake_lag"][1] == pytest.approx(0.15, abs=0.005)
     assert sure.fitted.delay_doubt == 0.0
@@ -64,10 +64,10 @@ BRAKES_AND_ROAD = tuple(
 
 def test_what_all_felt_slopes_have_in_common_is_the_roads_and_no_fault_of_the_brakes():
     """A car that lacked nothing had a dead band of 0.11 MPa, for its runs were on slopes 1.5 % lower than taken."""
-    trace = judge_car(hilly_campaign(-0.012), numbers=BRAKES_AND_ROAD)
-    assert trace.verdict.verdict == "NOTHING"
-    assert trace.fitted.by_name["slope"] == pytest.approx(-0.012, abs=0.002)
-    assert trace.fitted.by_name["pressure_gain"] == pytest.approx(0.0, abs=0.02)
+    outcome = judge_car(hilly_campaign(-0.012), numbers=BRAKES_AND_ROAD)
+    assert outcome.verdict.verdict == "NOTHING"
+    assert outcome.fitted.by_name["slope"] == pytest.approx(-0.012, abs=0.002)
+    assert outcome.fitted.by_name["pressure_gain"] == pytest.approx(0.0, abs=0.02)
     # re-tuning moves what is no name
     steeper = judge_car(hilly_campaign(0.012), numbers=BRAKES_AND_ROAD).verdict.error["speed"]
     assert steeper.retuned == pytest.approx(steeper.after, rel=1e-3)
@@ -77,9 +77,9 @@ def test_what_all_felt_slopes_have_in_common_is_the_roads_and_no_fault_of_the_br
 
 def test_a_common_slope_that_would_be_steeper_than_two_tolerances_is_none():
     """A force that holds a racing car back looks like a hill of 8 %: it is not one."""
-    trace = judge_car(hilly_campaign(-0.03), numbers=BRAKES_AND_ROAD)
-    assert "slope" not in trace.fitted.by_name
-    assert any("the road falls or climbs by -0.02" in reason for reason in trace.verdict.reasons)
+    outcome = judge_car(hilly_campaign(-0.03), numbers=BRAKES_AND_ROAD)
+    assert "slope" not in outcome.fitted.by_name
+    assert any("the road falls or climbs by -0.02" in reason for reason in outcome.verdict.reasons)
 
 
 def test_a_re_tuned_slope_that_makes_up_for_a_name_is_given_up_at_its_bound_too(monkeypatch):
@@ -88,6 +88,6 @@ def test_a_re_tuned_slope_that_makes_up_for_a_name_is_given_up_at_its_bound_too(
     monkeypatch.setattr(
         verdict, "predict_held_out", lambda runs, fit, grown: retuned.append(fit) or predict(runs, fit, grown)
     )
-    trace = judge_car(hilly_campaign(-0.008, tolerance=0.005, lag=0.3), numbers=BRAKES_AND_ROAD)
-    assert {"slope", "lag"} <= trace.fitted.by_name.keys()
+    outcome = judge_car(hilly_campaign(-0.008, tolerance=0.005, lag=0.3), numbers=BRAKES_AND_ROAD)
+    assert {"slope", "lag"} <= outcome.fitted.by_name.keys()
     assert "slope" not in retuned[0].by_name

@@ -67,24 +67,24 @@ def test_a_mass_and_frictions_are_wrong_by_the_tolerances_of_their_campaign():
 
 
 def test_a_gain_that_predicts_unseen_stops_is_told_and_grown_although_nothing_is_named():
-    trace = judge_car(campaign_of({"pressure_gain": 0.3}))
-    assert trace.verdict.verdict == "NOTHING" and trace.verdict.disagreement == ""
-    assert [effect.name for effect in trace.calibrated] == ["retuned_pressure_gain"]
+    outcome = judge_car(campaign_of({"pressure_gain": 0.3}))
+    assert outcome.verdict.verdict == "NOTHING" and outcome.verdict.disagreement == ""
+    assert [effect.name for effect in outcome.calibrated] == ["retuned_pressure_gain"]
 
 
 def test_a_car_that_is_as_its_file_says_lacks_nothing():
-    trace = judge_car(campaign_of({}))
-    assert trace.verdict.verdict == "NOTHING" and not named_intervals(trace)
-    assert trace.fitted.by_name["pressure_gain"] == pytest.approx(0.0, abs=0.01)
+    outcome = judge_car(campaign_of({}))
+    assert outcome.verdict.verdict == "NOTHING" and not named_intervals(outcome)
+    assert outcome.fitted.by_name["pressure_gain"] == pytest.approx(0.0, abs=0.01)
 
 
 def test_how_much_a_name_must_explain_is_asked_by_the_noise_of_the_speed_or_what_a_fit_follows(monkeypatch):
     asked, keep = [], verdict.makes_difference
     monkeypatch.setattr(verdict, "makes_difference", lambda *given: asked.append(given) or keep(*given))
     campaign = campaign_of({"pressure_gain": 0.3, "lag": 0.09})
-    trace = judge_car(campaign, numbers=FEW)
+    outcome = judge_car(campaign, numbers=FEW)
     ((_, error, _, _, over_noise),) = asked
-    follows = float(measure_misfit(trace.fitted, trace.train)[CHANNELS.index("speed")])
+    follows = float(measure_misfit(outcome.fitted, outcome.train)[CHANNELS.index("speed")])
     assert over_noise == pytest.approx(compare_with_noise(campaign, error, follows)) and over_noise > 0.5
 
 
@@ -94,9 +94,9 @@ def test_a_number_of_the_file_is_wrong_only_beyond_as_many_tolerances_as_the_rul
     assert [e.name for e in near.verdict.effects] == ["brake_lag"]
     assert [e.name for e in near.calibrated] == ["retuned_pressure_gain"]
     strict = replace(RULES.joint, wrong_number_tolerances=1.0, same_fit_errors=1e-12)
-    trace = judge_car(campaign_of({"pressure_gain": 0.3, "lag": 0.09}), rules=replace(RULES, joint=strict))
-    assert {e.name for e in trace.verdict.effects} == {"brake_lag", "retuned_pressure_gain"}
-    assert trace.agreeing[0] <= 1 < slow_brakes().agreeing[0]
+    outcome = judge_car(campaign_of({"pressure_gain": 0.3, "lag": 0.09}), rules=replace(RULES, joint=strict))
+    assert {e.name for e in outcome.verdict.effects} == {"brake_lag", "retuned_pressure_gain"}
+    assert outcome.agreeing[0] <= 1 < slow_brakes().agreeing[0]
 
 
 @pytest.mark.parametrize(
@@ -125,25 +125,25 @@ def test_nothing_is_named_that_predicts_unseen_stops_worse_than_the_file(monkeyp
     campaign = campaign_of({"lag": 0.09})
     assert judge_car(campaign, numbers=FEW).verdict.effects
     monkeypatch.setattr(verdict, "find_worse_channels", lambda _error, _limit, speed_decides: ["speed"])
-    trace = judge_car(campaign, numbers=FEW)
-    assert trace.verdict.error["speed"].after == trace.verdict.error["speed"].retuned
-    assert trace.verdict.verdict == "NOTHING" and not trace.calibrated
-    assert any("file predicts speed of the held-out runs better" in r for r in trace.verdict.reasons)
+    outcome = judge_car(campaign, numbers=FEW)
+    assert outcome.verdict.error["speed"].after == outcome.verdict.error["speed"].retuned
+    assert outcome.verdict.verdict == "NOTHING" and not outcome.calibrated
+    assert any("file predicts speed of the held-out runs better" in r for r in outcome.verdict.reasons)
 
 
 def test_what_makes_no_difference_beside_retuning_is_not_named(monkeypatch):
     monkeypatch.setattr(verdict, "makes_difference", lambda *_: False)
-    trace = judge_car(campaign_of({"lag": 0.09}), numbers=FEW)
-    assert trace.verdict.verdict == "NOTHING"
-    assert trace.verdict.error["speed"].after == trace.verdict.error["speed"].retuned
+    outcome = judge_car(campaign_of({"lag": 0.09}), numbers=FEW)
+    assert outcome.verdict.verdict == "NOTHING"
+    assert outcome.verdict.error["speed"].after == outcome.verdict.error["speed"].retuned
 
 
 def test_a_lag_that_would_have_to_be_longer_than_any_is_not_named():
     short = [replace(n, upper=0.05) if n.name == "lag" else n for n in load_joint_numbers()]
     numbers = [n for n in short if n.name not in ("dead_time", "speed_delay")]
-    trace = judge_jointly(campaign_of({"lag": 0.09}), VEHICLE, SURFACE, numbers, RULES)
-    assert "lag" not in trace.fitted.by_name
-    assert any("lag of 0.05 s, as far as it may go: not named" in r for r in trace.verdict.reasons)
+    outcome = judge_jointly(campaign_of({"lag": 0.09}), VEHICLE, SURFACE, numbers, RULES)
+    assert "lag" not in outcome.fitted.by_name
+    assert any("lag of 0.05 s, as far as it may go: not named" in r for r in outcome.verdict.reasons)
 
 
 def test_tyres_at_their_limit_are_a_rival_of_the_brakes_curve():
@@ -184,9 +184,9 @@ def test_a_number_within_its_tolerance_that_other_physics_explains_as_well_is_na
         (of, rival.name) for of, rival in slow_brakes().verdict.rivals
     ]
     monkeypatch.setattr(verdict, "collect_tolerances", lambda *_: {"lag": 1.0, "pressure_gain": 0.2})
-    trace = judge_car(campaign_of({"lag": 0.09}))
-    assert trace.verdict.verdict == "SET" and [e.name for e in trace.verdict.effects] == ["brake_lag"]
-    assert "brake_lag" not in [e.name for e in trace.calibrated]
+    outcome = judge_car(campaign_of({"lag": 0.09}))
+    assert outcome.verdict.verdict == "SET" and [e.name for e in outcome.verdict.effects] == ["brake_lag"]
+    assert "brake_lag" not in [e.name for e in outcome.calibrated]
 
 
 def test_runs_that_never_coast_say_which_resistance_stands_for_all():
@@ -212,11 +212,11 @@ def test_an_engine_that_was_measured_is_an_input_and_no_effect():
 
 
 def test_speed_and_pressure_alone_name_a_delay_as_a_set():
-    trace = judge_car(campaign_of({"pressure_gain": 0.3, "lag": 0.12}, channels=("speed",)))
-    assert trace.verdict.verdict in ("FOUND", "SET")
+    outcome = judge_car(campaign_of({"pressure_gain": 0.3, "lag": 0.12}, channels=("speed",)))
+    assert outcome.verdict.verdict in ("FOUND", "SET")
     delays = {"brake_lag", "brake_dead_time"}
-    assert delays & (named_intervals(trace).keys() | {rival.name for _, rival in trace.verdict.rivals})
-    assert trace.verdict.error.keys() == {"speed"}
+    assert delays & (named_intervals(outcome).keys() | {rival.name for _, rival in outcome.verdict.rivals})
+    assert outcome.verdict.error.keys() == {"speed"}
 
 
 def test_a_joint_fit_is_for_few_runs():
@@ -255,6 +255,6 @@ def test_what_the_training_runs_had_in_common_is_not_named_where_the_held_out_ru
 
 
 def test_every_start_is_tried_though_no_friction_is_free():
-    trace = slow_brakes()
-    assert "friction" not in trace.fitted.by_name
-    assert trace.agreeing == (4, 4)  # the fit itself, and three gains
+    outcome = slow_brakes()
+    assert "friction" not in outcome.fitted.by_name
+    assert outcome.agreeing == (4, 4)  # the fit itself, and three gains

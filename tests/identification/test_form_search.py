@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from catalogs.decision_rules import load_decision_rules
-from tasks.identification.decision import discovery
+from tasks.identification.decision import discovery, form_search
 from tasks.identification.decision.attribution import Candidate
 from tasks.identification.decision.search import Round, SearchState
 from tasks.identification.decision.verdict import _choose_verdict_name
@@ -37,10 +37,10 @@ def test_a_form_beside_an_effect_that_makes_good_nearly_all_alone_is_not_named(
     gain: float, kept: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     form = make_candidate("suspension_force ~ a tanh(4x)", "form", gain)
-    monkeypatch.setattr(discovery, "_find_credible_form", lambda *_: (RUNS, form))
-    monkeypatch.setattr(discovery, "find_best_form", lambda *_, **__: None)
+    monkeypatch.setattr(form_search, "_find_credible_form", lambda *_: (RUNS, form))
+    monkeypatch.setattr(form_search, "find_best_form", lambda *_, **__: None)
     reasons: list[str] = []
-    found, _ = discovery.search_forms(
+    found, _ = form_search.search_forms(
         make_state(make_candidate("anti_dive", "effect", 900.0)), make_state(form), reasons
     )
     assert (len(found.rounds) == 2) is kept
@@ -55,8 +55,8 @@ def test_an_effect_of_a_forms_port_and_variable_that_was_tried_in_vain_is_held_a
     tried = make_candidate("damper_asymmetry", "effect", 190.0, 12.0)
     tried.hypothesis.variable = variable  # type: ignore[misc]
     start = replace(make_state(form), rounds=(), tried=(tried,))
-    monkeypatch.setattr(discovery, "_find_credible_form", lambda *_: (RUNS, form))
-    found, _ = discovery.search_forms(start, start, [])
+    monkeypatch.setattr(form_search, "_find_credible_form", lambda *_: (RUNS, form))
+    found, _ = form_search.search_forms(start, start, [])
     assert found.rounds[-1].accepted is form
     assert (found.rounds[-1].tried == (tried,)) is kept
 
@@ -95,9 +95,9 @@ def test_a_weak_linear_hint_leads_to_forms(
     needed = RULES.hopeful_share * (RULES.accept_score + np.log(1000.0))
     runs = SimpleNamespace(rules=RULES, samples=1000)
     form = make_candidate("friction ~ a exp(-(4x - 1)^2)", "form", 150.0)
-    monkeypatch.setattr(discovery, "compute_inflation", lambda *_: 1.0)
-    monkeypatch.setattr(discovery, "fit_residual_splines", lambda *_: [SimpleNamespace(gain=share * needed)])
-    monkeypatch.setattr(discovery, "make_form_hypotheses", lambda *_: [form.hypothesis])
-    monkeypatch.setattr(discovery, "judge_hypothesis", lambda *_: form)
-    monkeypatch.setattr(discovery, "is_session_number", lambda _: False)
-    assert discovery.find_best_form(runs, None, gated=False) is (form if followed else None)
+    monkeypatch.setattr(form_search, "compute_inflation", lambda *_: 1.0)
+    monkeypatch.setattr(form_search, "fit_residual_splines", lambda *_: [SimpleNamespace(gain=share * needed)])
+    monkeypatch.setattr(form_search, "make_form_hypotheses", lambda *_: [form.hypothesis])
+    monkeypatch.setattr(form_search, "judge_hypothesis", lambda *_: form)
+    monkeypatch.setattr(form_search, "is_session_number", lambda _: False)
+    assert form_search.find_best_form(runs, None, gated=False) is (form if followed else None)
