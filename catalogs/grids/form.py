@@ -1,5 +1,6 @@
 """The form of a grid file, and limits on the size of one grid."""
 
+from math import ceil
 from typing import Annotated, Literal
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
@@ -101,9 +102,11 @@ class GridFile(Blocks):
 
     @property
     def telemetry_s(self) -> float:
-        """Length of the telemetry of every clip [s]."""
-        shown = (self.frames - 1) / self.frame_rate_hz
-        return shown if self.duration_s is None else self.duration_s
+        """Length of the telemetry of every clip, whole milliseconds: it reaches the last frame if none is given [s]."""
+        if self.duration_s is not None:
+            return self.duration_s
+        shown_ms = 1000.0 * (self.frames - 1) / self.frame_rate_hz
+        return ceil(shown_ms - 1e-6) / 1000.0
 
     @property
     def keeps_stops_steady(self) -> bool:

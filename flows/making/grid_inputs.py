@@ -173,7 +173,7 @@ def _find_camera_problems(settings: GridFile, tick_rate_hz: int) -> list[str]:
         camera = load_camera(settings.camera)
     except InputError:
         return []
-    ticks = int(settings.telemetry_s * tick_rate_hz) + 1
+    ticks = round(settings.telemetry_s * tick_rate_hz) + 1
     problems = find_memory_problems(settings, camera, ticks)
     if settings.composition == "linear" or (camera.plain and camera.sensor == Sensor()):
         return problems

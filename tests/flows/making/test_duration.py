@@ -51,6 +51,19 @@ def test_every_frame_shows_its_tick_and_the_telemetry_goes_on_to_the_stop(datase
     assert audit_physics(str(dataset))["clips"][0]["passed"]
 
 
+@pytest.mark.parametrize("rate", [60, 30, 24, 29.97, 16])
+def test_frames_of_any_rate_have_telemetry_to_the_last_one(rate, tmp_path):
+    """Rates whose frame time is no whole number of milliseconds were refused when the clips were made."""
+    grid = GRID.replace("frame_rate_hz: 5\nduration_s: 3.5", f"frame_rate_hz: {rate}")
+    generate_dataset(write_toy_grid(tmp_path, grid), str(tmp_path / "made"), runner="threads", workers=1)
+    for fact in clip_facts(tmp_path / "made"):
+        ticks = clip_columns(tmp_path / "made", "ticks", fact)["t_ns"]
+        shown = clip_columns(tmp_path / "made", "frames", fact)
+        np.testing.assert_allclose(shown["t_ns"], np.arange(5) / rate * 1e9, atol=0.5e6)
+        assert shown["tick"][-1] <= len(ticks) - 1 <= shown["tick"][-1] + 1
+    assert all(row["passed"] for row in audit_physics(str(tmp_path / "made"))["clips"])
+
+
 def test_the_papers_bump_lifts_wheels_and_every_answer_says_so(dataset):
     stop, bump = clip_facts(dataset)
     assert (stop["wheel_lift_time_f"], stop["wheel_lift_time_r"]) == (0, 0)
