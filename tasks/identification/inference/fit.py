@@ -82,6 +82,16 @@ class Fit:
         return bool(np.any(touching & (first.astype(bool) | (self.values != 0.0))))
 
 
+@dataclass(frozen=True, kw_only=True)
+class _State:
+    """Where a fit stands: parameters, session, the runs linearised there, and their misfit with the session's prior."""
+
+    values: NDArray[np.float64]
+    session: NDArray[np.float64]
+    points: tuple[LinearisedRun, ...]
+    misfit: float
+
+
 def fit_hypotheses(
     evidence: tuple[RunEvidence, ...],
     parts: tuple[Hypothesis, ...],
@@ -118,57 +128,33 @@ def fit_hypotheses(
         if offsets is None
         else linearise_at(evidence, parts, x, s, offsets)
     )
-    objective = _compute_total_misfit(points, prior, s)
+    here = _State(values=x, session=s, points=points, misfit=_compute_total_misfit(points, prior, s))
     slopes: list[Slopes] = []
     normal = np.eye(k + len(s))
     blind, fell, foreseen = False, np.inf, np.inf
     for _ in range(iterations):
-        if (
-            not slopes
-            or (k and np.isfinite(fell) and abs(fell - foreseen) > MISSED * foreseen + 1.0)
-            or blind
-        ):
-            slopes = _differentiate_runs(
-                evidence, parts, x, s, np.where(x + 0.3 * steps > upper, -0.3, 0.3) * steps
-            )
+        unforeseen = k and np.isfinite(fell) and abs(fell - foreseen) > MISSED * foreseen + 1.0
+        if not slopes or unforeseen or blind:
+            x = here.values
+            ways = np.where(x + 0.3 * steps > upper, -0.3, 0.3) * steps
+            slopes = _differentiate_runs(evidence, parts, x, here.session, ways)
             normal = np.diag(np.concatenate((np.zeros(k), prior)))
             for columns, q in slopes:
                 normal += columns.T @ columns - q.T @ q
             # a threshold has no derivative while its effect is 0: take derivatives again after the effect has moved
             blind = bool(np.any(np.diag(normal)[:k] == 0.0))
-        right = np.concatenate((np.zeros(k), -prior * s))
-        for run, point, (columns, q) in zip(evidence, points, slopes, strict=True):
+        right = np.concatenate((np.zeros(k), -prior * here.session))
+        for run, point, (columns, q) in zip(evidence, here.points, slopes, strict=True):
             # the offsets' linear part N d of the residual: columns' N = q' factor'
             right += columns.T @ point.residual + q.T @ (run.factor.T @ point.offsets - point.projected)
-        move = _compute_gauss_newton_step(normal, right, x, lower, upper)
+        move = _compute_gauss_newton_step(normal, right, here.values, lower, upper)
         foreseen = float(move @ right)
         if foreseen < 0.1 and abs(fell) < 3.0:
             break
-        before = objective
-        # parameters and each run's own offsets move together; if that does not help, one after the other
-        ahead = tuple(
-            run.estimate_offsets(point.projected - q @ move)
-            for run, point, (_, q) in zip(evidence, points, slopes, strict=True)
-        )
-        better = False
-        for share, together in TRIALS:
-            if share * (2.0 - share) * foreseen < SETTLED and share < 1.0:
-                continue
-            x_try, s_try = np.clip(x + share * move[:k], lower, upper), s + share * move[k:]
-            own = tuple(
-                point.offsets + share * together * (d - point.offsets)
-                for point, d in zip(points, ahead, strict=True)
-            )
-            trial = linearise_at(evidence, parts, x_try, s_try, own)
-            better = _compute_total_misfit(trial, prior, s_try) < objective
-            if better or foreseen < 0.1:
-                break
-        if not better:
+        there = _step_along(evidence, parts, here, move, slopes, foreseen, (lower, upper), prior)
+        if there is None:
             break
-        x, s = x_try, s_try
-        points = trial if together else move_linearisation_points(evidence, parts, x, s, trial)
-        objective = _compute_total_misfit(points, prior, s)
-        fell = before - objective
+        fell, here = here.misfit - there.misfit, there
         if abs(fell) < SETTLED and foreseen < SETTLED:
             break
     # scaled first: in their own units the information matrix is too ill-conditioned for double precision
@@ -177,13 +163,52 @@ def fit_hypotheses(
         np.linalg.pinv(normal / np.outer(size, size)) / np.outer(size, size), dtype=np.float64
     )
     return Fit(
-        parts=parts, values=x, session=s, session_sigma=session_sigma, objective=objective,
-        by_run=collect_misfits(points), covariance=inverse[:k, :k], session_error=np.sqrt(np.diag(inverse)[k:]),
+        parts=parts, values=here.values, session=here.session, session_sigma=session_sigma, objective=here.misfit,
+        by_run=collect_misfits(here.points), covariance=inverse[:k, :k],
+        session_error=np.sqrt(np.diag(inverse)[k:]),
         residuals=tuple(
-            run.add_offsets(point.residual, point.offsets) for run, point in zip(evidence, points, strict=True)
+            run.add_offsets(point.residual, point.offsets)
+            for run, point in zip(evidence, here.points, strict=True)
         ),
-        offsets=tuple(point.offsets for point in points),
+        offsets=tuple(point.offsets for point in here.points),
     )  # fmt: skip
+
+
+def _step_along(
+    evidence: tuple[RunEvidence, ...],
+    parts: tuple[Hypothesis, ...],
+    here: _State,
+    move: NDArray[np.float64],
+    slopes: list[Slopes],
+    foreseen: float,
+    bounds: tuple[NDArray[np.float64], NDArray[np.float64]],
+    prior: NDArray[np.float64],
+) -> _State | None:
+    """Return where the first share of a step leads that lowers the misfit; None where none does.
+
+    Parameters and each run's own offsets move together; if that does not help, one after the other.
+    """
+    k = len(here.values)
+    ahead = tuple(
+        run.estimate_offsets(point.projected - q @ move)
+        for run, point, (_, q) in zip(evidence, here.points, slopes, strict=True)
+    )
+    for share, together in TRIALS:
+        if share * (2.0 - share) * foreseen < SETTLED and share < 1.0:
+            continue
+        x, s = np.clip(here.values + share * move[:k], *bounds), here.session + share * move[k:]
+        own = tuple(
+            point.offsets + share * together * (d - point.offsets)
+            for point, d in zip(here.points, ahead, strict=True)
+        )
+        points = linearise_at(evidence, parts, x, s, own)
+        if _compute_total_misfit(points, prior, s) < here.misfit:
+            if not together:
+                points = move_linearisation_points(evidence, parts, x, s, points)
+            return _State(values=x, session=s, points=points, misfit=_compute_total_misfit(points, prior, s))
+        if foreseen < 0.1:
+            break
+    return None
 
 
 def _differentiate_runs(
