@@ -59,7 +59,7 @@ def eliminate_uncertain_numbers(stops: Sequence[Stop], fitted: JointFit, rules: 
             return _drop_unknown_frictions(stops, fitted, rules)
         name = min(weak)[1]
         without = _refit_without(stops, fitted, {name})
-        if fitted.cost < NEEDED_COST * without.cost and not _interval_holds_zero(fitted, name, rules):
+        if fitted.cost < NEEDED_COST * without.cost and not interval_holds_zero(fitted, name, rules):
             needed.add(name)
         else:
             fitted, needed = without, set()
@@ -78,8 +78,15 @@ def _refit_without(stops: Sequence[Stop], fitted: JointFit, gone: Collection[str
     return min((first, *others), key=lambda fit: fit.cost)
 
 
-def _interval_holds_zero(fitted: JointFit, name: str, rules: JointRules) -> bool:
-    """Whether the 95 % interval of a number holds 0."""
+def interval_holds_zero(fitted: JointFit, name: str, rules: JointRules) -> bool:
+    """Whether the 95 % interval of a number holds 0.
+
+    Parameters
+    ----------
+    fitted : the fit
+    name : of the number
+    rules : of the joint fit
+    """
     place = [n.name for n in fitted.numbers].index(name)
     return bool(abs(fitted.values[place]) <= compute_interval_reach(fitted, rules)[place])
 

@@ -19,6 +19,7 @@ from tasks.identification.decision.missed import compare_with_noise, tell_miss
 from tasks.identification.inference.disturbance import Disturbance
 from tasks.identification.joint.elimination import drop_at_bounds, refit_numbers
 from tasks.identification.joint.fit import JointFit, measure_misfit
+from tasks.identification.joint.from_brake import drop_what_the_drive_feigns
 from tasks.identification.joint.held_out import (
     drop_contradicted_rivals,
     makes_difference,
@@ -120,6 +121,7 @@ def judge_jointly(
     shown = choose_numbers(numbers, campaign, [stop.model for stop in train], joint)
     reasons = [disagreement] if disagreement else []
     selected, agreeing = select_numbers(campaign, train, held_out, shown, joint, reasons)
+    selected = drop_what_the_drive_feigns(campaign, vehicle, surface, train, selected, joint, reasons)
     retuned = refit_numbers(train, selected, tuple(n for n in selected.numbers if n.group in CALIBRATED))
     retuned = drop_at_bounds(train, retuned, joint, [])
 
