@@ -1,9 +1,11 @@
 """nerfstudio: a folder a clip with ``transforms.json``, and the edited scene as ``.ply`` of Gaussians.
 
-``NAME/transforms.json`` has pictures (PNG, as stored), depth (``.npy`` [m], ``depth_unit_scale_factor`` 1; unseen is 0)
-and camera-to-world matrices with nerfstudio's camera axes (OpenGL: x right, y up, z back), which are ours with y and z
-reversed. The world is ours (ISO 8855, z up), so that the camera of a braking car looks down: its z axis, which points
-back, rises. Pixel centres lie at +0.5 in both. ``time`` is a frame's share of the clip, our times are in ``t_ns``.
+``NAME/transforms.json`` has pictures (PNG, as stored), depth (``.npy``, float32 [mm]; unseen is 0) and camera-to-world
+matrices with nerfstudio's camera axes (OpenGL: x right, y up, z back), which are ours with y and z reversed. Depth is
+in millimetres because nerfstudio takes ``depth_unit_scale_factor`` from its own configuration (0.001 by default) and
+never from the file. The world is ours (ISO 8855, z up), so that the camera of a braking car looks down: its z axis,
+which points back, rises. Pixel centres lie at +0.5 in both. ``time`` is a frame's share of the clip, our times are in
+``t_ns``.
 
 ``scenes/*.ply`` are the Gaussians of the scene with one road feature each, in the layout of the INRIA code (means [m],
 logarithmic scales, logit opacities, quaternions wxyz, spherical harmonics); a clip's file is named in its
@@ -28,6 +30,8 @@ from tasks.render.contact_sheet import encode_png
 
 OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
 """Camera axes of nerfstudio in ours."""
+MILLIMETRE = np.float32(1000)
+"""In one metre: nerfstudio multiplies depth by 0.001 unless it is told otherwise."""
 
 
 def write_nerfstudio(dataset: ExportedDataset, folder: Path) -> None:
@@ -70,7 +74,7 @@ def _write_clip(clip: ExportedClip, dataset: ExportedDataset, folder: Path, scen
     for frame, t_ns in enumerate(times):
         picture, distance = f"images/frame_{frame:05d}.png", f"depth/frame_{frame:05d}.npy"
         (folder / picture).write_bytes(encode_png(rgb[frame]))
-        np.save(folder / distance, np.nan_to_num(depth[frame], nan=0.0))
+        np.save(folder / distance, np.nan_to_num(depth[frame], nan=0.0) * MILLIMETRE)
         frames.append(
             {
                 "file_path": picture,
@@ -81,7 +85,6 @@ def _write_clip(clip: ExportedClip, dataset: ExportedDataset, folder: Path, scen
             }
         )
     content = _describe_camera(dataset.camera) | {
-        "depth_unit_scale_factor": 1.0,
         "gaussians_file": f"../{scene}",
         "frames": frames,
     }

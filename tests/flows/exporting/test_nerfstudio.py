@@ -13,6 +13,8 @@ from flows.making.edited_scene import edit_scene
 from flows.making.plan import read_plan
 from tests.flows.exporting.conftest import BRAKING, HUMP
 
+NERFSTUDIO_DEPTH_UNIT = 1e-3
+"""Default of ``depth_unit_scale_factor`` in nerfstudio's NerfstudioDataParserConfig, for .npy and .png alike."""
 FOLDERS = {BRAKING: "00000_dry_flat", HUMP: "00003_snow-3_hump"}
 
 
@@ -33,8 +35,11 @@ def test_pictures_depth_intrinsics_and_opengl_poses(export, stored, toy_dataset)
         for k, frame in enumerate(content["frames"]):
             picture = cv2.imread(str(folder / frame["file_path"]))[..., ::-1]
             np.testing.assert_array_equal(picture, clip.pixels["rgb"][k])
-            depth = np.load(folder / frame["depth_file_path"]) * content["depth_unit_scale_factor"]
-            np.testing.assert_array_equal(depth, np.nan_to_num(clip.pixels["depth"][k]))
+            depth = np.load(folder / frame["depth_file_path"])
+            assert depth.dtype == np.float32
+            np.testing.assert_allclose(
+                depth * NERFSTUDIO_DEPTH_UNIT, np.nan_to_num(clip.pixels["depth"][k]), rtol=1e-6
+            )
             pose = np.array(frame["transform_matrix"])
             expected = clip.T_world_rig[k] @ camera.T_rig_camera
             np.testing.assert_allclose(pose[:3, 3], expected[:3, 3])
