@@ -1,9 +1,9 @@
-"""Specific force and turn rate of an inertial unit in the rig, from stored telemetry."""
+"""Velocity, specific force and turn rate of one point of the car body at the frames, from stored telemetry."""
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from flows.exporting.dataset import ExportedClip
@@ -11,58 +11,94 @@ from tasks.vehicle.parameters import Vehicle
 
 STANDARD_GRAVITY = 9.80665
 """CGPM 1901 [m s-2]."""
-Series = NDArray[np.float64]
+FORWARD, LEFT, UP = np.eye(3)
+Vectors = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
 class InertialMotion:
-    """Motion of the rig at the frames, each [F] unless said otherwise.
+    """Motion of a point of the body at the frames, in the axes of the world.
 
     Parameters
     ----------
-    roll, pitch, yaw : turn the rig into the world by Rz Ry Rx; pitch is positive nose-down [rad]
-    vertical_speed : of the rig's origin, up [m s-1]
-    force_forward, force_up : specific force along the road and up, at rest 0 and standard gravity [m s-2]
-    force : [F, 3] the same in the axes of the pitched rig [m s-2]
-    turn_rate : [F, 3] in the axes of the pitched rig [rad s-1]
-    yaw_rate : about the world's up axis [rad s-1]
+    attitude : body to world, F rotations; Rz Ry Rx of yaw, pitch (positive nose-down) and roll
+    velocity : [F, 3] [m s-1]
+    force : [F, 3] specific force, as an accelerometer feels it: at rest standard gravity up [m s-2]
+    turn_rate : [F, 3] [rad s-1]
     """
 
-    roll: Series
-    pitch: Series
-    yaw: Series
-    vertical_speed: Series
-    force_forward: Series
-    force_up: Series
-    force: Series
-    turn_rate: Series
-    yaw_rate: Series
+    attitude: Rotation
+    velocity: Vectors
+    force: Vectors
+    turn_rate: Vectors
+
+    @property
+    def level(self) -> Rotation:
+        """The attitude's yaw alone: axes forward, left and up that stay parallel to the ground, F rotations."""
+        return Rotation.from_euler("Z", self.attitude.as_euler("ZYX")[:, :1])
 
 
-def compute_inertial_motion(clip: ExportedClip, vehicle: Vehicle) -> InertialMotion:
-    """Return the motion of the rig; heave's acceleration and the yaw rate are differences of ticks and of frames.
+def compute_inertial_motion(
+    clip: ExportedClip, vehicle: Vehicle, place: ArrayLike = (0, 0, 0)
+) -> InertialMotion:
+    """Return the motion of a point of the body.
+
+    The rig's pose is P_0(s) (+) (z_s, theta) (paper, Eq. camera_pose): the route's frame runs along the road with the
+    car's speed, and in it the body heaves, and pitches about the centre of gravity. The point's velocity and
+    acceleration are those of this chain. Second derivatives of heave and pitch are differences of ticks; how the route
+    turns, per metre, is the difference of the frames' poses. The route runs along its x axis.
 
     Parameters
     ----------
     clip : that was driven
     vehicle : that drove it
+    place : of the point in the rig [m]
     """
-    frames = clip.frames
-    yaw, pitch, roll = Rotation.from_matrix(clip.T_world_rig[:, :3, :3]).as_euler("ZYX").T
-    cos, sin = np.cos(pitch), np.sin(pitch)
-    # the rig lies in front of and below the centre of gravity, about which the body pitches
-    lever = vehicle.cg_height * np.sin(frames["pitch"]) - vehicle.cg_to_front_axle * np.cos(frames["pitch"])
-    lift = np.gradient(clip.ticks["heave_rate"], clip.ticks["t_ns"] * 1e-9)[frames["tick"]]
-    forward, up = np.asarray(frames["longitudinal_acceleration"], np.float64), STANDARD_GRAVITY + lift
-    yaw_rate = np.gradient(np.unwrap(yaw), frames["t_ns"] * 1e-9)
-    return InertialMotion(
-        roll=roll,
-        pitch=pitch,
-        yaw=yaw,
-        vertical_speed=frames["heave_rate"] + frames["pitch_rate"] * lever,
-        force_forward=forward,
-        force_up=up,
-        force=np.stack((forward * cos - up * sin, np.zeros(len(yaw)), forward * sin + up * cos), axis=1),
-        turn_rate=np.stack((-yaw_rate * sin, frames["pitch_rate"], yaw_rate * cos), axis=1),
-        yaw_rate=yaw_rate,
+    frames, ticks, t = clip.frames, clip.ticks, clip.frames["t_ns"] * 1e-9
+    attitude = Rotation.from_matrix(clip.T_world_rig[:, :3, :3])
+    pitching = Rotation.from_euler("Y", frames["pitch"][:, None])
+    route = attitude * pitching.inv()
+    heave_acceleration, pitch_acceleration = (
+        np.gradient(ticks[rate], ticks["t_ns"] * 1e-9)[frames["tick"]]
+        for rate in ("heave_rate", "pitch_rate")
     )
+
+    centre = np.array([-vehicle.cg_to_front_axle, 0.0, vehicle.cg_height])
+    arm = pitching.apply(np.asarray(place, np.float64) - centre)
+    reach = centre + np.outer(frames["heave"], UP) + arm
+    pitch_rate = np.outer(frames["pitch_rate"], LEFT)
+    moved = np.outer(frames["heave_rate"], UP) + np.cross(pitch_rate, arm)
+    lifted = (
+        np.outer(heave_acceleration, UP)
+        + np.cross(np.outer(pitch_acceleration, LEFT), arm)
+        + np.cross(pitch_rate, np.cross(pitch_rate, arm))
+    )
+
+    along, turn = (
+        np.outer(frames["speed"], FORWARD),
+        _measure_turn_rate(route, frames["station"], frames["speed"]),
+    )
+    acceleration = (
+        np.outer(frames["longitudinal_acceleration"], FORWARD)
+        + np.cross(turn, along)
+        + np.cross(np.gradient(turn, t, axis=0), reach)
+        + np.cross(turn, np.cross(turn, reach))
+        + 2 * np.cross(turn, moved)
+        + lifted
+    )
+    return InertialMotion(
+        attitude=attitude,
+        velocity=route.apply(along + np.cross(turn, reach) + moved),
+        force=route.apply(acceleration) + STANDARD_GRAVITY * UP,
+        turn_rate=route.apply(turn + pitch_rate),
+    )
+
+
+def _measure_turn_rate(route: Rotation, station: NDArray[np.float64], speed: NDArray[np.float64]) -> Vectors:
+    """Turn rate of the route's frame in its own axes [F, 3] [rad s-1]; 0 of a car that stands."""
+    gone = np.diff(station)[:, None]
+    turned = (route[:-1].inv() * route[1:]).as_rotvec()
+    per_metre = np.divide(turned, gone, out=np.zeros_like(turned), where=gone > 0)
+    at_frames = (per_metre[np.r_[0, : len(gone)]] + per_metre[np.r_[: len(gone), -1]]) / 2
+    turn_rate: Vectors = at_frames * speed[:, None]
+    return turn_rate

@@ -7,9 +7,11 @@ one OXTS packet a frame and no pictures. The velodyne's and the IMU's frame are 
 the middle of the front axle): ``Tr`` takes the rig to the camera. Pixel centres are whole numbers, as KITTI's.
 
 Of OXTS, roll, pitch and yaw turn the rig into the world by Rz Ry Rx: pitch is positive nose-down, as ours. The world's
-x is east, its y north; its origin lies at latitude and longitude zero. ``vf`` is our speed, ``af`` our longitudinal
-acceleration, ``au`` 9.80665 m/s^2 plus that of heave (an accelerometer's), ``ax`` and ``az`` the two in the pitched
-body's axes, ``wl`` and ``wy`` the pitch rate. Accuracies, satellites and modes are 0. Time 0 is 1970-01-01.
+x is east, its y north; its origin lies at latitude and longitude zero. Velocities and accelerations are those of the
+rig's origin: ``vn`` and ``ve`` in the world, ``vf``, ``vl`` and ``vu`` along the level heading. Accelerations are an
+accelerometer's, which feels 9.80665 m/s^2 up at rest: ``af``, ``al`` and ``au`` along the level heading, ``ax``, ``ay``
+and ``az`` in the axes of the pitched body. So are the turn rates ``wf`` to ``wu`` and ``wx`` to ``wz``. Accuracies,
+satellites and modes are 0. Time 0 is 1970-01-01.
 
 Formats: http://www.cvlibs.net/datasets/kitti, devkit_odometry/readme.txt and devkit_raw_data/readme.txt
 """
@@ -74,13 +76,14 @@ def compute_oxts(clip: ExportedClip, vehicle: Vehicle) -> NDArray[np.float64]:
     """
     motion = compute_inertial_motion(clip, vehicle)
     east, north, up = clip.T_world_rig[:, :3, 3].T
-    still, speed = np.zeros(len(up)), clip.frames["speed"]
+    yaw, pitch, roll = motion.attitude.as_euler("ZYX").T
+    level, body, still = motion.level.inv(), motion.attitude.inv(), np.zeros(len(up))
     fields = (
         np.degrees(2 * np.arctan(np.exp(north / EARTH_RADIUS))) - 90.0, np.degrees(east / EARTH_RADIUS), up,
-        motion.roll, motion.pitch, motion.yaw,
-        speed * np.sin(motion.yaw), speed * np.cos(motion.yaw), speed, still, motion.vertical_speed,
-        *motion.force.T, motion.force_forward, still, motion.force_up,
-        *motion.turn_rate.T, still, clip.frames["pitch_rate"], motion.yaw_rate,
+        roll, pitch, yaw,
+        motion.velocity[:, 1], motion.velocity[:, 0], *level.apply(motion.velocity).T,
+        *body.apply(motion.force).T, *level.apply(motion.force).T,
+        *body.apply(motion.turn_rate).T, *level.apply(motion.turn_rate).T,
         still, still,
     )  # fmt: skip
     return np.stack(fields, axis=1)

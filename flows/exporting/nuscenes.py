@@ -5,8 +5,8 @@ z up, below the middle of the rear axle, a wheelbase behind our rig; positive pi
 ours. The camera's axes are ours (x right, y down, z forward) and pixel centres whole numbers. Quaternions are wxyz.
 Time is in microseconds since the start of the clip.
 
-Of the CAN bus, ``pose`` and ``ms_imu`` have a message a frame (acceleration as an accelerometer feels it, at rest
-9.80665 m/s^2 up), ``zoe_veh_info`` 100 a second (wheel speeds [rpm], speed [km/h]) and ``vehicle_monitor`` two (speed
+Of the CAN bus, ``pose`` and ``ms_imu`` have a message a frame with the motion of the ego frame's origin in its own axes
+(acceleration as an accelerometer feels it, at rest 9.80665 m/s^2 up), ``zoe_veh_info`` 100 a second (wheel speeds [rpm], speed [km/h]) and ``vehicle_monitor`` two (speed
 [km/h], brake pressure [bar], rear wheels [rpm]). Keys that we do not represent are absent. Scenes count from 2000,
 because the devkit refuses numbers of scenes of its own that lack a CAN bus.
 
@@ -101,15 +101,19 @@ def describe_can_bus(clip: ExportedClip, vehicle: Vehicle) -> dict[str, list[dic
     vehicle : that drove it
     """
     frames, ticks = clip.frames, clip.ticks
-    motion, poses = compute_inertial_motion(clip, vehicle), compute_ego_poses(clip, vehicle)
-    turns = compute_quaternions(poses, scalar_first=True).tolist()
+    poses = compute_ego_poses(clip, vehicle)
+    motion = compute_inertial_motion(clip, vehicle, _rig_from_ego(vehicle)[:3, 3])
+    turns, places = compute_quaternions(poses, scalar_first=True).tolist(), poses[:, :3, 3].tolist()
     at = (frames["t_ns"] // 1000).tolist()
-    forces, rates, places = motion.force.tolist(), motion.turn_rate.tolist(), poses[:, :3, 3].tolist()
+    speeds, forces, rates = (
+        motion.attitude.inv().apply(vectors).tolist()
+        for vectors in (motion.velocity, motion.force, motion.turn_rate)
+    )
     wheels = {"F": "wheel_speed_f", "R": "wheel_speed_r"}
     return {
         "pose": [
             {"accel": forces[k], "orientation": turns[k], "pos": places[k], "rotation_rate": rates[k],
-             "utime": at[k], "vel": [float(frames["speed"][k]), 0.0, 0.0]}
+             "utime": at[k], "vel": speeds[k]}
             for k in range(len(at))
         ],
         "ms_imu": [

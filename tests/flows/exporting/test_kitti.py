@@ -28,7 +28,7 @@ def test_a_sequence_has_pictures_times_calibration_and_camera_poses(
 
 
 @pytest.mark.parametrize(("number", "label"), [(0, BRAKING), (1, HUMP)])
-def test_a_drive_has_oxts_packets_in_si_with_pitch_nose_down(export, stored, number, label):
+def test_a_drive_has_oxts_packets_in_si_with_pitch_nose_down(export, stored, toy_dataset, number, label):
     clip = stored[label]
     read = pykitti.raw(str(export("kitti") / "raw"), "1970_01_01", f"{number:04d}")
     assert [(t.second * 10**6 + t.microsecond) for t in read.timestamps] == (
@@ -39,8 +39,14 @@ def test_a_drive_has_oxts_packets_in_si_with_pitch_nose_down(export, stored, num
     ours[:, :3, 3] -= ours[0, :3, 3]
     np.testing.assert_allclose(poses, ours, atol=1e-8)
     packets = [packet.packet for packet in read.oxts]
-    for name, column in (("vf", "speed"), ("af", "longitudinal_acceleration"), ("wl", "pitch_rate")):
-        assert [getattr(packet, name) for packet in packets] == clip.frames[column].tolist()
+    # the rig lies below the centre of gravity and in front of it: pitching moves it back and down
+    car, pitch, rate = catalogue_of(toy_dataset.root).vehicle, clip.frames["pitch"], clip.frames["pitch_rate"]
+    back = rate * (car.cg_to_front_axle * np.sin(pitch) + car.cg_height * np.cos(pitch))
+    for names in (("vf", "vl"), ("ve", "vn")):  # the street runs east
+        forward, across = ([getattr(p, name) for p in packets] for name in names)
+        np.testing.assert_allclose(forward, clip.frames["speed"] - back, atol=1e-9)
+        np.testing.assert_allclose(across, 0, atol=1e-9)
+    np.testing.assert_allclose([packet.wl for packet in packets], rate, atol=1e-12)
     np.testing.assert_allclose([packet.pitch for packet in packets], clip.frames["pitch"], atol=1e-12)
     # what the accelerometer feels turns with the body, and has one length
     felt = np.array([(p.ax, p.az) for p in packets])

@@ -53,11 +53,11 @@ def test_a_scene_chains_its_samples_to_pictures_and_poses(export, stored, tables
             np.testing.assert_allclose(behind[:3], [-wheelbase, 0, 0], atol=1e-12)
 
 
-def test_nuscenes_devkit_opens_tables_and_can_bus(export, stored):
+def test_nuscenes_devkit_opens_tables_and_can_bus(export, stored, toy_dataset):
     nuscenes = pytest.importorskip("nuscenes.nuscenes", reason="pip install nuscenes-devkit")
     from nuscenes.can_bus.can_bus_api import NuScenesCanBus
 
-    folder = str(export("nuscenes"))
+    folder, catalogue = str(export("nuscenes")), catalogue_of(toy_dataset.root)
     base = nuscenes.NuScenes(version="v1.0-musync", dataroot=folder, verbose=False)
     bus = NuScenesCanBus(dataroot=folder)
     for record, (label, clip) in zip(base.scene, stored.items(), strict=True):
@@ -68,9 +68,14 @@ def test_nuscenes_devkit_opens_tables_and_can_bus(export, stored):
         np.testing.assert_array_equal(K, [[80, 0, 47.5], [0, 80, 31.5], [0, 0, 1]])
         poses = bus.get_messages(record["name"], "pose")
         assert [row["utime"] * 1000 for row in poses] == clip.frames["t_ns"].tolist()
-        assert [row["vel"][0] for row in poses] == clip.frames["speed"].tolist()
         turns = Rotation.from_quat([row["orientation"] for row in poses], scalar_first=True)
         np.testing.assert_allclose(turns.as_euler("ZYX")[:, 1], clip.frames["pitch"], atol=1e-12)
+        # the rear axle, at the height of the road, goes up and back where the nose goes down
+        up = turns.apply([row["vel"] for row in poses])[:, 2]
+        far = catalogue.vehicle.cg_to_rear_axle * np.cos(clip.frames["pitch"])
+        high = catalogue.vehicle.cg_height * np.sin(clip.frames["pitch"])
+        rising = clip.frames["heave_rate"] + clip.frames["pitch_rate"] * (far + high)
+        np.testing.assert_allclose(up, rising, atol=1e-9)
         monitor = bus.get_messages(record["name"], "vehicle_monitor")
         ticks = clip.ticks.iloc[::500]
         np.testing.assert_allclose([row["vehicle_speed"] for row in monitor], ticks["speed"] * 3.6)
