@@ -3,17 +3,19 @@
 The version is ``v1.0-musync``; pictures are ``samples/CAM_FRONT/*.png``. The ego frame is nuScenes': x forward, y left,
 z up, below the middle of the rear axle, a wheelbase behind our rig; positive pitch about its y axis is nose-down, as
 ours. The camera's axes are ours (x right, y down, z forward) and pixel centres whole numbers. Quaternions are wxyz.
-Time is in microseconds since the start of the clip.
+Time is in microseconds; scene n of the export starts at n times the length of the telemetry and one second, so that
+times rise from scene to scene.
 
 Of the CAN bus, ``pose`` and ``ms_imu`` have a message a frame with the motion of the ego frame's origin in its own axes
-(acceleration as an accelerometer feels it, at rest 9.80665 m/s^2 up), ``zoe_veh_info`` 100 a second (wheel speeds [rpm], speed [km/h]) and ``vehicle_monitor`` two (speed
-[km/h], brake pressure [bar], rear wheels [rpm]). Keys that we do not represent are absent. Scenes count from 2000,
-because the devkit refuses numbers of scenes of its own that lack a CAN bus.
+(acceleration as an accelerometer feels it, at rest 9.80665 m/s^2 up), ``zoe_veh_info`` 100 a second (wheel speeds
+[rpm], speed [km/h]) and ``vehicle_monitor`` two (speed [km/h], brake pressure as a whole number from 0 to 126 [bar],
+rear wheels [rpm]). Keys that we do not represent are absent. Scenes count from 2000, because the devkit refuses numbers
+of scenes of its own that lack a CAN bus.
 
 Format: https://www.nuscenes.org/nuscenes#data-format and python-sdk/nuscenes/can_bus/README.md of nuscenes-devkit
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -21,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flows.exporting.dataset import ExportedClip, ExportedDataset, require_pinhole
+from flows.exporting.dataset import Columns, ExportedClip, ExportedDataset, require_pinhole
 from flows.exporting.inertial import compute_inertial_motion
 from flows.exporting.json_array import JsonArray, open_array
 from flows.exporting.poses import compute_quaternions
@@ -44,6 +46,25 @@ RPM = 60 / (2 * np.pi)
 KM_H = 3.6
 BAR = 10.0
 """Bars in one megapascal."""
+VEHICLE_INFO = {
+    "FL_wheel_speed": ("wheel_speed_f", RPM),
+    "FR_wheel_speed": ("wheel_speed_f", RPM),
+    "RL_wheel_speed": ("wheel_speed_r", RPM),
+    "RR_wheel_speed": ("wheel_speed_r", RPM),
+    "longitudinal_accel": ("longitudinal_acceleration", 1.0),
+    "odom_speed": ("speed", KM_H),
+}
+"""Keys of ``zoe_veh_info``: our column, and the factor to their unit."""
+MONITOR = {
+    "rear_left_rpm": ("wheel_speed_r", RPM),
+    "rear_right_rpm": ("wheel_speed_r", RPM),
+    "vehicle_speed": ("speed", KM_H),
+}
+"""Keys of ``vehicle_monitor``, in the same way; those of the brake are whole numbers."""
+MOST_BAR = 126
+"""Of ``vehicle_monitor.brake`` [bar]."""
+PAUSE_US = 1_000_000
+"""Between the end of one scene's telemetry and the start of the next [us]."""
 
 
 def write_nuscenes(dataset: ExportedDataset, folder: Path) -> None:
@@ -70,15 +91,16 @@ def write_nuscenes(dataset: ExportedDataset, folder: Path) -> None:
     (folder / "maps" / "none.png").write_bytes(encode_png(np.full((1, 1, 3), 255, np.uint8)))
     for name, rows in (_describe_fixed(dataset) | {name: [] for name in EMPTY}).items():
         write_json(tables / f"{name}.json", rows)
+    period_us = round(dataset.plan.settings.telemetry_s * 1e6) + PAUSE_US
     with ExitStack() as stack:
         rows_of = {
             name: stack.enter_context(open_array(stack.enter_context((tables / f"{name}.json").open("w"))))
             for name in STREAMED
         }
         for number, clip in enumerate(dataset):
-            scene = f"scene-{FIRST_SCENE + number:04d}"
-            _write_scene(clip, dataset, scene, folder, rows_of)
-            for message, rows in describe_can_bus(clip, dataset.vehicle).items():
+            scene, start_us = f"scene-{FIRST_SCENE + number:04d}", number * period_us
+            _write_scene(clip, dataset, scene, start_us, folder, rows_of)
+            for message, rows in describe_can_bus(clip, dataset.vehicle, start_us).items():
                 write_json(folder / "can_bus" / f"{scene}_{message}.json", rows)
 
 
@@ -92,24 +114,24 @@ def compute_ego_poses(clip: ExportedClip, vehicle: Vehicle) -> NDArray[np.float6
     return clip.T_world_rig @ _rig_from_ego(vehicle)
 
 
-def describe_can_bus(clip: ExportedClip, vehicle: Vehicle) -> dict[str, list[dict[str, Any]]]:
-    """Return the messages of a clip's CAN bus, by kind.
+def describe_can_bus(clip: ExportedClip, vehicle: Vehicle, start_us: int) -> dict[str, list[dict[str, Any]]]:
+    """Return the messages of a clip's CAN bus, by kind; what is not represented is left out.
 
     Parameters
     ----------
     clip : that was driven
     vehicle : that drove it
+    start_us : of the scene [us]
     """
-    frames, ticks = clip.frames, clip.ticks
+    ticks = clip.ticks
     poses = compute_ego_poses(clip, vehicle)
     motion = compute_inertial_motion(clip, vehicle, _rig_from_ego(vehicle)[:3, 3])
     turns, places = compute_quaternions(poses, scalar_first=True).tolist(), poses[:, :3, 3].tolist()
-    at = (frames["t_ns"] // 1000).tolist()
+    at = (start_us + clip.frames["t_ns"] // 1000).tolist()
     speeds, forces, rates = (
         motion.attitude.inv().apply(vectors).tolist()
         for vectors in (motion.velocity, motion.force, motion.turn_rate)
     )
-    wheels = {"F": "wheel_speed_f", "R": "wheel_speed_r"}
     return {
         "pose": [
             {"accel": forces[k], "orientation": turns[k], "pos": places[k], "rotation_rate": rates[k],
@@ -121,24 +143,37 @@ def describe_can_bus(clip: ExportedClip, vehicle: Vehicle) -> dict[str, list[dic
             for k in range(len(at))
         ],
         "zoe_veh_info": [
-            {f"{axle}{side}_wheel_speed": float(ticks[name][k]) * RPM for axle, name in wheels.items() for side in "LR"}
-            | {"longitudinal_accel": float(ticks["longitudinal_acceleration"][k]),
-               "odom_speed": float(ticks["speed"][k]) * KM_H, "utime": int(ticks["t_ns"][k]) // 1000}
+            _describe_tick(ticks, k, start_us, VEHICLE_INFO)
             for k in _every(ticks["t_ns"], 10_000_000)
         ],
         "vehicle_monitor": [
-            {"brake": float(ticks["brake_pressure_mpa"][k]) * BAR,
-             "brake_switch": 2 if ticks["brake_pressure_mpa"][k] > 0 else 1,
-             "rear_left_rpm": float(ticks["wheel_speed_r"][k]) * RPM,
-             "rear_right_rpm": float(ticks["wheel_speed_r"][k]) * RPM,
-             "vehicle_speed": float(ticks["speed"][k]) * KM_H, "utime": int(ticks["t_ns"][k]) // 1000}
+            _describe_tick(ticks, k, start_us, MONITOR) | _describe_brake(float(ticks["brake_pressure_mpa"][k]))
             for k in _every(ticks["t_ns"], 500_000_000)
         ],
     }  # fmt: skip
 
 
+def _describe_tick(
+    ticks: Columns, tick: int, start_us: int, keys: Mapping[str, tuple[str, float]]
+) -> dict[str, Any]:
+    values = {key: float(ticks[column][tick]) * factor for key, (column, factor) in keys.items()}
+    known = {key: value for key, value in values.items() if np.isfinite(value)}
+    return known | {"utime": start_us + int(ticks["t_ns"][tick]) // 1000}
+
+
+def _describe_brake(pressure_mpa: float) -> dict[str, int]:
+    if not np.isfinite(pressure_mpa):
+        return {}
+    return {"brake": min(round(pressure_mpa * BAR), MOST_BAR), "brake_switch": 2 if pressure_mpa > 0 else 1}
+
+
 def _write_scene(
-    clip: ExportedClip, dataset: ExportedDataset, scene: str, folder: Path, rows_of: dict[str, JsonArray]
+    clip: ExportedClip,
+    dataset: ExportedDataset,
+    scene: str,
+    start_us: int,
+    folder: Path,
+    rows_of: dict[str, JsonArray],
 ) -> None:
     own = make_token("scene", clip.clip_id)
     frames = clip.frames
@@ -150,22 +185,22 @@ def _write_scene(
          "description": clip.label, "first_sample_token": make_token("sample", clip.clip_id, 0),
          "last_sample_token": make_token("sample", clip.clip_id, count - 1)}
     )  # fmt: skip
-    for frame, t_ns in enumerate(frames["t_ns"].tolist()):
+    for frame, at_us in enumerate((start_us + frames["t_ns"] // 1000).tolist()):
         name = f"samples/{CHANNEL}/{scene}_{frame:06d}.png"
         (folder / name).write_bytes(encode_png(pictures[frame]))
         ego, sample = (make_token(table, clip.clip_id, frame) for table in ("ego_pose", "sample"))
         rows_of["ego_pose"].append(
-            {"token": ego, "timestamp": t_ns // 1000, "rotation": turns[frame].tolist(),
+            {"token": ego, "timestamp": at_us, "rotation": turns[frame].tolist(),
              "translation": poses[frame, :3, 3].tolist()}
         )  # fmt: skip
         rows_of["sample"].append(
-            {"token": sample, "timestamp": t_ns // 1000, "scene_token": own}
+            {"token": sample, "timestamp": at_us, "scene_token": own}
             | dict(_link("sample", clip, frame, count))
         )
         rows_of["sample_data"].append(
             {"token": make_token("sample_data", clip.clip_id, frame), "sample_token": sample,
              "ego_pose_token": ego, "calibrated_sensor_token": make_token("calibrated_sensor"),
-             "timestamp": t_ns // 1000, "fileformat": "png", "is_key_frame": True, "filename": name,
+             "timestamp": at_us, "fileformat": "png", "is_key_frame": True, "filename": name,
              "height": dataset.camera.height, "width": dataset.camera.width}
             | dict(_link("sample_data", clip, frame, count))
         )  # fmt: skip
