@@ -162,8 +162,21 @@ class ExportedDataset:
     def __len__(self) -> int:
         return len(self.rows)
 
+    @cached_property
+    def known_columns(self) -> tuple[str, ...]:
+        """Columns of the tick table that have a number at every frame; a reference trace does not hold all."""
+        known = set(TICK_COLUMNS)
+        for clip in self._open_clips():
+            known -= {name for name in known if not np.isfinite(clip.frames[name]).all()}
+        return tuple(name for name in TICK_COLUMNS if name in known)
+
     def __iter__(self) -> Iterator[ExportedClip]:
         """Yield each clip; what was read of one is forgotten with it."""
+        for clip in self._open_clips():
+            yield clip
+            self.finish(clip.label)
+
+    def _open_clips(self) -> Iterator[ExportedClip]:
         files = {
             table: {clip_id: path for path, ids in table_parts(self.plan, table).items() for clip_id in ids}
             for table in ("ticks", "frames")
@@ -177,7 +190,6 @@ class ExportedDataset:
                 camera=self.camera,
                 plan=self.plan,
             )
-            self.finish(row["label"])
 
 
 def require_pinhole(dataset: ExportedDataset, to: str) -> None:

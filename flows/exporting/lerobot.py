@@ -4,12 +4,16 @@
 ``observation.state`` the telemetry at the frame in float32, with our names, units and signs (pitch positive nose-down);
 ``observation.pose`` our ``T_world_rig`` (ISO 8855: x forward, y left, z up), row by row, in float64; ``action`` the
 commanded brake pressure [MPa]; the task is the clip's label. ``timestamp`` is the time since the start of the clip [s].
+Columns that a clip does not represent at every frame (of a reference trace) are not in the state. Episodes are in the
+order of the grid's splits, and ``splits`` has the range of episodes of each; without splits all are ``train``.
 Statistics are over all frames; those of pictures are of colours in 0..1, sampled.
 
 Format: codebase version v3.0, https://huggingface.co/docs/lerobot/lerobot-dataset-v3
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +22,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from flows.exporting.dataset import TICK_COLUMNS, ExportedClip, ExportedDataset
+from flows.exporting.dataset import ExportedClip, ExportedDataset
 from flows.exporting.running_statistics import RunningStatistics
 from flows.reading.film import write_film
 from flows.store.layout import write_json
@@ -26,7 +30,8 @@ from tasks.errors import InputError
 
 CAMERA, STATE, POSE, ACTION = "observation.images.front", "observation.state", "observation.pose", "action"
 ACTION_COLUMN = "brake_pressure_mpa"
-STATE_COLUMNS = tuple(name for name in TICK_COLUMNS if name not in {"t_ns", ACTION_COLUMN})
+NO_STATE = frozenset({"t_ns", ACTION_COLUMN})
+"""Columns of the tick table that are no part of the state."""
 FILES_PER_CHUNK = 1000
 SAMPLED = 4
 """Statistics of pictures take every fourth pixel of every fourth row; LeRobot's own writer samples them too."""
@@ -46,7 +51,7 @@ def write_lerobot(dataset: ExportedDataset, folder: Path) -> None:
     Raises
     ------
     InputError
-        If the frames are of odd size or the rate no whole number.
+        If the frames are of odd size or the rate no whole number, or a clip does not know its brake pressure.
     """
     camera, rate = dataset.camera, dataset.frame_rate_hz
     if camera.width % 2 or camera.height % 2 or rate != round(rate):
@@ -54,10 +59,18 @@ def write_lerobot(dataset: ExportedDataset, folder: Path) -> None:
             f"{dataset.layout}: --to lerobot needs frames of even size at a whole number a second; they are"
             f" {camera.width} x {camera.height} at {rate:g}"
         )
+    known = dataset.known_columns
+    if ACTION_COLUMN not in known:
+        raise InputError(
+            f"{dataset.layout}: --to lerobot takes the brake pressure as the action, and the reference traces of this"
+            " dataset do not hold it at every frame: name clips that have it with --clip, or take another format"
+        )
+    state = tuple(name for name in known if name not in NO_STATE)
+    dataset = replace(dataset, rows=sort_by_split(dataset.rows))
     episodes, first, total = [], 0, RunningStatistics()
     for number, clip in enumerate(dataset):
         place = {"chunk_index": number // FILES_PER_CHUNK, "file_index": number % FILES_PER_CHUNK}
-        columns = _collect_columns(clip, number, first, rate)
+        columns = _collect_columns(clip, state, number, first, rate)
         pictures = clip.read_array("rgb")
         data, film = folder / DATA_PATH.format(**place), folder / VIDEO_PATH.format(video_key=CAMERA, **place)
         for file in (data, film):
@@ -73,14 +86,37 @@ def write_lerobot(dataset: ExportedDataset, folder: Path) -> None:
         last = first + len(pictures)
         episodes.append(_describe_episode(clip, number, (first, last), place, rate) | _flatten(own))
         first = last
-    _write_meta(folder, dataset, episodes, total, frames=first)
+    _write_meta(folder, dataset, state, episodes, total, frames=first)
 
 
-def _collect_columns(clip: ExportedClip, number: int, first: int, rate: float) -> dict[str, NDArray[Any]]:
+def sort_by_split(rows: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Return records of clips with those of one split beside each other, splits in the order of their first clip."""
+    splits = list(dict.fromkeys(row["split"] for row in rows))
+    return sorted(rows, key=lambda row: splits.index(row["split"]))
+
+
+def describe_splits(rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """Return the episodes of each split, first and behind the last; those of a grid without splits are ``train``.
+
+    Parameters
+    ----------
+    rows : records of the clips, as `sort_by_split` returns them
+    """
+    ranges, first = {}, 0
+    for split, group in groupby(rows, key=lambda row: row["split"]):
+        last = first + len(list(group))
+        ranges[split or "train"] = f"{first}:{last}"
+        first = last
+    return ranges
+
+
+def _collect_columns(
+    clip: ExportedClip, state: Sequence[str], number: int, first: int, rate: float
+) -> dict[str, NDArray[Any]]:
     frames = clip.frames
     count = np.arange(len(frames["frame"]), dtype=np.int64)
     return {
-        STATE: np.stack([frames[name] for name in STATE_COLUMNS], axis=1).astype(np.float32),
+        STATE: np.stack([frames[name] for name in state], axis=1).astype(np.float32),
         POSE: np.asarray(frames["T_world_rig"], np.float64),
         ACTION: frames[ACTION_COLUMN].astype(np.float32),
         "timestamp": (count / rate).astype(np.float32),
@@ -137,7 +173,7 @@ def _shape_statistics(statistics: RunningStatistics) -> dict[str, dict[str, list
     return rows
 
 
-def _describe_features(dataset: ExportedDataset) -> dict[str, Any]:
+def _describe_features(dataset: ExportedDataset, state: Sequence[str]) -> dict[str, Any]:
     height, width, rate = dataset.camera.height, dataset.camera.width, round(dataset.frame_rate_hz)
     video = {"height": height, "width": width, "codec": "h264", "pix_fmt": "yuv420p", "is_depth_map": False}
     info = {f"video.{key}": value for key, value in (video | {"fps": rate, "channels": 3}).items()}
@@ -148,7 +184,7 @@ def _describe_features(dataset: ExportedDataset) -> dict[str, Any]:
             "names": ["height", "width", "channels"],
             "info": info | {"has_audio": False},
         },
-        STATE: {"dtype": "float32", "shape": [len(STATE_COLUMNS)], "names": list(STATE_COLUMNS)},
+        STATE: {"dtype": "float32", "shape": [len(state)], "names": list(state)},
         POSE: {
             "dtype": "float64",
             "shape": [16],
@@ -163,6 +199,7 @@ def _describe_features(dataset: ExportedDataset) -> dict[str, Any]:
 def _write_meta(
     folder: Path,
     dataset: ExportedDataset,
+    state: Sequence[str],
     episodes: list[dict[str, Any]],
     total: RunningStatistics,
     frames: int,
@@ -189,9 +226,9 @@ def _write_meta(
             "data_files_size_in_mb": 100,
             "video_files_size_in_mb": 200,
             "fps": round(dataset.frame_rate_hz),
-            "splits": {"train": f"0:{len(episodes)}"},
+            "splits": describe_splits(dataset.rows),
             "data_path": DATA_PATH,
             "video_path": VIDEO_PATH,
-            "features": _describe_features(dataset),
+            "features": _describe_features(dataset, state),
         },
     )

@@ -1,4 +1,4 @@
-"""Minimum, maximum, mean and standard deviation of columns that pass by in blocks; NaN is left out."""
+"""Minimum, maximum, mean and standard deviation of columns of numbers that pass by in blocks."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 @dataclass
 class _Moments:
-    """Of one column: extremes, numbers of values, mean and sum of squared deviations, by component."""
+    """Of one column: number of values, and their extremes, mean and sum of squared deviations by component."""
 
+    number: int
     low: NDArray[np.float64]
     high: NDArray[np.float64]
-    number: NDArray[np.float64]
     mean: NDArray[np.float64]
     squares: NDArray[np.float64]
     frames: int
@@ -31,7 +31,7 @@ class RunningStatistics:
         Parameters
         ----------
         name : of the column
-        values : [N] or [N, components]
+        values : [N] or [N, components], finite; N at least 1
         frames : that the block stands for; None is N [1]
         """
         self._join(
@@ -48,13 +48,13 @@ class RunningStatistics:
         self._columns[name] = block if known is None else _merge(known, block)
 
     def summarise(self) -> dict[str, dict[str, list[Any]]]:
-        """Return min, max, mean, std and count (frames) by column; a component without any number has zeros."""
+        """Return min, max, mean, std and count (frames) by column."""
         return {
             name: {
-                "min": np.where(m.number > 0, m.low, 0.0).tolist(),
-                "max": np.where(m.number > 0, m.high, 0.0).tolist(),
+                "min": m.low.tolist(),
+                "max": m.high.tolist(),
                 "mean": m.mean.tolist(),
-                "std": np.sqrt(m.squares / np.maximum(m.number, 1)).tolist(),
+                "std": np.sqrt(m.squares / m.number).tolist(),
                 "count": [m.frames],
             }
             for name, m in self._columns.items()
@@ -62,27 +62,25 @@ class RunningStatistics:
 
 
 def _measure(values: NDArray[np.float64], frames: int) -> _Moments:
-    known = np.isfinite(values)
-    number = known.sum(axis=0).astype(np.float64)
-    mean = np.where(known, values, 0.0).sum(axis=0) / np.maximum(number, 1)
+    mean = values.mean(axis=0)
     return _Moments(
-        low=np.where(known, values, np.inf).min(axis=0),
-        high=np.where(known, values, -np.inf).max(axis=0),
-        number=number,
+        number=len(values),
+        low=values.min(axis=0),
+        high=values.max(axis=0),
         mean=mean,
-        squares=(np.where(known, values - mean, 0.0) ** 2).sum(axis=0),
+        squares=((values - mean) ** 2).sum(axis=0),
         frames=frames,
     )
 
 
 def _merge(a: _Moments, b: _Moments) -> _Moments:
     number = a.number + b.number
-    share = b.number / np.maximum(number, 1)
+    share = b.number / number
     step = b.mean - a.mean
     return _Moments(
+        number=number,
         low=np.minimum(a.low, b.low),
         high=np.maximum(a.high, b.high),
-        number=number,
         mean=a.mean + step * share,
         squares=a.squares + b.squares + step**2 * a.number * share,
         frames=a.frames + b.frames,

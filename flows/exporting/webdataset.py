@@ -1,9 +1,10 @@
 """WebDataset: one ``.tar`` shard a clip, one sample a frame.
 
 A sample holds ``rgb.png`` (sRGB, as stored), ``arrays.npz`` (depth [m], class and, where the dataset has them, its
-labels, as stored) and ``json`` (the telemetry at the frame with our names, units and signs; the poses ``T_world_rig``
-and ``T_world_camera``). Frames and signs are ours: ISO 8855 for world and rig, pitch positive nose-down; camera axes
-x right, y down, z forward; pixel centres at +0.5. The samples of a shard stand in the order of time.
+labels, as stored) and ``json`` (label and split of the clip; the telemetry at the frame with our names, units and
+signs; the poses ``T_world_rig`` and ``T_world_camera``). Frames and signs are ours: ISO 8855 for world and rig, pitch
+positive nose-down; camera axes x right, y down, z forward; pixel centres at +0.5. The samples of a shard stand in the
+order of time.
 
 Format: https://github.com/webdataset/webdataset, a POSIX tar whose members with one stem are one sample.
 """
@@ -58,6 +59,7 @@ def _describe_frame(clip: ExportedClip, frame: int) -> dict[str, Any]:
     return {
         "label": clip.label,
         "clip_id": clip.clip_id,
+        "split": clip.record["split"],
         "weather": clip.record["scenario"]["weather"],
         "telemetry": clip.read_frame_telemetry(frame),
         "T_world_rig": clip.T_world_rig[frame].tolist(),

@@ -8,9 +8,15 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from flows.exporting.lerobot import CAMERA, STATE_COLUMNS
+from flows.exporting import dataset
+from flows.exporting.export import export_dataset
+from flows.exporting.lerobot import CAMERA, NO_STATE, describe_splits, sort_by_split
 from flows.exporting.running_statistics import RunningStatistics
+from tasks.conventions import TICK_CHANNELS
+from tasks.errors import InputError
 from tests.flows.exporting.conftest import BRAKING, HUMP
+
+STATE_COLUMNS = [channel.name for channel in TICK_CHANNELS if channel.name not in NO_STATE]
 
 
 def test_the_layout_of_version_3_holds_every_value(export, stored):
@@ -52,18 +58,62 @@ def test_the_layout_of_version_3_holds_every_value(export, stored):
     )
 
 
+def test_episodes_stand_in_the_order_of_splits_and_each_split_has_its_range():
+    rows = [
+        {"label": label, "split": split}
+        for label, split in zip("abcde", ("val", "train", "val", "test", "train"), strict=True)
+    ]
+    ordered = sort_by_split(rows)
+    assert [row["label"] for row in ordered] == ["a", "c", "b", "e", "d"]
+    assert describe_splits(ordered) == {"val": "0:2", "train": "2:4", "test": "4:5"}
+
+
+def test_episodes_of_a_grid_without_splits_are_all_for_training(export):
+    info = json.loads((export("lerobot") / "meta/info.json").read_text())
+    assert info["splits"] == {"train": "0:2"}
+
+
+@pytest.fixture
+def traced(monkeypatch) -> set[str]:
+    """Names of columns that every clip is made not to know, as those of a reference trace."""
+    unknown: set[str] = set()
+    read = dataset.ExportedClip._read
+
+    def read_less(clip, *asked):
+        columns = read(clip, *asked)
+        return columns | {name: np.full(len(columns[name]), np.nan) for name in unknown}
+
+    monkeypatch.setattr(dataset.ExportedClip, "_read", read_less)
+    return unknown
+
+
+def test_a_column_that_a_trace_does_not_hold_is_no_part_of_the_state(traced, toy_dataset, tmp_path):
+    traced |= {"wheel_speed_f", "road_height_r"}
+    export_dataset(str(toy_dataset.root), "lerobot", out=str(tmp_path / "out"), clips=[BRAKING])
+    feature = json.loads((tmp_path / "out/meta/info.json").read_text())["features"]["observation.state"]
+    known = [name for name in STATE_COLUMNS if name not in traced]
+    assert (feature["names"], feature["shape"]) == (known, [len(known)])
+    state = pq.read_table(tmp_path / "out/data/chunk-000/file-000.parquet")["observation.state"].to_pylist()
+    assert np.isfinite(state).all() and np.shape(state) == (11, len(known))
+
+
+def test_a_trace_without_brake_pressure_has_no_action_and_is_refused(traced, toy_dataset, tmp_path):
+    traced.add("brake_pressure_mpa")
+    with pytest.raises(InputError, match="the brake pressure as the action"):
+        export_dataset(str(toy_dataset.root), "lerobot", out=str(tmp_path / "out"), clips=[BRAKING])
+
+
 def test_statistics_that_are_added_in_blocks_are_those_of_all_values():
     draw = np.random.default_rng(1)
     values = draw.normal(3, 2, (100, 2))
-    values[5, 1] = np.nan
     blocks = RunningStatistics()
     for part in (values[:1], values[1:60], values[60:]):
         blocks.add("a", part)
     told = blocks.summarise()["a"]
-    np.testing.assert_allclose(told["mean"], np.nanmean(values, axis=0))
-    np.testing.assert_allclose(told["std"], np.nanstd(values, axis=0))
-    np.testing.assert_array_equal(told["min"], np.nanmin(values, axis=0))
-    np.testing.assert_array_equal(told["max"], np.nanmax(values, axis=0))
+    np.testing.assert_allclose(told["mean"], np.mean(values, axis=0))
+    np.testing.assert_allclose(told["std"], np.std(values, axis=0))
+    np.testing.assert_array_equal(told["min"], np.min(values, axis=0))
+    np.testing.assert_array_equal(told["max"], np.max(values, axis=0))
     assert told["count"] == [100]
 
 

@@ -17,6 +17,7 @@ def test_the_reader_gives_back_pictures_labels_telemetry_and_poses(export, store
         clip, frame = stored[(BRAKING, HUMP)[number // 11]], number % 11
         assert sample["__key__"] == f"{clip.clip_id}_{frame:06d}"
         assert (sample["json"]["label"], sample["json"]["clip_id"]) == (clip.label, clip.clip_id)
+        assert sample["json"]["split"] == ""  # as the clips table: the toy grid names none
         np.testing.assert_array_equal(sample["rgb.png"], clip.pixels["rgb"][frame])
         for name in ("depth", "class"):
             np.testing.assert_array_equal(sample["arrays.npz"][name], clip.pixels[name][frame])
