@@ -3,6 +3,7 @@
 from typing import Any
 
 from catalogs.variants import warn_of_variant
+from flows.exporting.camera import describe_camera
 from flows.exporting.dataset import TICK_COLUMNS, ExportedDataset, describe_columns
 
 CARD = "musync-export.json"
@@ -16,7 +17,7 @@ def describe_export(dataset: ExportedDataset, to: str) -> dict[str, Any]:
     dataset : that is exported
     to : name of the format
     """
-    camera, variant = dataset.camera, dataset.plan.settings.variant
+    variant = dataset.plan.settings.variant
     return {
         "format": to,
         "dataset": dataset.name,
@@ -25,14 +26,7 @@ def describe_export(dataset: ExportedDataset, to: str) -> dict[str, Any]:
         "variant": variant,
         **({"warning": warning} if (warning := warn_of_variant(variant)) else {}),
         "frame_rate_hz": dataset.frame_rate_hz,
-        "camera": {
-            "name": camera.name,
-            "width": camera.width,
-            "height": camera.height,
-            "K": camera.K.tolist(),
-            "T_rig_camera": camera.T_rig_camera.tolist(),
-            "distortion": None if camera.distortion is None else camera.distortion.tolist(),
-        },
+        "camera": describe_camera(dataset.camera),
         "columns": describe_columns(TICK_COLUMNS),
         "clips": [
             {

@@ -6,7 +6,8 @@ mask (``iscrowd`` 1). Boxes are x, y, width, height in pixels, from the picture'
 
 Parked cars, lamps, signs, bollards, bins and the letter box of the built-in street are objects. Each has a mask and a
 box of its own (``iscrowd`` 0, categories from 101 on), ``instance_id``, ``visibility``, ``truncation`` (null where too
-little of it is seen). ``objects`` has their 3D boxes in the world, and each image its ``T_world_camera``.
+little of it is seen). ``objects`` has their 3D boxes in the world, each image its ``T_world_camera``, and ``camera`` is
+that of all images, with its lens and shutter.
 
 Format: https://cocodataset.org/#format-data
 """
@@ -19,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flows.exporting.camera import describe_camera
 from flows.exporting.dataset import ExportedDataset
 from flows.exporting.instances import describe_object, find_scene_objects, to_share
 from flows.exporting.json_array import open_array
@@ -73,6 +75,7 @@ def write_coco(dataset: ExportedDataset, folder: Path) -> None:
                 for place, kind in enumerate(KINDS)
             ]
         rest = {
+            "camera": describe_camera(dataset.camera),
             "images": images,
             "categories": categories,
             "info": {"description": f"muSync {dataset.name}", "version": dataset.manifest["run_id"]},

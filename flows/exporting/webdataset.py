@@ -2,9 +2,9 @@
 
 A sample holds ``rgb.png`` (sRGB, as stored), ``arrays.npz`` (depth [m], class and, where the dataset has them, its
 labels, as stored) and ``json`` (label and split of the clip; the telemetry at the frame with our names, units and
-signs; the poses ``T_world_rig`` and ``T_world_camera``). Frames and signs are ours: ISO 8855 for world and rig, pitch
-positive nose-down; camera axes x right, y down, z forward; pixel centres at +0.5. The samples of a shard stand in the
-order of time.
+signs; the poses ``T_world_rig`` and ``T_world_camera``; the camera with its lens and shutter). Frames and signs are
+ours: ISO 8855 for world and rig, pitch positive nose-down; camera axes x right, y down, z forward; pixel centres at
++0.5. The samples of a shard stand in the order of time.
 
 Format: https://github.com/webdataset/webdataset, a POSIX tar whose members with one stem are one sample.
 """
@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from flows.exporting.camera import describe_camera
 from flows.exporting.dataset import ExportedClip, ExportedDataset
 from tasks.render.contact_sheet import encode_png
 
@@ -64,5 +65,5 @@ def _describe_frame(clip: ExportedClip, frame: int) -> dict[str, Any]:
         "telemetry": clip.read_frame_telemetry(frame),
         "T_world_rig": clip.T_world_rig[frame].tolist(),
         "T_world_camera": clip.T_world_camera[frame].tolist(),
-        "K": clip.camera.K.tolist(),
+        "camera": describe_camera(clip.camera),
     }

@@ -2,11 +2,14 @@
 
 import json
 import sys
+import tarfile
 from types import ModuleType
 
 import pytest
 
+from catalogs.cameras import load_camera
 from flows.exporting import export as module
+from flows.exporting.camera import describe_camera
 from flows.exporting.export import export_dataset, import_writer
 from flows.exporting.formats import FORMAT_NAMES, FORMATS
 from manifests.provenance import SOURCE_ROOT
@@ -103,3 +106,21 @@ def test_the_card_names_run_units_camera_and_clips(export, toy_dataset):
     assert card["columns"]["pitch"]["unit"] == "rad"
     assert [clip["label"] for clip in card["clips"]] == [BRAKING, HUMP]
     assert card["camera"]["K"][0] == [80.0, 0.0, 48.0]
+
+
+def test_a_camera_is_described_with_its_lens_and_its_shutter():
+    told = describe_camera(load_camera("dashcam-480x320-rolling"))
+    assert json.loads(json.dumps(told)) == told
+    assert (told["width"], told["height"], told["K"][0]) == (480, 320, [400.0, 0.0, 240.0])
+    # KITTI, D_02 of 2011-09-26, in OpenCV's order k1, k2, p1, p2, k3
+    assert told["distortion"] == [-3.691481e-01, 1.968681e-01, 1.353473e-03, 5.677587e-04, -6.770705e-02]
+    assert (told["line_delay_s"], told["motion_blur"], told["exposure_s"]) == (6.94e-5, True, 0.008)
+
+
+def test_card_samples_and_annotations_describe_the_same_camera(export, toy_dataset):
+    told = describe_camera(load_camera(toy_dataset.inputs / "camera.yaml"))
+    assert json.loads((export("webdataset") / "musync-export.json").read_text())["camera"] == told
+    with tarfile.open(export("webdataset") / "clip-00000.tar") as shard:
+        sample = next(name for name in shard.getnames() if name.endswith(".json"))
+        assert json.load(shard.extractfile(sample))["camera"] == told
+    assert json.loads((export("coco") / "annotations.json").read_text())["camera"] == told
