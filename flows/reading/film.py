@@ -1,6 +1,10 @@
-"""Pictures to H.264 and back; the same pictures give the same bytes."""
+"""Pictures to H.264 and back; the same pictures give the same bytes.
+
+The chroma of H.264 4:2:0 needs an even width and height: a picture of odd size gets its last row or column once more.
+"""
 
 from collections.abc import Iterable, Sequence
+from fractions import Fraction
 from io import BytesIO
 from pathlib import Path
 
@@ -20,14 +24,15 @@ def write_film(
     Parameters
     ----------
     target : file or buffer
-    pictures : uint8 [H, W, 3] sRGB each, of even size [1]
-    frame_rate_hz : [Hz]
+    pictures : uint8 [H, W, 3] sRGB each, of one size
+    frame_rate_hz : a whole number or a fraction, to a thousandth [Hz]
     crf : constant rate factor: 0 is lossless, 51 the worst [1]
     """
     height, width = pictures[0].shape[:2]
+    rate = Fraction(frame_rate_hz).limit_denominator(1000)
     with av.open(str(target) if isinstance(target, Path) else target, "w", format="mp4") as container:
-        stream = container.add_stream("libx264", rate=round(frame_rate_hz))
-        stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
+        stream = container.add_stream("libx264", rate=rate)
+        stream.width, stream.height, stream.pix_fmt = width + width % 2, height + height % 2, "yuv420p"
         # with its macroblock tree, x264 encodes the same small pictures in several ways
         stream.options = {"crf": str(crf), "preset": "medium", "threads": "1", "x264-params": "mbtree=0"}
         for frame in (*_make_frames(pictures), None):
@@ -40,17 +45,22 @@ def through_film(pictures: NDArray[np.uint8], frame_rate_hz: float, crf: int) ->
 
     Parameters
     ----------
-    pictures : uint8 [F, H, W, 3] sRGB, of even size [1]
-    frame_rate_hz : [Hz]
+    pictures : uint8 [F, H, W, 3] sRGB
+    frame_rate_hz : as `write_film` takes it [Hz]
     crf : constant rate factor [1]
     """
     film = BytesIO()
+    height, width = pictures.shape[1:3]
     write_film(film, list(pictures), frame_rate_hz, crf)
     film.seek(0)
     with av.open(film, "r", format="mp4") as container:
-        return np.stack([frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)])
+        return np.stack(
+            [frame.to_ndarray(format="rgb24")[:height, :width] for frame in container.decode(video=0)]
+        )
 
 
 def _make_frames(pictures: Iterable[NDArray[np.uint8]]) -> Iterable[av.VideoFrame]:
     for picture in pictures:
-        yield av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
+        height, width = picture.shape[:2]
+        even = np.pad(picture, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
+        yield av.VideoFrame.from_ndarray(np.ascontiguousarray(even), format="rgb24")

@@ -55,10 +55,10 @@ def add_traces(
 
     Returns
     -------
-    uint8 [H + STRIP_HEIGHT, W, 3]; one row more where that height is odd, as video codecs want it even
+    uint8 [H + STRIP_HEIGHT, W, 3]
     """
-    height, width = picture.shape[:2]
-    strip = np.full((STRIP_HEIGHT + height % 2, width, 3), _PAPER, np.uint8)
+    width = picture.shape[1]
+    strip = np.full((STRIP_HEIGHT, width, 3), _PAPER, np.uint8)
     for k, trace in enumerate(TRACES):
         left, right = k * width // len(TRACES) + 4, (k + 1) * width // len(TRACES) - 4
         values = trace.factor * columns[trace.column]
