@@ -15,6 +15,8 @@ from manifests.records import Manifest
 from tasks.errors import InputError
 
 MANIFEST_FORMAT = "musync-manifest/3"
+TRACES = "traces"
+"""Folder below ``inputs/`` of the traces that a dataset's clips show."""
 _BEFORE_CLIPS = re.compile(rb',"clips":\[(?=\{)')
 _AFTER_CLIPS = b'}],"environment":'
 _SEAL = re.compile(rb',"seal":"([0-9a-f]{64})"\}')
@@ -71,6 +73,16 @@ def _list_pieces(clips: Iterable[Mapping[str, Any]]) -> Iterator[bytes]:
 def is_quarantined(clip: Mapping[str, Any]) -> bool:
     """Whether a clip's record says that its pose check failed; without pictures there was none to fail."""
     return clip["verdict"]["passed"] is False
+
+
+def is_traced(inputs: Iterable[str]) -> bool:
+    """Whether a dataset shows the motion of reference traces, which do not hold every column of the telemetry.
+
+    Parameters
+    ----------
+    inputs : names of its frozen inputs
+    """
+    return any(name.startswith(f"{TRACES}/") for name in inputs)
 
 
 def seal_of(manifest: Mapping[str, Any]) -> str:

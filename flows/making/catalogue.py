@@ -18,9 +18,9 @@ from catalogs.vehicles import load_vehicle
 from catalogs.weather.look import load_weather
 from flows.making.places import find_scene
 from flows.making.plan import read_plan
-from flows.making.traced import FOLDER as TRACES
 from flows.making.traced import Reference
 from flows.store.layout import Layout
+from manifests.manifest import TRACES
 from tasks.eval.motion_agreement import PoseThresholds
 from tasks.render.camera import Camera
 from tasks.render.road_paint import HazardMarking

@@ -11,6 +11,7 @@ from catalogs.scenario import Scenario
 from catalogs.sentences import cap_problems
 from catalogs.surfaces import load_surface
 from flows.making.driving import weather_of
+from manifests.manifest import TRACES, is_traced
 from tasks.errors import InputError
 from tasks.studies.label_ranges import PERCENTILES
 from tasks.surface.state import SurfaceParameters, SurfaceState
@@ -18,8 +19,6 @@ from tasks.surface.weather import surface_state
 from tasks.vehicle.replayed_trace import BEFORE_START, ENDS_STANDING, replay_trace
 from tasks.vehicle.rollout import Rollout
 
-FOLDER = "traces"
-"""Where a dataset keeps the traces that its clips show, below ``inputs/``."""
 CASES = "cases.json"
 
 Reference = Sequence[tuple[ReferenceCase, Traces]]
@@ -57,8 +56,8 @@ def read_trace_inputs(grid: Grid, folder: Path) -> tuple[dict[str, bytes], list[
         if (problem := _find_gap(case.case, traces[case.case], last)) is not None:
             problems.append(f"{folder}: scenario {label}: {problem}")
     rows = [case.model_dump(mode="json", exclude_none=True) for case in used.values()]
-    files = {f"{FOLDER}/{CASES}": json.dumps(rows, indent=1, sort_keys=True).encode() + b"\n"}
-    files |= {f"{FOLDER}/{name}.parquet": trace_file(folder, name).read_bytes() for name in used}
+    files = {f"{TRACES}/{CASES}": json.dumps(rows, indent=1, sort_keys=True).encode() + b"\n"}
+    files |= {f"{TRACES}/{name}.parquet": trace_file(folder, name).read_bytes() for name in used}
     return ({} if problems else files), cap_problems(problems)
 
 
@@ -96,16 +95,6 @@ def unknown_ranges() -> dict[str, float]:
     """Return the label ranges of a clip whose car cannot be driven on another surface: not represented."""
     names = ("surface_friction", "stopping_distance", "peak_pitch")
     return {f"{name}_p{percentile:02d}": float("nan") for name in names for percentile in PERCENTILES}
-
-
-def is_traced(inputs: Iterable[str]) -> bool:
-    """Return whether a dataset shows the motion of traces.
-
-    Parameters
-    ----------
-    inputs : names of its frozen inputs
-    """
-    return any(name.startswith(f"{FOLDER}/") for name in inputs)
 
 
 def refuse_traced(inputs: Iterable[str], place: object, command: str) -> None:

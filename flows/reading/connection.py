@@ -13,6 +13,7 @@ from flows.reading.table_files import SCHEME, TableFiles, table_files
 from flows.store.address import open_for_reading, want_telemetry
 from flows.store.layout import Layout
 from flows.store.sealed import read_manifest_head
+from manifests.manifest import is_traced
 from tasks.conventions import CHECK_CHANNELS
 from tasks.errors import InputError
 
@@ -56,7 +57,7 @@ def connect_sealed(
     Queries reach the recorded tables and nothing else: no file, network, extension or Python variable. They use at most
     half of the machine's memory, and none of its disk: a query that needs more ends with an error.
     """
-    tables = table_files(layout, manifest)
+    tables, traced = table_files(layout, manifest), is_traced(manifest["inputs"])
     connection = duckdb.connect(config=_SETTINGS if allow_files else _SETTINGS | _CLOSED)
     paths = {name: path for names in tables.values() for name, path in names.items()}
     connection.register_filesystem(TableFiles(paths))
@@ -67,7 +68,7 @@ def connect_sealed(
     try:
         for table, names in tables.items():
             connection.execute(
-                f"CREATE VIEW {table} AS SELECT {_select_columns(table, next(iter(names.values())))} FROM"
+                f"CREATE VIEW {table} AS SELECT {_select_columns(table, next(iter(names.values())), traced)} FROM"
                 f" read_parquet({_format_list(map(_make_address, names))},"
                 f" hive_partitioning = {table in {'ticks', 'frames'}})"
             )
@@ -82,12 +83,15 @@ def connect_sealed(
     return connection
 
 
-def _select_columns(table: str, first: Path) -> str:
-    """All columns, with NaN as NULL: SQL's aggregates leave NULL out, and would return NaN for NaN."""
+def _select_columns(table: str, first: Path, traced: bool) -> str:
+    """All columns, with NaN as NULL: SQL's aggregates leave NULL out, and would return NaN for NaN.
+
+    Of a car that was driven every tick has every number, and the largest table is read as it is.
+    """
     schema = pq.read_schema(first)
     if len(schema) > MOST_COLUMNS:
         raise pa.ArrowInvalid(f"{table} must have at most {MOST_COLUMNS} columns; it has {len(schema)}")
-    if table == "ticks":  # every tick has every number
+    if table == "ticks" and not traced:
         return "*"
     floats = [field.name for field in schema if str(field.type) == "double"]
     nulls = ", ".join(f"nullif({name}, 'nan'::DOUBLE) AS {name}" for name in map(quote_identifier, floats))

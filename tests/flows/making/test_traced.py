@@ -17,6 +17,7 @@ from flows.auditing.lineage import trace_lineage
 from flows.judging.controls import run_controls
 from flows.judging.physics import audit_physics, clip_columns, clip_facts
 from flows.making.request import make_dataset
+from flows.reading.query import query_dataset
 from tasks.errors import InputError
 from tasks.eval.state_agreement import WHEELS
 from tasks.vehicle.replayed_trace import replay_trace
@@ -77,6 +78,13 @@ def test_a_clip_shows_the_motion_of_its_trace_and_is_made_again_without_it(trace
     for path in (traced.parent / "traces").iterdir():
         path.unlink()
     assert audit_dataset(str(traced), share=1.0, runner="threads", workers=1)["verified"]
+
+
+def test_what_a_trace_does_not_hold_is_null_in_sql(traced: Path) -> None:
+    ask = "SELECT count(tyre_force_f) AS known, count(*) FILTER (tyre_force_f > 0) AS braking, count(*) AS rows FROM"
+    for view, rows in (("ticks", 801), ("frames", 9)):
+        (told,) = query_dataset(str(traced), f"{ask} {view}")["rows"]
+        assert told == {"known": 0, "braking": 0, "rows": rows}
 
 
 def test_commands_that_drive_a_clip_again_refuse_it(traced: Path) -> None:
