@@ -6,6 +6,9 @@ from typing import Any
 
 from flows.running.terminal import escape_controls, open_console, print_lines
 
+LEAST_WIDTH = 12
+"""To which a column is folded where a table is too wide [characters]."""
+
 
 def print_json(value: dict[str, Any]) -> None:
     """Print a result as JSON."""
@@ -22,25 +25,49 @@ def print_result(value: dict[str, Any]) -> None:
 
 
 def _print_table(title: str, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Print a table; one of few rows that is too wide for the terminal lies on its side, a line a column."""
+    """Print a table so that every column can be read.
+
+    One that is too wide for the terminal lies on its side, a line a column, where its rows are few; else its long
+    values are folded, or it comes in blocks of columns, each with the first one.
+    """
     # its import takes longer than many a command
-    from rich.measure import Measurement
     from rich.table import Table
 
     console = open_console()
-    names = [escape_controls(name) for name in rows[0]]
-    lines = [[_format_value(row.get(name)) for name in rows[0]] for row in rows]
-    table = Table(*names, title=title, title_justify="left")
-    for line in lines:
-        table.add_row(*line)
-    unfolded = console.options.update(width=10_000)
-    if len(rows) < len(names) and Measurement.get(console, unfolded, table).maximum > console.width:
-        table = Table(title=title, title_justify="left", show_header=False)
-        for cells in zip(names, *lines, strict=True):
-            table.add_row(*cells)
-    for column in table.columns:
-        column.overflow = "fold"
-    console.print(table)
+    columns = [[escape_controls(name), *(_format_value(row.get(name)) for row in rows)] for name in rows[0]]
+    lines = [list(line) for line in zip(*columns, strict=True)]
+    upright, blocks = True, [columns]
+    if _measure(columns) > console.width:
+        if len(rows) < len(columns) and _measure(lines, LEAST_WIDTH) <= console.width:
+            upright, blocks = False, [lines]
+        elif _measure(columns, LEAST_WIDTH) > console.width:
+            blocks = _part_columns(columns, console.width)
+    for block in blocks:
+        table = Table(title=title, title_justify="left", show_header=upright)
+        for head, *_ in block:
+            table.add_column(head if upright else "", overflow="fold")
+        for line in list(zip(*block, strict=True))[upright:]:
+            table.add_row(*line)
+        console.print(table)
+
+
+def _measure(columns: Sequence[Sequence[str]], folded: int | None = None) -> int:
+    """Characters across a table, whose columns may be folded to a least width."""
+    from rich.cells import cell_len
+
+    widths = [max(map(cell_len, column)) for column in columns]
+    return 1 + sum(3 + (width if folded is None else min(width, folded)) for width in widths)
+
+
+def _part_columns(columns: list[list[str]], room: int) -> list[list[list[str]]]:
+    """Blocks of columns that have room beside each other, the first column in all of them."""
+    blocks = [columns[:2]]
+    for column in columns[2:]:
+        if _measure([*blocks[-1], column]) <= room:
+            blocks[-1].append(column)
+        else:
+            blocks.append([columns[0], column])
+    return blocks
 
 
 def _format_value(value: Any) -> str:

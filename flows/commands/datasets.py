@@ -61,9 +61,22 @@ def shorten_description(result: dict[str, Any]) -> dict[str, Any]:
     return result | {"clips": clips}
 
 
+MOST_ROWS = 100
+"""Rows of an answer that are printed [1]; of a longer one, the first and the last `SHOWN_ROWS`."""
+SHOWN_ROWS = 20
+
+
 def select_answer(result: dict[str, Any]) -> dict[str, Any]:
-    """Return the rows of an answer, or the file that holds them and how many they are."""
-    return {key: result[key] for key in ("file", "row_count", "rows") if key in result}
+    """Return the rows of an answer, of a long one its ends, or the file that holds them and how many they are."""
+    chosen: dict[str, Any] = {key: result[key] for key in ("file", "row_count", "rows") if key in result}
+    count = len(chosen.get("rows", ()))
+    if count <= MOST_ROWS:
+        return chosen
+    gap = dict.fromkeys(result["columns"], "...")
+    return {
+        "rows": [*chosen["rows"][:SHOWN_ROWS], gap, *chosen["rows"][-SHOWN_ROWS:]],
+        "left out": f"{count - 2 * SHOWN_ROWS:,} of {count:,} rows; --to csv --out FILE writes all of them",
+    }
 
 
 COMMANDS = (

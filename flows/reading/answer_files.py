@@ -4,6 +4,7 @@ import csv
 import json
 import math
 from collections.abc import Sequence
+from decimal import Decimal
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -46,9 +47,9 @@ def open_answer_file(to: str | None, out: str | None) -> Outputs | None:
 
 
 def format_csv(names: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
-    """Return CSV: numbers in the shortest form that reads back to the same double, lists as JSON.
+    """Return CSV: numbers in the shortest form that reads back to the same double, lists and structures as JSON.
 
-    NULL and numbers that are not finite are empty.
+    NULL and numbers that are not finite are empty; decimals keep all their digits.
 
     Text that a spreadsheet would take for a formula gets an apostrophe in front, as in the CSV of ``musync report``.
 
@@ -72,16 +73,22 @@ def format_parquet(table: pa.Table) -> memoryview:
 
 
 def make_plain(value: Any) -> Any:
-    """Return a value that JSON has; other values as text."""
+    """Return a value that JSON has: a decimal as a number, a structure or map as an object; other values as text."""
     if isinstance(value, float) and not math.isfinite(value):
         return None
+    if isinstance(value, Decimal):
+        return int(value) if value == value.to_integral_value() else float(value)
+    if isinstance(value, dict):
+        return {str(make_plain(key)): make_plain(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
         return [make_plain(entry) for entry in value]
     return value if isinstance(value, bool | int | float | str | None) else str(value)
 
 
 def _format_cell(value: Any) -> Any:
-    if isinstance(value, bool | list | tuple):
+    if isinstance(value, Decimal):
+        return value
+    if isinstance(value, bool | list | tuple | dict):
         return json.dumps(make_plain(value))
     if isinstance(value, str) and value.startswith(_FORMULA):
         return f"'{value}"

@@ -2,7 +2,7 @@
 
 import re
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from typing import Any, TypeVar
 
@@ -66,8 +66,9 @@ def query_dataset(
 
     Returns
     -------
-    ``columns[]`` and ``rows[]``, each a mapping of column to value; NULL is None. With ``to``: ``file``, ``columns[]``
-    and the number of rows, ``row_count``.
+    ``columns[]`` and ``rows[]``, each a mapping of column to value; NULL is None. Of columns with one name the second
+    is called ``name_1``, as in ``data.sql(...).df()``. With ``to``: ``file``, ``columns[]`` and the number of rows,
+    ``row_count``.
 
     Raises
     ------
@@ -83,14 +84,31 @@ def query_dataset(
             names, rows = run_interruptibly(connection, lambda: fetch(connection, query))
         except duckdb.Error as error:
             raise refused_query(query, error, "--allow-files") from None
+    names = number_repeats(names)
     if file is None:
         return {
             "columns": names,
             "rows": [dict(zip(names, map(make_plain, row), strict=True)) for row in rows],
         }
     (name,) = file.names
-    file.write(name, format_parquet(rows) if to == "parquet" else format_csv(names, rows))
+    file.write(
+        name, format_parquet(rows.rename_columns(names)) if to == "parquet" else format_csv(names, rows)
+    )
     return {"file": str(file.path(name)), "columns": names, "row_count": len(rows)}
+
+
+def number_repeats(names: Sequence[str]) -> list[str]:
+    """Return names of which no two are the same to SQL, which knows no case: a, A and a become a, A_1 and a_2."""
+    told: list[str] = []
+    repeats: dict[str, int] = {}
+    for name in names:
+        unique, known = name, name.casefold()
+        while unique.casefold() in repeats:
+            repeats[known] += 1
+            unique = f"{name}_{repeats[known]}"
+        repeats[unique.casefold()] = 0
+        told.append(unique)
+    return told
 
 
 def refuse_several(connection: duckdb.DuckDBPyConnection, query: str, *, allow_files: bool) -> None:

@@ -8,6 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import flows.reading.query
+import musync
 from flows.reading.query import query_dataset
 from tasks.errors import InputError
 from tests.flows.shell import run_command
@@ -46,6 +47,47 @@ def test_parquet_keeps_types_and_csv_writes_null_empty_lists_as_json_and_formula
     kinds = [str(kind).split("<")[0] for kind in schema.types]
     assert kinds == ["double", "list", "decimal128(2, 1)", "date32[day]", "bool", "string", "string"]
     assert schema.names[5] == "+f"
+
+
+def test_decimals_are_numbers_and_structures_are_json(toy_dataset, tmp_path):
+    query = (
+        "SELECT 0.4 AS d, 2::DECIMAL(9, 0) AS w, {'a': 0.5, 'b': ['x', NULL]} AS s, MAP {1: 'nan'::DOUBLE} AS m,"
+        " 12345678901234567890.123456789::DECIMAL(38, 9) AS long"
+    )
+    (row,) = query_dataset(str(toy_dataset.root), query)["rows"]
+    structures = {"s": {"a": 0.5, "b": ["x", None]}, "m": {"1": None}}
+    assert row == {"d": 0.4, "w": 2, **structures, "long": 12345678901234567890.123456789}
+    assert isinstance(row["w"], int) and isinstance(row["d"], float)
+    query_dataset(str(toy_dataset.root), query, to="csv", out=str(tmp_path / "a.csv"))
+    with (tmp_path / "a.csv").open(newline="") as stream:
+        (written,) = csv.DictReader(stream)
+    assert (written["d"], written["w"], written["long"]) == ("0.4", "2", "12345678901234567890.123456789")
+    assert {name: json.loads(written[name]) for name in structures} == structures
+
+
+def test_columns_of_one_name_are_numbered_as_in_a_pandas_frame_and_none_is_lost(toy_dataset, tmp_path):
+    query = "SELECT 1 AS a, 2 AS a, 3 AS a, 4 AS a_1, 5 AS A, 6 AS b"
+    names = musync.open(toy_dataset.root).sql(query).df().columns.tolist()
+    assert names == ["a", "a_1", "a_2", "a_1_1", "A_3", "b"]
+    answer = query_dataset(str(toy_dataset.root), query)
+    assert answer == {"columns": names, "rows": [dict(zip(names, range(1, 7), strict=True))]}
+    for to, read in (("csv", pd.read_csv), ("parquet", pd.read_parquet)):
+        told = query_dataset(str(toy_dataset.root), query, to=to, out=str(tmp_path / f"a.{to}"))
+        assert told["columns"] == names
+        assert read(tmp_path / f"a.{to}").to_dict("records") == answer["rows"]
+
+
+def test_a_long_answer_prints_its_ends_and_says_how_to_get_the_rest(toy_dataset, monkeypatch, capsys):
+    words = ("sql", str(toy_dataset.root), "SELECT range AS n FROM range(5000)")
+    assert run_command(monkeypatch, *words) == 0
+    shown = capsys.readouterr().out
+    assert "left out: 4,960 of 5,000 rows; --to csv --out FILE writes all of them" in shown
+    printed = [int(word) for word in shown.split("left out")[0].split() if word.isdigit()]
+    assert printed == [*range(20), *range(4980, 5000)]
+    assert run_command(monkeypatch, *words, "--json") == 0
+    assert len(json.loads(capsys.readouterr().out)["rows"]) == 5000
+    assert run_command(monkeypatch, *words[:2], "SELECT range AS n FROM range(100)") == 0
+    assert "left out" not in capsys.readouterr().out
 
 
 def test_its_own_file_is_written_again_and_a_strangers_never(toy_dataset, tmp_path):

@@ -63,6 +63,31 @@ def test_a_table_too_wide_for_the_terminal_lies_on_its_side_and_cuts_no_number(c
     assert any("drive" in line and "events" in line for line in lines), "a small one stands upright"
 
 
+def test_a_table_of_many_rows_and_columns_comes_in_blocks_that_cut_no_value(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    rows = [
+        {"clip": f"clip-{n}"} | {f"column_{k}": 100000 + 100 * n + k for k in range(30)} for n in range(40)
+    ]
+    print_result({"rows": rows})
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 80
+    printed = " ".join(lines)
+    assert all(f" {value} " in printed for row in rows for value in row.values())
+    blocks = [line for line in lines if "column_" in line]
+    assert len(blocks) > 3 and all(" clip " in line for line in blocks)
+
+
+def test_a_long_text_is_folded_in_its_place(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "60")
+    print_result({"rows": [{"label": "dry", "file": "x" * 100, "count": 7} for _ in range(4)]})
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 60 and "".join(lines).count("x") == 400
+    assert (
+        sum("label" in line for line in lines) == 1
+        and sum("dry" in line and "7" in line for line in lines) == 4
+    )
+
+
 def test_a_reader_that_leaves_ends_no_run(monkeypatch):
     console = open_console()
     monkeypatch.setattr("flows.running.terminal._silence_stream", lambda stream: None)
