@@ -21,6 +21,7 @@ from flows.making.places import find_scene
 from flows.making.plan import ClipPlan, Plan, read_plan
 from flows.making.traced import refuse_traced
 from flows.reading.query import VIEWS
+from flows.reading.suggestions import suggest_clips
 from flows.store.address import open_for_reading, want_telemetry
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
@@ -168,13 +169,12 @@ def find_clip(plan: Plan, clip: str, dataset: str) -> ClipPlan:
     Raises
     ------
     InputError
-        If there is none; the sentence lists the labels that exist.
+        If there is none, with the labels that come near.
     """
     for planned in plan.clips:
         if clip in (planned.clip_id, planned.label):
             return planned
-    labels = ", ".join(c.label for c in plan.clips[:20])
-    raise InputError(f"{dataset}: no clip {clip!r}; there are {labels}{', ...' * (len(plan.clips) > 20)}")
+    raise suggest_clips(dataset, [clip], [planned.label for planned in plan.clips])
 
 
 def _as_row(step: Step) -> dict[str, Any]:

@@ -306,7 +306,13 @@ COMMANDS = (
                 "New or empty folder for the files; by default DIR-FORMAT, beside the dataset.",
                 None,
             ),
-            CLIPS,
+            define_option(
+                "clips",
+                list[str] | None,
+                "Label or id of a clip, by default every clip that is not in quarantine; may be given more than once.",
+                None,
+                spelling="clip",
+            ),
         ),
     ),
 )

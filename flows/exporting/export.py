@@ -132,8 +132,9 @@ def choose_folder(dataset: str, to: str, out: str | None) -> Path:
     """
     if out is None and is_address(dataset):
         raise InputError("--out: must name a folder where the dataset lies in an object store")
-    folder = Path(f"{dataset.rstrip('/')}-{to}" if out is None else out)
-    if not is_address(dataset) and folder.resolve().is_relative_to(Path(dataset).resolve()):
+    place = Path(dataset).resolve()
+    folder = place.with_name(f"{place.name}-{to}") if out is None else Path(out)
+    if not is_address(dataset) and folder.resolve().is_relative_to(place):
         raise InputError(
             f"--out {folder}: must lie outside the dataset, whose files are all recorded; name another folder"
         )

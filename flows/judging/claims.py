@@ -16,6 +16,12 @@ LARGEST_CLAIM = 2**28
 """Bytes of a claim [1]."""
 CLAIMED = {"t_ns": "ns", "time": "s", "pitch": "rad", "station": "m", "speed": "m/s"}
 """Columns of a claim that are read, and their units."""
+NEEDED = {
+    "a column t_ns or time": {"t_ns", "time"},
+    "the column pitch [rad]": {"pitch"},
+    "a column station [m] or speed [m/s]": {"station", "speed"},
+}
+"""Columns of which a claim needs one each."""
 LARGEST_MOTION = 1e8
 """Farthest station [m], and greatest speed [m/s], that a claim may hold."""
 
@@ -31,14 +37,12 @@ def read_claim(path: Path) -> VideoClaim:
     content = read_content(path, "claim", LARGEST_CLAIM)
     columns, units = parse_columns(content, f"{path}: the claim", CLAIMED)
     problems = find_unit_problems(units, CLAIMED, str(path))
-    if not columns.keys() & {"t_ns", "time"}:
+    lacks = [name for name, wanted in NEEDED.items() if not columns.keys() & wanted]
+    if lacks:
+        there = ", ".join(pq.read_schema(pa.BufferReader(content)).names)
         problems.append(
-            f"{path}: the claim lacks a column t_ns or time; it has {shorten(', '.join(columns))}."
+            f"{path}: the claim lacks {', '.join(lacks)}; its columns are {shorten(there) or 'none'}."
         )
-    if "pitch" not in columns:
-        problems.append(f"{path}: the claim lacks the column pitch [rad].")
-    if not columns.keys() & {"station", "speed"}:
-        problems.append(f"{path}: the claim lacks a column station [m] or speed [m/s].")
     if (clips := _clip_count(path, content)) > 1:
         problems.append(f"{path}: the claim holds {clips} clips; give one clip's rows.")
     if problems:

@@ -27,7 +27,7 @@ from flows.making.driving import (
 )
 from flows.making.edited_scene import edit_scene
 from flows.making.places import remember_place
-from flows.making.plan import TICK_RATE_HZ, Plan, read_plan
+from flows.making.plan import TICK_RATE_HZ, Plan, frame_ticks, read_plan
 from flows.making.traced import replay_drive, unknown_ranges
 from flows.store.address import find_local, send_files
 from flows.store.frames import buffer_hash, write_clip
@@ -141,7 +141,7 @@ def move_car(scenario: Scenario, plan: Plan, catalogue: Catalogue) -> tuple[Surf
 def frame_rows(ride: Rollout, plan: Plan, catalogue: Catalogue) -> dict[str, NDArray[Any]]:
     """The tick that each frame shows, and the rig pose at it."""
     frame = np.arange(plan.settings.frames)
-    tick = np.rint(frame * TICK_RATE_HZ / plan.settings.frame_rate_hz).astype(np.int64)
+    tick = frame_ticks(plan.settings.frames, plan.settings.frame_rate_hz)
     rows = {"frame": frame, "tick": tick} | {name: column[tick] for name, column in ride.columns.items()}
     vehicle = catalogue.vehicle
     poses = body_poses(

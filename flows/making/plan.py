@@ -8,6 +8,9 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from catalogs.grids import FaultyGrid, Grid, GridFile, load_grid
 from catalogs.scenario import Scenario
 from catalogs.vehicles import vehicle_provenance
@@ -25,6 +28,17 @@ TICK_RATE_HZ = 1000
 _AS_WRITTEN: dict[str, Any] = {"indent": 1, "sort_keys": True, "allow_nan": False, "ensure_ascii": False}
 _HELD: dict[Path, "Plan"] = {}
 """Plans of the runs of this process, which it need not read again."""
+
+
+def frame_ticks(frames: int, frame_rate_hz: float) -> NDArray[np.int64]:
+    """Return the tick that each frame shows [frames]: the nearest whole millisecond.
+
+    Parameters
+    ----------
+    frames : of a clip [1]
+    frame_rate_hz : [Hz]
+    """
+    return np.rint(np.arange(frames) * TICK_RATE_HZ / frame_rate_hz).astype(np.int64)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from catalogs.sentences import shorten
 from flows.reading.arguments import is_whole
-from flows.reading.suggestions import suggest_names
+from flows.reading.suggestions import suggest_clips
 from tasks.errors import InputError
 
 if TYPE_CHECKING:
@@ -115,5 +115,5 @@ def find_clip(rows: Sequence[Mapping[str, Any]], name: object, place: object) ->
     """
     found = next((row for row in rows if name in (row["label"], row["clip_id"])), None)
     if found is None:
-        raise suggest_names(f"{place}: clip", [name], [row["label"] for row in rows], "list(data)")
+        raise suggest_clips(place, [name], [row["label"] for row in rows], "list(data)")
     return found

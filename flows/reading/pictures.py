@@ -53,7 +53,8 @@ def _refuse_missing(layout: Layout, manifest: Mapping[str, Any]) -> None:
 
 
 def open_labelled_frames(layout: Layout, manifest: Mapping[str, Any]) -> Any:
-    """Return the frames as a lazy xarray dataset, its clips by label and its frames with their time.
+    """Return the frames as a lazy xarray dataset, its clips by label and its frames with the time
+    of the tick that they show.
 
     Parameters
     ----------
@@ -68,6 +69,9 @@ def open_labelled_frames(layout: Layout, manifest: Mapping[str, Any]) -> Any:
         import xarray
     except ImportError:
         raise InputError("xarray is not installed: pip install 'musync-gs[analysts]'") from None
+    # it imports what makes clips, which a query need not wait for
+    from flows.making.plan import TICK_RATE_HZ, frame_ticks
+
     try:
         pixels = xarray.open_zarr(
             open_frames_store(layout, manifest),
@@ -81,7 +85,7 @@ def open_labelled_frames(layout: Layout, manifest: Mapping[str, Any]) -> Any:
             f"{layout}/frames.zarr: {shorten(error)}: musync verify says whether it is damaged"
         ) from None
     clips, time = manifest["clips"], CHANNELS_BY_NAME["t_ns"]
-    seconds = [frame / manifest["grid"]["frame_rate_hz"] for frame in range(pixels.sizes["frame"])]
+    seconds = frame_ticks(pixels.sizes["frame"], manifest["grid"]["frame_rate_hz"]) / TICK_RATE_HZ
     units = {"standard_name": time.standard_name, "long_name": time.description, "units": "s"}
     return pixels.assign_coords(
         clip=[clip["label"] for clip in clips],

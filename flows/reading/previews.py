@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from flows.making.plan import Plan
 from flows.reading.film import write_film
+from flows.reading.suggestions import suggest_clips
 from flows.running.progress import progress_bar
 from flows.store.address import open_for_reading
 from flows.store.frames import read_clip
@@ -103,9 +104,7 @@ def select_clips(
     """
     unknown = set(names) - {row[key] for row in rows for key in ("label", "clip_id")}
     if unknown:
-        raise InputError(
-            [f"{dataset}: no clip {name!r}; musync describe lists them" for name in sorted(unknown)]
-        )
+        raise suggest_clips(dataset, sorted(unknown), [row["label"] for row in rows])
     return [row for row in rows if row["label"] in names or row["clip_id"] in names]
 
 

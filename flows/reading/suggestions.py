@@ -24,6 +24,21 @@ def suggest_names(what: str, wrong: Sequence[object], known: Sequence[str], list
     return InputError(cap_problems([_describe(what, name, known, lister) for name in wrong]))
 
 
+def suggest_clips(
+    place: object, wrong: Sequence[object], labels: Sequence[str], lister: str = "musync describe"
+) -> InputError:
+    """Return the error for clips that a dataset does not have, one sentence each.
+
+    Parameters
+    ----------
+    place : what messages call the dataset
+    wrong : labels or ids as the user gave them
+    labels : of its clips
+    lister : how to see them all
+    """
+    return suggest_names(f"{place}: clip", wrong, labels, lister)
+
+
 def _describe(what: str, name: object, known: Sequence[str], lister: str) -> str:
     near = get_close_matches(str(name)[:200], known[:MOST_COMPARED], n=_SHOWN, cutoff=0.5)
     listed = ", ".join(shorten(other, 60) for other in near or known[:_SHOWN])

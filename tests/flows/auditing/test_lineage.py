@@ -131,7 +131,7 @@ def test_telemetry_that_does_not_follow_is_told(kept, tmp_path, quick):
 
 
 def test_changed_entries_and_an_unknown_clip_are_refused_in_sentences(kept, tmp_path):
-    with pytest.raises(InputError, match="no clip 'moon'; there are dry/flat"):
+    with pytest.raises(InputError, match="clip 'moon': there is none of this name; the first: dry/flat"):
         trace_lineage(str(kept.root), "moon")
     copy = Layout(tmp_path / "broken")
     shutil.copytree(kept.root, copy.root)

@@ -14,6 +14,7 @@ import pytest
 from benchmarks.synthetic_street import Clip, drive_clip
 from catalogs.gates import load_foreign_gates
 from flows.judging import foreign_sources
+from flows.judging.claims import read_claim
 from flows.judging.foreign import judge_video, measure_retention
 from flows.judging.foreign_sources import (
     LEVEL,
@@ -178,6 +179,16 @@ def test_all_wrong_inputs_are_told_at_once(tmp_path: Path) -> None:
         )
     told = "\n".join(caught.value.problems)
     assert "no such file" in told and "lacks the column pitch" in told and "fx must be a number" in told
+
+
+def test_a_claim_without_its_columns_is_told_which_it_has(tmp_path: Path) -> None:
+    pq.write_table(pa.table({"t": [0.0, 1.0], "theta": [0.0, 0.0]}), tmp_path / "claim.parquet")
+    with pytest.raises(InputError) as caught:
+        read_claim(tmp_path / "claim.parquet")
+    assert caught.value.problems == (
+        f"{tmp_path}/claim.parquet: the claim lacks a column t_ns or time, the column pitch [rad], a column station [m]"
+        " or speed [m/s]; its columns are t, theta.",
+    )
 
 
 def test_a_short_wrong_swing_is_not_hidden_by_a_long_quiet_clip() -> None:

@@ -15,6 +15,7 @@ import pytest
 from torch.utils.data import DataLoader
 
 import musync
+from flows.reading.pictures import open_labelled_frames
 from flows.reading.query import VIEWS, list_columns, query_dataset
 from flows.store.frames import read_clip
 from manifests.provenance import SOURCE_ROOT
@@ -78,6 +79,14 @@ def test_xarray_reads_frames_lazily_with_named_dimensions(data, toy_dataset):
     assert str(same.clip_id.values) == data.manifest["clips"][1]["clip_id"]
     assert (float(same.t), same.t.attrs["units"]) == (0.3, "s")
     assert data.xarray()["depth"].attrs["units"] == "m"
+
+
+def test_the_time_of_a_frame_in_xarray_is_that_of_its_tick(toy_dataset, monkeypatch):
+    pytest.importorskip("xarray", reason="xarray is optional")
+    manifest = json.loads(toy_dataset.manifest.read_text())
+    monkeypatch.setitem(manifest["grid"], "frame_rate_hz", 30)
+    seconds = open_labelled_frames(toy_dataset, manifest)["t"].values
+    assert seconds[:4].tolist() == [0.0, 0.033, 0.067, 0.1]
 
 
 def test_xarray_by_itself_opens_the_frames_without_a_warning(toy_dataset, recwarn):

@@ -73,5 +73,5 @@ def test_the_page_does_not_go_among_other_files_nor_into_the_dataset(toy_dataset
         make_report(str(toy_dataset.root), out=str(tmp_path))
     with pytest.raises(InputError, match="outside the dataset"):
         make_report(str(toy_dataset.root), out=str(toy_dataset.root / "report"))
-    with pytest.raises(InputError, match="no clip 'moon'"):
+    with pytest.raises(InputError, match="clip 'moon': there is none of this name"):
         make_report(str(toy_dataset.root), clips=["moon"])
