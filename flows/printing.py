@@ -16,10 +16,12 @@ def print_json(value: dict[str, Any]) -> None:
 
 
 def print_result(value: dict[str, Any]) -> None:
-    """Print a result: a line for each value, a table where the value is a list of rows."""
+    """Print a result: a line for each value and each sentence of a list, a table where it is a list of rows."""
     for key, entry in value.items():
         if isinstance(entry, list) and entry and isinstance(entry[0], dict):
             _print_table(key, entry)
+        elif isinstance(entry, list) and any(isinstance(item, str) and ", " in item for item in entry):
+            print_lines(f"{key}:", *(f"  - {_format_value(item)}" for item in entry))
         else:
             print_lines(f"{key}: {_format_value(entry)}")
 

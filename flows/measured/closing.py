@@ -181,10 +181,10 @@ def _number_json(
 
 
 def _say_own_numbers(outcome: SearchOutcome | JointOutcome, library: Sequence[Effect]) -> str:
-    """Return what the numbers that the file hardly knew say of the car, else the one that the runs pull most."""
+    """Return what the numbers that the file hardly knew say of the car, else, beside no name, the one pulled most."""
     if outcome.calibrated:
         return join_phrases(say_effect(effect, library) for effect in outcome.calibrated)
-    if isinstance(outcome, JointOutcome):
+    if isinstance(outcome, JointOutcome) or outcome.verdict.effects:
         return ""
     base = outcome.end.base
     place = int(np.argmax(base.pulls))

@@ -44,7 +44,7 @@ def tell_verdict(
     error, manoeuvres : on runs to which no number was fitted
     suggested : what the training runs show and the held-out runs neither confirm nor contradict, if nothing is named
     misses : whether the runs disagree with the model, and with what is named, by more than their noise
-    own : what the vehicle's own numbers that the runs move most say of the car
+    own : what the vehicle's own numbers that the runs moved say of the car
     """
     if not effects and suggested is not None:
         return (
@@ -59,30 +59,33 @@ def tell_verdict(
         )
         if not own or not is_lowered(error["speed"]) or not _is_told_apart(error["speed"]):
             return f"{nothing}."
-        figures = {name: e for name, e in manoeuvres.items() if is_lowered(e)}
         return (
             f"{nothing}; its own numbers, fitted to these runs ({own}), take the error"
-            f" {_say_errors({'speed': error['speed'], **figures})}, on runs to which no number was fitted."
+            f" {_say_errors({'speed': error['speed'], **manoeuvres})}, on runs to which no number was fitted."
         )
     told = [say_effect(effect, library) for effect in effects]
     text = join_phrases(told)
-    # a form of another shape at the same port reads the same
-    others = [said for rival in rivals if (said := say_effect(rival, library)) not in told]
+    # a form of another shape at the same port reads the same, and one effect may be the rival of two names
+    said = dict.fromkeys(say_effect(rival, library) for rival in rivals)
+    others = [other for other in said if other not in told]
     if others:
         choice = others[0] if len(others) == 1 else f"one of {len(others)} other explanations holds"
-        text += f", or {choice}, which these runs cannot tell apart"
+        place = "" if len(told) == 1 else " in the place of one of these"
+        text += f", or {choice}{place}, which these runs cannot tell apart"
     figures = {"speed": error["speed"], **manoeuvres}
     if not any(moves_speed(effect.effect_class, effect.variable) for effect in effects):
         # an instrument's own channel says what its error does; the car moves as before
         missed = [name for name, e in error.items() if e.frozen > 0.0]
-        own = min(missed, key=lambda name: error[name].after / error[name].frozen)
-        figures = {own: error[own]}
+        felt = min(missed, key=lambda name: error[name].after / error[name].frozen)
+        figures = {felt: error[felt]}
     elif all(e.after >= e.retuned for e in figures.values()):
         # what a name is worth stands in another channel
         worth = min(error, key=lambda name: error[name].after / max(error[name].retuned, 1e-12))
         figures = {worth: error[worth]} | figures
     moved = _say_errors(figures, retuned=True)
     how = "that takes" if len(told) == 1 else "together they take"
+    if own:
+        how = f"with the vehicle's own numbers fitted too ({own}), {how}"
     rest = " The speed is still missed by more than its noise: more is lacking than that." if misses else ""
     done = f"{how} the error {moved}, on runs to which no number was fitted."
     return f"{text[0].upper()}{text[1:]}; {done}{rest}"

@@ -15,6 +15,7 @@ from tasks.identification.joint.elimination import eliminate_uncertain_numbers, 
 from tasks.identification.joint.fit import JointFit, lead_offsets
 from tasks.identification.joint.stops import Stop, predict_stop
 from tasks.identification.joint.substitutes import Substitute
+from tasks.identification.joint.uncertainty import measure_certainty
 from tasks.identification.rules import DecisionRules, JointRules
 
 
@@ -104,6 +105,32 @@ def drop_contradicted_rivals(
         for rival in rivals
         if named >= rules.better_prediction_share * _held_out_misfit(held_out, rival.fitted)[0]
     )
+
+
+def find_better_substitute(
+    held_out: Sequence[Stop], fitted: JointFit, rivals: Sequence[Substitute], rules: JointRules
+) -> Substitute | None:
+    """Return the rival that explains most, if that is more than the named number does; None without such a one.
+
+    It must be certain itself, and predict the speed of the held-out runs no worse: elimination takes away one of two
+    that stand in for each other while both are free, and may keep the wrong one.
+
+    Parameters
+    ----------
+    held_out : the runs
+    fitted : with what is named
+    rivals : what explains the training runs nearly as well
+    rules : of the joint fit
+    """
+    best = min(rivals, key=lambda rival: rival.fitted.cost, default=None)
+    if best is None or best.fitted.cost >= fitted.cost:
+        return None
+    place = [number.name for number in best.fitted.numbers].index(best.name)
+    number, value = best.fitted.numbers[place], best.fitted.by_name[best.name]
+    certain = measure_certainty(best.fitted, rules)[place] >= 1.0 and not number.is_at_bound(value)
+    if not certain or _held_out_misfit(held_out, best.fitted)[0] > _held_out_misfit(held_out, fitted)[0]:
+        return None
+    return best
 
 
 def _held_out_misfit(held_out: Sequence[Stop], fitted: JointFit) -> tuple[float, float]:

@@ -51,7 +51,12 @@ def name_rivals(
     for other in substitutes:
         number = next(n for n in other.fitted.numbers if n.name == other.name)
         rivals.append((effect_of[other.of], _name_number(other.fitted, number, rules)))
-    grips = [_name_number(fitted, n, rules) for n in fitted.numbers if n.group == FRICTION]
+    named = {effect.name for effect in effects}
+    grips = [
+        _name_number(fitted, n, rules)
+        for n in fitted.numbers
+        if n.group == FRICTION and n.effect.name not in named
+    ]
     curve = {n.effect.name for n in fitted.numbers if n.group == "curve"}
     # tyres at their limit bend the brake's curve too
     return rivals + [(effect.name, grip) for effect in effects if effect.name in curve for grip in grips]

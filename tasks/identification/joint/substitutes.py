@@ -1,6 +1,6 @@
 """What explains nearly as much as a named number in its place: its rivals on the training runs."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,9 +71,9 @@ def foresee_falls(
 def find_substitutes(
     stops: Sequence[Stop],
     fitted: JointFit,
+    named: Sequence[JointNumber],
     everything: Sequence[JointNumber],
     share: float,
-    doubted: Collection[str] = (),
 ) -> list[Substitute]:
     """Return what explains nearly as much as each named number in its place.
 
@@ -84,16 +84,14 @@ def find_substitutes(
     ----------
     stops : training runs
     fitted : after elimination
+    named : of its numbers, those in whose place others are tried
     everything : numbers that the campaign could show
     share : of what a number explains from which a substitute is as good [1]
-    doubted : numbers that every car needs anew, but that the file claims to know: they too may stand for another
     """
     left = {n.name for n in fitted.numbers}
+    others = [n for n in everything if n.removable and n.name not in left]
     found = []
-    for number in fitted.numbers:
-        others = [n for n in everything if n.removable and n.name not in left]
-        if not (number.removable or number.name in doubted) or not others:
-            continue
+    for number in named if others else ():
         rest = tuple(n for n in fitted.numbers if n is not number)
         without = refit_numbers(stops, fitted, rest)
         worth = without.cost - fitted.cost

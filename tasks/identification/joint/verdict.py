@@ -19,9 +19,10 @@ from tasks.identification.decision.missed import compare_with_noise, tell_miss
 from tasks.identification.inference.disturbance import Disturbance
 from tasks.identification.joint.elimination import drop_at_bounds, refit_numbers
 from tasks.identification.joint.fit import JointFit, measure_misfit
-from tasks.identification.joint.from_brake import drop_what_the_drive_feigns
+from tasks.identification.joint.from_brake import drop_feigned_numbers, make_driver_check
 from tasks.identification.joint.held_out import (
     drop_contradicted_rivals,
+    find_better_substitute,
     makes_difference,
     predict_held_out,
     summarise_held_out,
@@ -121,7 +122,18 @@ def judge_jointly(
     shown = choose_numbers(numbers, campaign, [stop.model for stop in train], joint)
     reasons = [disagreement] if disagreement else []
     selected, agreeing = select_numbers(campaign, train, held_out, shown, joint, reasons)
-    selected = drop_what_the_drive_feigns(campaign, vehicle, surface, train, selected, joint, reasons)
+    find_feigned = make_driver_check(campaign, vehicle, surface, train, joint)
+    selected = drop_feigned_numbers(train, selected, find_feigned, joint, reasons)
+
+    def find_rivals(fitted: JointFit, named: Sequence[JointNumber]) -> list[Substitute]:
+        found = find_substitutes(train, fitted, named, shown, rules.rival_gain_share)
+        found = drop_contradicted_readings(train, found)
+        return [rival for rival in found if rival.name not in {n.name for n in find_feigned(rival.fitted)}]
+
+    as_good = find_rivals(selected, selected.removable_numbers)
+    while better := find_better_substitute(held_out, selected, as_good, joint):
+        selected = better.fitted
+        as_good = find_rivals(selected, selected.removable_numbers)
     retuned = refit_numbers(train, selected, tuple(n for n in selected.numbers if n.group in CALIBRATED))
     retuned = drop_at_bounds(train, retuned, joint, [])
 
@@ -142,9 +154,10 @@ def judge_jointly(
     fitted = left.fitted
     # a number that the file claims to know may stand for what the model lacks
     claimed = [name for name, tolerance in tolerances.items() if tolerance < joint.unknown_gain_tolerance]
-    doubted = {e.parameters[0].name for e in effects} & set(claimed)
-    as_good = find_substitutes(train, fitted, shown, rules.rival_gain_share, doubted)
-    as_good = drop_contradicted_readings(train, as_good)
+    named = {e.parameters[0].name for e in effects}
+    doubted = [n for n in fitted.numbers if not n.removable and n.name in named.intersection(claimed)]
+    as_good = as_good if fitted is selected else []
+    as_good += find_rivals(fitted, doubted)
     substitutes = drop_contradicted_rivals(held_out, fitted, as_good, joint)
     # what other physics explains as well is no number of the file alone
     disputed = {substitute.of for substitute in substitutes}

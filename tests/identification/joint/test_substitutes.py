@@ -31,7 +31,7 @@ def test_whatever_explains_nearly_as_much_is_a_rival_of_whichever_kind(monkeypat
 
     monkeypatch.setattr(substitutes, "refit_numbers", look_up_cost)
     monkeypatch.setattr(substitutes, "foresee_falls", foresee_much)
-    found = find_substitutes([], named, list(NUMBERS.values()), 0.85)
+    found = find_substitutes([], named, named.numbers, list(NUMBERS.values()), 0.85)
     assert [(one.of, one.name) for one in found] == [("pressure_curve", "engine_torque")]
 
 
@@ -48,7 +48,7 @@ def test_a_rival_is_fitted_where_its_derivatives_let_it_matter(monkeypatch, shar
 
     monkeypatch.setattr(substitutes, "refit_numbers", look_up_cost)
     monkeypatch.setattr(substitutes, "foresee_falls", foresee_little)
-    assert [one.name for one in find_substitutes([], named, list(NUMBERS.values()), 0.85)] == rivals
+    assert [one.name for one in find_substitutes([], named, named.numbers, list(NUMBERS.values()), 0.85)] == rivals
 
 
 def test_a_gain_that_the_file_claims_to_know_may_stand_for_a_resistance(monkeypatch):
@@ -62,8 +62,8 @@ def test_a_gain_that_the_file_claims_to_know_may_stand_for_a_resistance(monkeypa
 
     monkeypatch.setattr(substitutes, "refit_numbers", look_up_cost)
     monkeypatch.setattr(substitutes, "foresee_falls", foresee_much)
-    assert find_substitutes([], named, list(NUMBERS.values()), 0.85) == []
-    (found,) = find_substitutes([], named, list(NUMBERS.values()), 0.85, {"pressure_gain"})
+    assert find_substitutes([], named, [], list(NUMBERS.values()), 0.85) == []
+    (found,) = find_substitutes([], named, named.numbers, list(NUMBERS.values()), 0.85)
     assert (found.of, found.name) == ("pressure_gain", "rolling_coefficient")
 
 

@@ -106,10 +106,10 @@ def test_a_number_of_the_file_is_wrong_only_beyond_as_many_tolerances_as_the_rul
 def test_a_gain_that_the_file_claims_to_know_is_doubted_where_a_resistance_explains_as_much(
     monkeypatch, tolerance: float, kind: str, rivals: list[str]
 ):
-    def find_resistance(_stops, fitted, everything, _share, doubted):
+    def find_resistance(_stops, fitted, named, everything, _share):
         rolling = next(n for n in everything if n.name == "rolling_coefficient")
         instead = replace(fitted, numbers=(rolling,), values=np.array([0.02]))
-        return [Substitute(of=name, name=rolling.name, fitted=instead) for name in doubted]
+        return [Substitute(of=name, name=rolling.name, fitted=instead) for name in {n.name for n in named}]
 
     monkeypatch.setattr(verdict, "find_substitutes", find_resistance)
     monkeypatch.setattr(verdict, "drop_contradicted_rivals", lambda _held_out, _fitted, found, _rules: found)
