@@ -8,6 +8,7 @@ import numpy as np
 
 from catalogs.cameras import load_camera
 from catalogs.scenes import load_scene
+from catalogs.surfaces import load_surface
 from catalogs.weather.look import load_weather
 from tasks.render.camera import world_to_camera
 from tasks.render.composition import compose_over_sky
@@ -52,6 +53,7 @@ def measure_rows(scene_name: str = "street", camera_name: str = "dashcam-480x320
     row "added" counts its Gaussians in the rasteriser too, and its ratio is the share of the clear frame.
     """
     scene, camera, parameters = load_scene(scene_name), load_camera(camera_name), load_weather()
+    pavement = load_surface("dense-asphalt")
     pose = scene.route.T_world_rig[STATION] @ camera.T_rig_camera
     K = np.asarray(camera.K, dtype=np.float64)
     view = world_to_camera(pose)
@@ -74,7 +76,7 @@ def measure_rows(scene_name: str = "street", camera_name: str = "dashcam-480x320
         started = time.process_time()
         gaussians, weather = weather_scene(
             ClearScene(gaussians=scene.gaussians, environment=scene.environment, route=scene.route),
-            ClipConditions(state=state, parameters=parameters, seed=1),
+            ClipConditions(state=state, pavement=pavement, parameters=parameters, seed=1),
             float(K[0, 0]),
         )
         once_s = time.process_time() - started
@@ -120,7 +122,12 @@ def _list_stages(
         "particles": lambda: particle_layer(weather, falling, sky, gbuffer.depth, shutter),
     }
     if film is not None:
-        on_road = RoadFilm(depth_mm=weather.state.film_depth_mm, parameters=film, seed=weather.seed)
+        on_road = RoadFilm(
+            depth_mm=weather.state.film_depth_mm,
+            texture_depth_mm=weather.pavement.texture_depth_mm,
+            parameters=film,
+            seed=weather.seed,
+        )
         light = LightOnRoad(environment=overcast.environment, sky=sky, extinction=air.extinction)
         stages["wet road with reflection"] = lambda: wet_layer(lit, gbuffer, shutter, rays, on_road, light)
     return stages

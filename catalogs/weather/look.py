@@ -14,6 +14,8 @@ from tasks.errors import InputError
 from tasks.render.weather.parameters import KindLook, WeatherParameters
 from tasks.surface.weather import WEATHERS
 
+OF_THE_PAVEMENT = ("full_cover_mm", "texture_depth_mm")
+"""Values that datasets made before keep here too, and that are now read from the surface's entry alone."""
 MOST_STEPS = 100
 """Size classes, or octaves of noise [1]: five times what ships; each one costs time in every frame."""
 
@@ -74,7 +76,7 @@ def _build_parameters(kind: Any, entries: object, place: str, problems: list[str
         return None
     hints = get_type_hints(kind)
     optional = {name for name, hint in hints.items() if NoneType in get_args(hint)}
-    for name in sorted(set(entries) - set(hints)):
+    for name in sorted(set(entries) - set(hints) - set(OF_THE_PAVEMENT)):
         problems.append(f"{place}: {shorten(name, 60)} is not a known value; known are {', '.join(hints)}")
     for name in sorted(set(hints) - set(entries) - optional):
         problems.append(f"{place}: {name} is missing; give it value, unit and source")

@@ -188,6 +188,7 @@ def render_frames(
         ),
         ClipConditions(
             state=state,
+            pavement=catalogue.surface,
             parameters=catalogue.weather_parameters,
             seed=seed,
             anchors=_anchors_of(scenario, plan, catalogue),

@@ -22,7 +22,7 @@ from tasks.scene.route import route_from_positions
 from tasks.scene.scene import Scene
 from tasks.surface.state import SurfaceState
 from tests.render.rolling_cameras import ALL, CAMERA, ROLLING
-from tests.render.weather.scenes import clear_sky, road, surfels
+from tests.render.weather.scenes import PAVEMENT, clear_sky, road, surfels
 
 ROUTE = route_from_positions(np.stack([np.arange(100.0), np.zeros(100), np.zeros(100)], axis=1))
 TICKS = np.arange(201) * 1e-3
@@ -82,7 +82,7 @@ def scene(street):
 
 
 def under(state, parameters):
-    return ClipConditions(state=state, parameters=parameters, seed=1)
+    return ClipConditions(state=state, pavement=PAVEMENT, parameters=parameters, seed=1)
 
 
 def drawn(street, camera, pose):

@@ -33,12 +33,12 @@ from tasks.render.weather.rays import pixel_rays
 from tasks.render.weather.relief import clear_light, overcast_light, relight_gaussians
 from tasks.render.weather.scene_light import ground_light, without_sun
 from tasks.render.weather.sky import SkyLight, light_from
-from tasks.render.weather.snow.field import snow_field
+from tasks.render.weather.snow.field import LyingSnow, snow_field
 from tasks.render.weather.snow.layer import snow_layer, snowed_over, whiten_gaussians
 from tasks.render.weather.wet.wet_road import LightOnRoad, RoadFilm, wet_layer
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.route import Route
-from tasks.surface.state import SurfaceState
+from tasks.surface.state import SurfaceParameters, SurfaceState
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,6 +68,7 @@ class ClipConditions:
     Parameters
     ----------
     state : what falls, and what lies on the road
+    pavement : the road itself, from whose numbers the state follows
     parameters : optical parameters of the weather, of the catalogue
     seed : visual seed; it moves particles and snow, and nothing else [1]
     anchors : states of the two anchors that the paper's composition blends; none for a picture of its own rate
@@ -75,6 +76,7 @@ class ClipConditions:
     """
 
     state: SurfaceState
+    pavement: SurfaceParameters
     parameters: WeatherParameters
     seed: int
     anchors: tuple[SurfaceState, ...] = ()
@@ -88,6 +90,7 @@ class ClipWeather:
     Parameters
     ----------
     state : surface state
+    pavement : the road itself
     parameters : numbers of the catalogue
     seed : visual seed of the clip [1]
     overcast : None under a clear sky
@@ -96,6 +99,7 @@ class ClipWeather:
     """
 
     state: SurfaceState
+    pavement: SurfaceParameters
     parameters: WeatherParameters
     seed: int
     overcast: Overcast | None
@@ -168,7 +172,7 @@ def weather_scene(
     state, p, seed = conditions.state, conditions.parameters, conditions.seed
     look = p.find_look(state.kind)
     if look is None:
-        dry = ClipWeather(state=state, parameters=p, seed=seed, overcast=None)
+        dry = ClipWeather(state=state, pavement=conditions.pavement, parameters=p, seed=seed, overcast=None)
         if relief is None:
             return gaussians, dry
         return relight_gaussians(
@@ -180,13 +184,18 @@ def weather_scene(
     if (cover := look.snow_cover) is not None:
         field = snow_field(gaussians, cover.patches, cover.tracks, cover.anchors, clear.route, seed)
         xi_road = road_controls(state, look)
-        amount = (xi_road.snow_coverage, xi_road.snow_depth_mm, cover)
+        amount = LyingSnow(
+            coverage=xi_road.snow_coverage,
+            depth_mm=xi_road.snow_depth_mm,
+            full_cover_mm=conditions.pavement.full_cover_depth_mm,
+        )
         lift = None if relief is None else measure_road_lift(scene, relief)
-        snow = snow_layer(scene, field, white, *amount, lift)
-        scene = snowed_over(whiten_gaussians(scene, field, white, *amount), snow)
+        snow = snow_layer(scene, field, white, amount, cover, lift)
+        scene = snowed_over(whiten_gaussians(scene, field, white, amount, cover), snow)
     own, *anchors = (
         ClipWeather(
             state=one,
+            pavement=conditions.pavement,
             parameters=p,
             seed=seed,
             overcast=make_overcast(look, one, p, seed, environment, white, field, focal_px),
@@ -236,6 +245,7 @@ def apply_weather(
         state = weather.state
         on_road = RoadFilm(
             depth_mm=state.film_depth_mm,
+            texture_depth_mm=weather.pavement.texture_depth_mm,
             parameters=film,
             seed=weather.seed,
             rate_mm_h=state.precipitation_mm_h,

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from catalogs.surfaces import load_surface
 from tasks.conventions import SemanticClass
 from tasks.render.camera import world_to_camera
 from tasks.render.environment import environment_view
@@ -13,21 +14,24 @@ from tasks.render.weather.parameters import WeatherParameters
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.route import Route
 from tasks.scene.spherical_harmonics import C0
-from tasks.surface.state import SurfaceState
+from tasks.surface.state import SurfaceParameters, SurfaceState
 
 ASPHALT = 0.17
 FOCAL_PX = 120.0
+PAVEMENT = load_surface("dense-asphalt")
+TEXTURE_MM = PAVEMENT.texture_depth_mm
 
 
 def weather_over(
     street: Gaussians, environment: np.ndarray, state: SurfaceState, parameters: WeatherParameters,
     seed: int = 1, route: Route | None = None, relief: RoadRelief | None = None,
     anchors: tuple[SurfaceState, ...] = (), refracts: bool = False,
+    pavement: SurfaceParameters = PAVEMENT,
 ) -> tuple[Gaussians, ClipWeather]:  # fmt: skip
     """The street in a weather, and the weather."""
     clear = ClearScene(gaussians=street, environment=environment, route=route, relief=relief)
     conditions = ClipConditions(
-        state=state, parameters=parameters, seed=seed, anchors=anchors, refracts=refracts
+        state=state, pavement=pavement, parameters=parameters, seed=seed, anchors=anchors, refracts=refracts
     )
     return weather_scene(clear, conditions, FOCAL_PX)
 

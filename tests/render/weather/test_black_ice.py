@@ -7,7 +7,7 @@ from tasks.render.weather.rays import pixel_rays
 from tasks.render.weather.sky import sky_light
 from tasks.render.weather.wet.puddles import water_surface
 from tasks.render.weather.wet.wet_road import LightOnRoad, RoadFilm, fresnel_reflectance, wet_layer
-from tests.render.weather.scenes import ASPHALT, flat_gbuffer
+from tests.render.weather.scenes import ASPHALT, TEXTURE_MM, flat_gbuffer
 from tests.render.weather.test_wet_road import CLOUDY, VIEW, see_road
 
 GLAZE_MM, FILM_MM = 0.4, 0.489
@@ -21,9 +21,9 @@ def film_on_road(parameters, kind, depth_mm):
     road = gbuffer.class_id == 1
     rows = np.arange(len(road))[:, None, None]
     picture = np.where(road[..., None], picture, (rows // 4 % 2).astype(np.float32))
-    smooth = water_surface(see_road(gbuffer), depth_mm, film.water, 3).smooth
+    smooth = water_surface(see_road(gbuffer), depth_mm, TEXTURE_MM, film.water, 3).smooth
     sky = sky_light(np.full(3, ASPHALT / 0.1), 1.0, 0.0002, 0.1, parameters.sky)
-    on_road = RoadFilm(depth_mm=depth_mm, parameters=film, seed=3)
+    on_road = RoadFilm(depth_mm=depth_mm, texture_depth_mm=TEXTURE_MM, parameters=film, seed=3)
     light = LightOnRoad(environment=CLOUDY, sky=sky, extinction=0.0)
     return road, smooth, wet_layer(picture, gbuffer, VIEW, pixel_rays(VIEW), on_road, light)
 

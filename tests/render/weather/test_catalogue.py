@@ -99,6 +99,19 @@ def test_an_unedited_copy_is_the_same_catalogue(copy, parameters):
     assert load_weather(copy) == parameters
 
 
+def test_the_pavements_numbers_in_a_kept_copy_of_before_are_not_read(copy, parameters):
+    for kind, section, name in (
+        ("snow", "snow_cover", "full_cover_mm"),
+        ("rain", "film", "texture_depth_mm"),
+    ):
+        entry = yaml.safe_load((copy / f"{kind}.yaml").read_text())
+        owner = entry[section].get("water", entry[section])
+        assert name not in owner
+        owner[name] = {"value": 7, "unit": "mm", "source": "the paper"}
+        (copy / f"{kind}.yaml").write_text(yaml.safe_dump(entry))
+    assert load_weather(copy) == parameters
+
+
 @pytest.mark.parametrize("kind", [kind for kind, row in WEATHERS.items() if row.overcast])
 def test_every_kind_under_cloud_has_an_entry(kind, parameters):
     assert parameters.find_look(kind) is not None

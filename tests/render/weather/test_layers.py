@@ -17,7 +17,7 @@ from tasks.render.weather.scene_light import append_gaussians, to_display_unclip
 from tasks.render.weather.snow.layer import GROUND_CLASSES
 from tasks.surface.state import SurfaceState
 from tests.render.weather.conftest import shutter
-from tests.render.weather.scenes import clear_sky, road, surfels, weather_over
+from tests.render.weather.scenes import PAVEMENT, clear_sky, road, surfels, weather_over
 
 SKY = clear_sky()
 RAIN = {
@@ -48,10 +48,13 @@ def street():
 
 
 def frame(
-    street, state, parameters, seed=1, time_s=2.0, speed=10.0, exposure_s=0.005, anchors=(), refracts=False
-):
+    street, state, parameters, seed=1, time_s=2.0, speed=10.0, exposure_s=0.005, anchors=(), refracts=False,
+    pavement=PAVEMENT,
+):  # fmt: skip
     view = shutter(time_s=time_s, exposure_s=exposure_s, speed=speed, **SIZE)
-    scene, weather = weather_over(street, SKY, state, parameters, seed, anchors=anchors, refracts=refracts)
+    scene, weather = weather_over(
+        street, SKY, state, parameters, seed, anchors=anchors, refracts=refracts, pavement=pavement
+    )
     gbuffer = rasterise_view(
         prepare_gaussians(scene), np.linalg.inv(view.T_world_camera), view.K, view.width, view.height
     )
@@ -105,6 +108,25 @@ def test_when_the_car_stands_only_particles_move(street, parameters, state):
         same = first.gain.tobytes() == second.gain.tobytes() and first.add.tobytes() == second.add.tobytes()
         assert same == (first.name != "particles")
     assert now.base.tobytes() == later.base.tobytes()
+
+
+def test_the_road_is_white_where_the_pavements_own_cover_depth_has_snow(street, parameters):
+    """On a pavement that 40 mm cover, 22 mm leave 45 % of the road bare; 20 mm cover asphalt."""
+    state = SurfaceState(kind="snow", precipitation_mm_h=2.2, snow_depth_mm=22, snow_coverage=0.55)
+    later = replace(PAVEMENT, full_cover_depth_mm=40)
+    weather, drawn, gbuffer, view = frame(street, state, parameters, pavement=later)
+    road = np.isin(gbuffer.class_id, ROAD_CLASSES)
+    covered, light = snow_on(ROAD_CLASSES, weather, gbuffer, view), drawn.base.mean(axis=-1)
+    assert 0.4 < covered[road].mean() < 0.8
+    assert np.median(light[road & ~covered]) < 0.2 * np.median(light[covered])
+
+
+def test_a_coarser_texture_mirrors_less(street, parameters):
+    coarse = replace(PAVEMENT, texture_depth_mm=1.5)
+    fine, rough = (
+        frame(street, RAIN[50], parameters, pavement=one)[1].layers[1].add for one in (PAVEMENT, coarse)
+    )
+    assert rough.sum() < 0.9 * fine.sum()
 
 
 def test_severity_is_ordered(street, parameters):

@@ -8,7 +8,7 @@ from tasks.render.weather.rays import pixel_rays
 from tasks.render.weather.wet.refraction import compute_film_shift, see_through_film
 from tasks.render.weather.wet.wet_road import LightOnRoad, RoadFilm, wet_layer
 from tests.render.weather.conftest import shutter
-from tests.render.weather.scenes import flat_gbuffer
+from tests.render.weather.scenes import TEXTURE_MM, flat_gbuffer
 from tests.render.weather.test_wet_road import CLOUDY, VIEW, see_road, sky  # noqa: F401
 
 WATER, DEEP = 1.333, 0.005
@@ -75,7 +75,9 @@ def test_only_a_film_that_refracts_moves_the_texture_and_by_its_smooth_share(par
     picture, gbuffer = flat_gbuffer(VIEW)
     rng = np.random.default_rng(1)
     picture *= rng.uniform(0.5, 1.5, picture.shape[:2])[..., None].astype(np.float32)
-    film = RoadFilm(depth_mm=1.263, parameters=parameters.kinds["rain"].film, seed=1)
+    film = RoadFilm(
+        depth_mm=1.263, texture_depth_mm=TEXTURE_MM, parameters=parameters.kinds["rain"].film, seed=1
+    )
     light = LightOnRoad(environment=CLOUDY, sky=sky, extinction=0.0)
     plain, refracted = (
         wet_layer(picture, gbuffer, VIEW, pixel_rays(VIEW), one, light)

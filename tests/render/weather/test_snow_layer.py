@@ -12,7 +12,7 @@ from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tasks.render.weather.coverage_field import FieldParameters, height_field, rank_uniform
 from tasks.render.weather.rays import pixel_rays
 from tasks.render.weather.scene_light import append_gaussians, mean_colours, remove_gaussians
-from tasks.render.weather.snow.field import coverage_rank, local_depth_mm, snow_field, tracks_at
+from tasks.render.weather.snow.field import LyingSnow, coverage_rank, local_depth_mm, snow_field, tracks_at
 from tasks.render.weather.snow.layer import hidden_share, snow_layer, snowed_over, whiten_gaussians
 from tasks.render.weather.snow.road_anchors import road_anchors
 from tasks.scene.route import Route
@@ -34,6 +34,10 @@ def field_of(scene, parameters, seed=5, route=None):
     return snow_field(scene, p.patches, p.tracks, p.anchors, route, seed)
 
 
+def lying(coverage, depth_mm, full_cover_mm=20.0):
+    return LyingSnow(coverage=coverage, depth_mm=depth_mm, full_cover_mm=full_cover_mm)
+
+
 def rank_at(field, x, y):
     return coverage_rank(field, x, y, tracks_at(field, x, y))
 
@@ -41,7 +45,7 @@ def rank_at(field, x, y):
 def layer_at(street, parameters, coverage, depth_mm=None, seed=5):
     field = field_of(street, parameters, seed)
     depth_mm = 20.0 * coverage if depth_mm is None else depth_mm
-    return snow_layer(street, field, WHITE, coverage, depth_mm, parameters.kinds["snow"].snow_cover)
+    return snow_layer(street, field, WHITE, lying(coverage, depth_mm), parameters.kinds["snow"].snow_cover)
 
 
 def test_ranks_by_weight_are_uniform_and_keep_the_order():
@@ -79,12 +83,20 @@ def test_more_coverage_adds_to_what_is_there(street, parameters):
 
 def test_local_depth_keeps_the_mean_and_the_support():
     xi = (np.arange(100000) + 0.5) / 100000
-    for coverage, mean in ((0.25, 5.0), (0.5, 10.0), (1.0, 20.0), (1.0, 30.0)):
-        depth = local_depth_mm(xi, coverage, mean, 20.0)
+    for coverage, mean, full in (
+        (0.25, 5, 20),
+        (0.5, 10, 20),
+        (1, 20, 20),
+        (1, 30, 20),
+        (0.55, 22, 40),
+        (1, 44, 40),
+    ):
+        depth = local_depth_mm(xi, lying(coverage, mean, full))
         assert depth.mean() == pytest.approx(mean, rel=1e-3)
         assert np.array_equal(depth > 0, xi < coverage)
         assert np.all(np.diff(depth) <= 0)
-    assert local_depth_mm(xi, 0.0, 0.0, 20.0).max() == 0
+    assert local_depth_mm(xi, lying(0.0, 0.0)).max() == 0
+    assert not local_depth_mm(np.array([0.76, 0.9, 1.0]), lying(0.75, 30.0)).any()
 
 
 def test_snow_lies_over_its_anchors_along_their_normals(street, parameters):
@@ -150,7 +162,7 @@ def test_the_picture_shows_the_coverage_asked(street, parameters):
     seen, expected = [], []
     for coverage in COVERAGES:
         field = field_of(street, parameters)
-        amount = (coverage, 20.0 * coverage, parameters.kinds["snow"].snow_cover)
+        amount = (lying(coverage, 20.0 * coverage), parameters.kinds["snow"].snow_cover)
         snow = snow_layer(street, field, WHITE, *amount)
         scene = append_gaussians(
             remove_gaussians(whiten_gaussians(street, field, WHITE, *amount), snow.buried), snow.gaussians
@@ -180,7 +192,7 @@ def test_snow_settles_on_what_faces_up_and_leaves_walls_bare(street, parameters)
     scene = append_gaussians(append_gaussians(street, flat), wall)
     field = field_of(scene, parameters)
     colours = mean_colours(
-        whiten_gaussians(scene, field, WHITE, 1.0, 30.0, parameters.kinds["snow"].snow_cover)
+        whiten_gaussians(scene, field, WHITE, lying(1.0, 30.0), parameters.kinds["snow"].snow_cover)
     )
     assert colours[-2].mean() > 1.0
     assert colours[-1] == pytest.approx(mean_colours(scene)[-1], rel=1e-5)
@@ -196,7 +208,7 @@ def test_under_a_roof_the_ground_is_white_and_what_stands_on_it_is_bare(street, 
     scene = append_gaussians(append_gaussians(append_gaussians(street, roof), table), ground)
     colours = mean_colours(
         whiten_gaussians(
-            scene, field_of(scene, parameters), WHITE, 1.0, 30.0, parameters.kinds["snow"].snow_cover
+            scene, field_of(scene, parameters), WHITE, lying(1.0, 30.0), parameters.kinds["snow"].snow_cover
         )
     )
     assert colours[-1].mean() > 1.0 and colours[len(street)].mean() > 1.0
@@ -215,7 +227,7 @@ def test_wheel_tracks_are_covered_last_and_leave_the_share_as_it_is(street, para
     assert 0.02 < track.mean() < 0.12
     assert np.abs(np.abs(y[track]) - parameters.kinds["snow"].snow_cover.tracks.gauge_m / 2).max() < 0.5
     assert np.mean(xi[track] <= 0.5) < 0.25
-    snow = snow_layer(street, field, WHITE, 1.0, 30.0, parameters.kinds["snow"].snow_cover)
+    snow = snow_layer(street, field, WHITE, lying(1.0, 30.0), parameters.kinds["snow"].snow_cover)
     layer, pressed = snow.gaussians, track[snow.anchors]
     assert mean_colours(layer)[pressed].mean() < 0.95 * mean_colours(layer)[~pressed].mean()
     assert tracks_at(field_of(street, parameters), x, y).max() == 0

@@ -22,7 +22,7 @@ from tasks.render.weather.wet.wet_road import (
     wet_layer,
 )
 from tests.render.weather.conftest import shutter
-from tests.render.weather.scenes import ASPHALT, flat_gbuffer
+from tests.render.weather.scenes import ASPHALT, TEXTURE_MM, flat_gbuffer
 
 FILMS = (0.0, 0.05, 0.189, 0.489, 0.839, 1.263, 4.0)
 """Film depths [mm]; the middle four are those of 2, 10, 25 and 50 mm/h."""
@@ -46,7 +46,9 @@ def sky(parameters):
 
 def wet(parameters, sky, film, wall_x=12.0, seed=1):
     picture, gbuffer = flat_gbuffer(VIEW, wall_x)
-    on_road = RoadFilm(depth_mm=film, parameters=parameters.kinds["rain"].film, seed=seed)
+    on_road = RoadFilm(
+        depth_mm=film, texture_depth_mm=TEXTURE_MM, parameters=parameters.kinds["rain"].film, seed=seed
+    )
     light = LightOnRoad(environment=CLOUDY, sky=sky, extinction=0.0)
     return picture, gbuffer, wet_layer(picture, gbuffer, VIEW, pixel_rays(VIEW), on_road, light)
 
@@ -77,7 +79,7 @@ def test_the_film_drowns_more_of_the_road_everywhere_as_it_rises(parameters):
     _, gbuffer = flat_gbuffer(VIEW)
     road = gbuffer.class_id == 1
     shares = [
-        water_surface(see_road(gbuffer), film, parameters.kinds["rain"].film.water, 3).smooth
+        water_surface(see_road(gbuffer), film, TEXTURE_MM, parameters.kinds["rain"].film.water, 3).smooth
         for film in FILMS
     ]
     assert shares[0].max() == 0
@@ -113,7 +115,9 @@ def test_only_the_road_gets_wet(parameters, sky):
 def test_pavement_and_earth_are_darkened_and_do_not_mirror(parameters, sky):
     """By Lekner and Dorf at their own reflectance; walls, which face no rain, and cars stay as they are."""
     picture, gbuffer = flat_gbuffer(VIEW)
-    film = RoadFilm(depth_mm=4.0, parameters=parameters.kinds["rain"].film, seed=1)
+    film = RoadFilm(
+        depth_mm=4.0, texture_depth_mm=TEXTURE_MM, parameters=parameters.kinds["rain"].film, seed=1
+    )
     light = LightOnRoad(environment=CLOUDY, sky=sky, extinction=0.0)
     beside = (gbuffer.class_id == SemanticClass.ROAD) & (np.arange(160) > 100)
     for kind, soaks in (
@@ -192,7 +196,7 @@ def test_puddles_stay_where_they_are_as_the_car_drives(parameters):
     for x in (0.0, 1.0):
         view = shutter(width=160, height=108, focal=133.0, x=x)
         _, gbuffer = flat_gbuffer(view)
-        surface = water_surface(see_road(gbuffer, view), 0.6, p, 8)
+        surface = water_surface(see_road(gbuffer, view), 0.6, TEXTURE_MM, p, 8)
         column = 80
         place = x + gbuffer.depth[:, column] * pixel_rays(view)[:, column, 0]
         near = (gbuffer.class_id[:, column] == 1) & (place > 4.5) & (place < 7.0)
@@ -214,7 +218,9 @@ def test_a_pixel_that_leaves_its_own_mirrored_light_out_has_that_of_its_neighbou
     picture, gbuffer = flat_gbuffer(view, 12.0)
     kept = np.isin(np.arange(320), np.arange(320)[rows])[:, None]
     narrow = replace(gbuffer, class_id=np.where(kept, gbuffer.class_id, np.uint8(SemanticClass.BUILDING)))
-    film = RoadFilm(depth_mm=1.2, parameters=parameters.kinds["rain"].film, seed=1)
+    film = RoadFilm(
+        depth_mm=1.2, texture_depth_mm=TEXTURE_MM, parameters=parameters.kinds["rain"].film, seed=1
+    )
     light = LightOnRoad(environment=CLOUDY, sky=sky, extinction=0.0)
     arguments = (picture, narrow, view, pixel_rays(view), film, light)
     layer = wet_layer(*arguments)
@@ -236,7 +242,13 @@ def test_drops_blur_what_a_film_mirrors_and_leave_its_share(parameters, sky):
     picture = np.where(rows > 160, picture, (rows // 8 % 2).astype(np.float32))
     light, layers = LightOnRoad(environment=CLOUDY, sky=sky, extinction=0.0), []
     for rate in (0.0, 10.0, 50.0):
-        film = RoadFilm(depth_mm=4.0, parameters=parameters.kinds["rain"].film, seed=1, rate_mm_h=rate)
+        film = RoadFilm(
+            depth_mm=4.0,
+            texture_depth_mm=TEXTURE_MM,
+            parameters=parameters.kinds["rain"].film,
+            seed=1,
+            rate_mm_h=rate,
+        )
         layers.append(wet_layer(picture, gbuffer, view, pixel_rays(view), film, light))
     # where the part of the wall above the horizon is mirrored
     contrast = [np.abs(np.diff(layer.add[265:295, :, 0], axis=0)).mean() for layer in layers]

@@ -21,6 +21,22 @@ QUANTILES = 1025
 
 
 @dataclass(frozen=True, kw_only=True)
+class LyingSnow:
+    """How much snow lies on the ground.
+
+    Parameters
+    ----------
+    coverage : share of the ground that it covers, c_s [1]
+    depth_mm : mean depth over all of the ground, h_s [mm]
+    full_cover_mm : depth at which the ground is covered, h_cover of the pavement [mm]
+    """
+
+    coverage: float
+    depth_mm: float
+    full_cover_mm: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class SnowField:
     """The coverage field of one scene and seed, readable anywhere.
 
@@ -121,23 +137,22 @@ def _unranked(
     return height_field(x, y, patches, seed, "snow-cover") + tracks.bareness * np.asarray(on_track)
 
 
-def local_depth_mm(
-    xi: NDArray[np.floating], coverage: float, depth_mm: float, full_cover_mm: float
-) -> NDArray[np.float64]:
+def local_depth_mm(xi: NDArray[np.floating], snow: LyingSnow) -> NDArray[np.float64]:
     """Snow depth where the field has the value xi; its mean over uniform xi is the depth given.
 
     Parameters
     ----------
     xi : [...] coverage field [1]
-    coverage : c_s [1]
-    depth_mm : mean depth over all of the ground, h_s [mm]
-    full_cover_mm : depth at which the ground is covered [mm]
+    snow : how much lies on average
 
     Returns
     -------
     float64 [...] depth, 0 where xi exceeds the coverage [mm]
     """
-    if coverage <= 0:
+    if snow.coverage <= 0:
         return np.zeros(np.shape(xi))
-    tapered = min(depth_mm, full_cover_mm) * 2 / coverage * np.maximum(1 - np.asarray(xi) / coverage, 0)
-    return tapered + max(depth_mm - full_cover_mm, 0.0)
+    patchy = min(snow.depth_mm, snow.full_cover_mm)
+    depth = patchy * 2 / snow.coverage * np.maximum(1 - np.asarray(xi) / snow.coverage, 0) + (
+        snow.depth_mm - patchy
+    )
+    return np.where(np.asarray(xi) <= snow.coverage, depth, 0.0)

@@ -14,7 +14,7 @@ from tasks.render.weather.scene_light import (
     to_display_unclipped,
 )
 from tasks.render.weather.snow.bearing import GROUND_CLASSES, bearing_share
-from tasks.render.weather.snow.field import SnowField, coverage_rank, local_depth_mm, tracks_at
+from tasks.render.weather.snow.field import LyingSnow, SnowField, coverage_rank, local_depth_mm, tracks_at
 from tasks.render.weather.snow.road_anchors import AnchorParameters, road_anchors
 from tasks.render.weather.snow.shelter import open_share
 from tasks.render.weather.snow.wheel_tracks import TrackParameters
@@ -42,7 +42,6 @@ class SnowCoverParameters:
     lumps : waves of the micro-height
     lump_share : standard deviation of the micro-height by the local depth [1]
     relief : standard deviation of the snow's brightness from hollow to lump, by its mean [1]
-    full_cover_mm : depth at which the road is covered, h_cover [mm]
     hiding_mm : depth at which 1 - 1/e of the ground is hidden [mm]
     albedo : reflectance of fresh snow, red, green, blue [1]
     damp_albedo_ratio : reflectance of the damp road between the snow by its dry one [1]
@@ -54,7 +53,6 @@ class SnowCoverParameters:
     lumps: FieldParameters
     lump_share: float
     relief: float
-    full_cover_mm: float
     hiding_mm: float
     albedo: tuple[float, float, float]
     damp_albedo_ratio: float
@@ -97,8 +95,7 @@ def snow_layer(
     gaussians: Gaussians,
     field: SnowField,
     white: NDArray[np.floating],
-    coverage: float,
-    depth_mm: float,
+    amount: LyingSnow,
     parameters: SnowCoverParameters,
     lift: NDArray[np.floating] | None = None,
 ) -> SnowLayer:
@@ -109,8 +106,7 @@ def snow_layer(
     gaussians : the scene with the clip's road edit
     field : its coverage field
     white : [3] radiance of a white surface lying on the road, as the scene's colours have it [1]
-    coverage : c_s [1]
-    depth_mm : h_s [mm]
+    amount : how much snow lies
     parameters : how snow lies and looks
     lift : [N] height of a road feature under each Gaussian, as `road_anchors` takes it [m]
 
@@ -123,9 +119,9 @@ def snow_layer(
     x, y = gaussians.means[anchors.index, :2].T
     tracks = tracks_at(field, x, y)
     xi = coverage_rank(field, x, y, tracks)
-    depth = local_depth_mm(xi, coverage, depth_mm, p.full_cover_mm)
+    depth = local_depth_mm(xi, amount)
     hidden = hidden_share(depth, p) * gaussians.opacities[anchors.index]
-    on = (xi <= coverage) & (hidden > 1 / 255)
+    on = (xi <= amount.coverage) & (hidden > 1 / 255)
     index, normal, flat, xi, depth = (
         anchors.index[on],
         anchors.normal[on],
@@ -138,9 +134,9 @@ def snow_layer(
     scales, quats = _lying(gaussians, index, normal, flat)
     wide = scales.max(axis=1)
     kept = np.ones(len(index))
-    if coverage < 1:
+    if amount.coverage < 1:
         # no wider than the way to the edge of the patch
-        inside = (coverage - xi) / _steepness(field, place, tracks[on], wide)
+        inside = (amount.coverage - xi) / _steepness(field, place, tracks[on], wide)
         kept = np.clip(inside / (EDGE_WIDTHS * wide), NARROWEST, 1)
         scales *= kept[:, None]
     lumps = height_field(place[:, 0], place[:, 1], p.lumps, field.seed, "snow-lumps", wide)
@@ -195,8 +191,7 @@ def whiten_gaussians(
     gaussians: Gaussians,
     field: SnowField,
     white: NDArray[np.floating],
-    coverage: float,
-    depth_mm: float,
+    amount: LyingSnow,
     parameters: SnowCoverParameters,
 ) -> Gaussians:
     """The scene with snow on everything that faces up, and damp road between the snow.
@@ -211,8 +206,7 @@ def whiten_gaussians(
     gaussians : the scene
     field : its coverage field
     white : [3] radiance of a white surface lying on the road, as the scene's colours have it [1]
-    coverage : c_s [1]
-    depth_mm : h_s [mm]
+    amount : how much snow lies
     parameters : how snow lies and looks
 
     Returns
@@ -232,7 +226,7 @@ def whiten_gaussians(
     xi = coverage_rank(field, x, y, tracks)
     hidden = np.zeros(len(gaussians))
     reached = np.where(np.isin(gaussians.class_id, GROUND_CLASSES), 1.0, open_share(gaussians))
-    depth = reached[bears] * local_depth_mm(xi, coverage, depth_mm, p.full_cover_mm)
+    depth = reached[bears] * local_depth_mm(xi, amount)
     hidden[bears] = facing[bears] * hidden_share(depth, p)
     damp = np.where(road, p.damp_albedo_ratio, 1.0)
     even = np.zeros(len(gaussians))

@@ -19,7 +19,6 @@ class RoadWaterParameters:
     Parameters
     ----------
     wetting_mm : film depth at which 1 - 1/e of the surface is wet [mm]
-    texture_depth_mm : mean texture depth; the film is measured from the bottom of the texture [mm]
     texture_spread_mm : standard deviation of the heights of the texture's peaks [mm]
     unevenness_mm : standard deviation of the road's level over metres; water gathers at low places [mm]
     unevenness : waves of that level
@@ -29,7 +28,6 @@ class RoadWaterParameters:
     """
 
     wetting_mm: float
-    texture_depth_mm: float
     texture_spread_mm: float
     unevenness_mm: float
     unevenness: FieldParameters
@@ -84,7 +82,7 @@ class WaterSurface:
 
 
 def water_surface(
-    view: RoadView, film_depth_mm: float, parameters: RoadWaterParameters, seed: int
+    view: RoadView, film_depth_mm: float, texture_depth_mm: float, parameters: RoadWaterParameters, seed: int
 ) -> WaterSurface:
     """Return the share of smooth water and the normals of its surface.
 
@@ -94,7 +92,8 @@ def water_surface(
     Parameters
     ----------
     view : the road
-    film_depth_mm : total film depth h_t [mm]
+    film_depth_mm : total film depth h_t, from the bottom of the texture [mm]
+    texture_depth_mm : mean texture depth of the pavement, MTD [mm]
     parameters : parameters of the film
     seed : visual seed of the clip [1]
 
@@ -110,7 +109,7 @@ def water_surface(
     )
     _water(
         view.depth, view.rays, view.normal, view.road, view.mirrors, view.T_world_camera[:3, 3], float(view.K[1, 1]),
-        film_depth_mm, compute_wetness(film_depth_mm, p), p.texture_depth_mm, p.texture_spread_mm,
+        film_depth_mm, compute_wetness(film_depth_mm, p), texture_depth_mm, p.texture_spread_mm,
         p.unevenness_mm, p.unevenness.coarsest_m, p.unevenness.octaves, p.unevenness.roughness,
         p.ripple_slope, p.ripple_m, np.uint64(stream_key(seed, "puddles")),
         surface.smooth, surface.normal, surface.cosine,

@@ -58,6 +58,7 @@ class RoadFilm:
     Parameters
     ----------
     depth_mm : total film depth h_t [mm]
+    texture_depth_mm : mean texture depth of the pavement, MTD [mm]
     parameters : optics of the wet road
     seed : visual seed of the clip [1]
     rate_mm_h : rate of the rain that strikes it [mm/h]
@@ -65,6 +66,7 @@ class RoadFilm:
     """
 
     depth_mm: float
+    texture_depth_mm: float
     parameters: RoadFilmParameters
     seed: int
     rate_mm_h: float = 0.0
@@ -172,7 +174,7 @@ def wet_layer(
         T_world_camera=shutter.T_world_camera,
         K=shutter.K,
     )
-    water = water_surface(view, film.depth_mm, p.water, film.seed)
+    water = water_surface(view, film.depth_mm, film.texture_depth_mm, p.water, film.seed)
     mirrored = mirrored_scene(
         picture, replace(view, normal=water.normal), light.environment, light.extinction, sky.airlight
     )
