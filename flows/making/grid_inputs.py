@@ -18,11 +18,13 @@ from catalogs.studies.ablation import ABLATION, cut_coupling, load_families
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_content, vehicle_tyre_source
 from catalogs.weather.grip import FOLDER as WEATHER_FOLDER
+from flows.making.driving import surface_of
 from flows.making.memory import find_memory_problems
 from flows.making.places import remember_place
 from flows.making.traced import read_trace_inputs
 from tasks.errors import InputError
 from tasks.render.sensor import Sensor
+from tasks.render.weather.snow.layer import HIGHEST_LUMP
 from tasks.surface.weather import WEATHERS
 
 LOADERS: Mapping[str, Callable[[Path], Any]] = {
@@ -112,6 +114,7 @@ def read_grid_inputs(grid: Grid, tick_rate_hz: int) -> tuple[dict[str, bytes], d
     inputs, scene, problems = _read_entries(grid.settings, weathers)
     if not problems:
         problems += _find_weather_problems(grid.settings, weathers)
+        problems += _find_buried_cameras(grid)
     if scene:
         problems += _find_route_problems(grid)
     if grid.poses is not None:
@@ -165,6 +168,21 @@ def _find_weather_problems(settings: GridFile, weathers: Set[str]) -> list[str]:
         except InputError as error:
             problems += error.problems
     return problems
+
+
+def _find_buried_cameras(grid: Grid) -> list[str]:
+    """Scenarios in whose pictures the camera would look out of the snow."""
+    if not grid.settings.pictures:
+        return []
+    surface, camera = load_surface(grid.settings.surface), load_camera(grid.settings.camera)
+    height_m = float(camera.T_rig_camera[2, 3])
+    deepest_mm = 1e3 * height_m / HIGHEST_LUMP
+    return [
+        f"scenario {label}: snow must be less than {deepest_mm:g} mm deep in a picture: its lumps reach the camera"
+        f" {height_m:g} m above the road; it is {depth_mm:g} mm: take a shorter snow_accumulation_h or pictures: false"
+        for label, scenario in grid.scenarios
+        if (depth_mm := surface_of(scenario, surface).snow_depth_mm) >= deepest_mm
+    ]
 
 
 def _find_camera_problems(settings: GridFile, tick_rate_hz: int) -> list[str]:

@@ -13,7 +13,7 @@ from flows.auditing.repair import repair_dataset
 from flows.auditing.verify import verify_dataset
 from flows.judging.physics import audit_physics
 from flows.making.generate import generate_dataset
-from flows.making.plan import read_plan
+from flows.making.plan import make_plan, read_plan
 from flows.reading.describe import describe_dataset
 from flows.reading.previews import make_films
 from flows.reading.query import query_dataset
@@ -36,6 +36,19 @@ def test_telemetry_is_that_of_the_same_grid_with_frames(toy_dataset, bare):
     assert [c["content"]["ticks"] for c in without] == [c["content"]["ticks"] for c in with_frames]
     ours, theirs = (pq.read_table(x.telemetry / "ticks") for x in (bare, toy_dataset))
     assert ours.equals(theirs, check_metadata=True)
+
+
+def test_snow_that_reaches_the_camera_is_refused_where_pictures_are_asked_for(tmp_path):
+    """Its highest lumps are twice the mean depth: 0.7 m buries a camera 1.4 m above the road."""
+    deep = "name: deep\nframes: 2\nframe_rate_hz: 1\nscenarios:\n"
+    for label, hours in (("under", 23.3), ("at", 23.4)):
+        deep += f"  {label}: {{weather: snow, precipitation_mm_h: 3, snow_accumulation_h: {hours}}}\n"
+    (tmp_path / "grid.yaml").write_text(deep)
+    with pytest.raises(InputError) as caught:
+        make_plan(tmp_path / "grid.yaml", "cpu")
+    (problem,) = caught.value.problems
+    assert "scenario at: snow must be less than 700 mm deep" in problem and "it is 702 mm" in problem
+    assert len(make_plan(tmp_path / "grid.yaml", "cpu", pictures=False)[0].clips) == 2
 
 
 def test_there_is_no_picture_and_no_verdict(bare):

@@ -26,6 +26,8 @@ EDGE_WIDTHS = 1.4
 """Distance to the edge of a patch by the standard deviation of a Gaussian that still ends there."""
 BURIED = 0.98
 """Share of an anchor that its snow hides from which on the anchor itself need not be drawn."""
+HIGHEST_LUMP = 2.0
+"""Height of the highest lump of snow by the mean depth [1]."""
 NARROWEST = 0.35
 """Width of the narrowest Gaussian, at the very edge, by that of its anchor."""
 
@@ -140,7 +142,7 @@ def snow_layer(
         kept = np.clip(inside / (EDGE_WIDTHS * wide), NARROWEST, 1)
         scales *= kept[:, None]
     lumps = height_field(place[:, 0], place[:, 1], p.lumps, field.seed, "snow-lumps", wide)
-    rise = 1e-3 * depth * np.clip(1 + p.lump_share * lumps, 0.2, 2)
+    rise = 1e-3 * depth * np.clip(1 + p.lump_share * lumps, 0.2, HIGHEST_LUMP)
     thin = np.argmin(scales, axis=1)
     scales[np.arange(len(index)), thin] = np.clip(0.3 * rise, 1e-3, 5e-3)
 
