@@ -1,5 +1,6 @@
 """The Gaussians that a clip is drawn from: the scene with the clip's road feature in it, before the weather."""
 
+from tasks.render.kerb_face import extend_kerbs
 from tasks.render.road_edit import RoadRelief, apply_road_profile
 from tasks.render.road_paint import HazardMarking, paint_feature
 from tasks.render.road_refinement import refine_road
@@ -33,4 +34,4 @@ def edit_scene(
     gaussians = refine_road(scene.gaussians, relief)
     if marking is not None and hazard.height_m > 0:
         gaussians = paint_feature(gaussians, relief, marking, *carriageway, asphalt_albedo)
-    return apply_road_profile(gaussians, relief, *carriageway)[0], relief
+    return extend_kerbs(apply_road_profile(gaussians, relief, *carriageway)[0], relief), relief
