@@ -24,10 +24,13 @@ def snow(parameters):
     return make_population(parameters.kinds["snow"].particles, 2.0)
 
 
-def test_one_class_has_as_many_drops_in_view_as_density_times_volume(parameters, rain):
+@pytest.mark.parametrize(("rate", "frames"), [(50, 12), (1872, 2)])
+def test_one_class_has_as_many_drops_in_view_as_density_times_volume(parameters, rate, frames):
+    """At the highest rate there is, a cell holds up to 96 drops on average."""
+    rain = make_population(parameters.kinds["rain"].particles, rate)
     near = replace(parameters.air.near, fade_share=0.2)
     counts = []
-    for seed in range(12):
+    for seed in range(frames):
         streaks = visible_streaks(rain, near, shutter(exposure_s=1e-6), CALM, seed)
         seen = ((streaks["begin"] > 0) & (streaks["begin"] < (480, 320))).all(axis=1)
         counts.append(np.histogram(streaks["diameter"][seen], bins=1e-3 * rain.edges_mm)[0])

@@ -7,13 +7,15 @@ class that is denser at a higher rate keeps its particles of a lower one: every 
 """
 
 from dataclasses import dataclass
-from math import cos, exp, log, pi, sin, sqrt
+from math import exp, log, pi, sqrt
+from typing import NamedTuple
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.render.lens import Lens, distort_rays, undistort_points
+from tasks.render.lens import Lens, undistort_points
+from tasks.render.weather.falling.exposure import NEAREST_Z_SHARE, expose, expose_by_rows, sway, turn
 from tasks.render.weather.falling.precipitation import NearField, Population, drawn_reach
 from tasks.render.weather.random_streams import philox, scale_to_unit, stream_key
 
@@ -30,11 +32,8 @@ STREAK = np.dtype(
 """One streak: picture positions at shutter opening and closing [px], camera z [m], diameter [m], share that is
 drawn (the rest is mean extinction) [1] and the direction from the camera in the world [1]."""
 
-MOST_PER_CELL = 32
-NEAREST_Z_SHARE = 0.3
-"""Particles are cut at this share of the nearest distance along the optical axis."""
-ROW_STEPS, MOST_LONGER = 8, 4.0
-"""Steps by which a particle's row is found, and the most that a row-by-row shutter lengthens a streak [1]."""
+WORD = np.uint64(0xFFFFFFFF)
+"""Bits of one word of the random generator's counter."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,6 +64,61 @@ class Shutter:
     line_delay_s: float = 0.0
 
 
+class _View(NamedTuple):
+    """What the kernels read of the exposure, the same for all size classes; units as in `Shutter`.
+
+    Parameters
+    ----------
+    R : float64 [3, 3] world to camera axes [1]
+    planes : float64 [4, 3] inward normals of the view's sides, camera axes [1]
+    K, coefficients, velocity, time, exposure, line_delay, height : of the shutter and its lens
+    by_rows : whether a lens or a delay of rows bends the streaks
+    nearest : distance from which particles are drawn [m]
+    key : of the random generator
+    """
+
+    R: NDArray[np.float64]
+    planes: NDArray[np.float64]
+    K: NDArray[np.float64]
+    coefficients: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    time: float
+    exposure: float
+    line_delay: float
+    height: int
+    by_rows: bool
+    nearest: float
+    key: np.uint64
+
+
+class _Falling(NamedTuple):
+    """What the kernels read of one size class.
+
+    Parameters
+    ----------
+    size_class : its number [1]
+    cell : edge of its cells [m]
+    mean : number of particles in a cell, on average [1]
+    sizes : float64 [2] exp(-slope D) at the ends of the class [1]
+    size_scale : diameter in the air by the logarithm of such a number [m]
+    velocity, seat : float64 [3] velocity in the world [m s-1], place of the camera in the frame of the particles [m]
+    flutter, flutter_rate : amplitude [m] and angular rate [s-1] of the sideways motion
+    reach, fade : distance up to which the class is drawn, and over which it fades before [m]
+    """
+
+    size_class: np.uint64
+    cell: float
+    mean: float
+    sizes: NDArray[np.float64]
+    size_scale: float
+    velocity: NDArray[np.float64]
+    seat: NDArray[np.float64]
+    flutter: float
+    flutter_rate: float
+    reach: float
+    fade: float
+
+
 def visible_streaks(
     population: Population, near: NearField, shutter: Shutter, wind: NDArray[np.float64], seed: int
 ) -> NDArray[np.void]:
@@ -88,9 +142,13 @@ def visible_streaks(
     R = np.ascontiguousarray(shutter.T_world_camera[:3, :3].T, dtype=np.float64)
     rays = _corner_rays(shutter, K)
     coefficients = np.zeros(5) if shutter.lens is None else shutter.lens.coefficients
-    planes = _frustum_planes(rays)
     reach = drawn_reach(population, near, K[0, 0])
-    key = np.uint64(stream_key(seed, p.kind))
+    view = _View(
+        R=R, planes=_frustum_planes(rays), K=K, coefficients=coefficients, velocity=shutter.velocity,
+        time=shutter.time_s, exposure=shutter.exposure_s, line_delay=shutter.line_delay_s, height=shutter.height,
+        by_rows=shutter.line_delay_s != 0 or bool((coefficients != 0).any()), nearest=near.nearest_m,
+        key=np.uint64(stream_key(seed, p.kind)),
+    )  # fmt: skip
     found = []
     for index in np.flatnonzero(reach):
         velocity = wind - np.array((0.0, 0.0, population.speed[index]))
@@ -100,17 +158,14 @@ def visible_streaks(
         hull = np.vstack((np.zeros(3), rays * reach[index])) @ R + seat
         low = np.floor((hull.min(axis=0) - p.flutter_m - near.nearest_m) / cell).astype(np.int64)
         high = np.floor((hull.max(axis=0) + p.flutter_m + near.nearest_m) / cell).astype(np.int64)
-        sizes = np.exp(-population.slope_mm * population.edges_mm[index : index + 2])
-        found.append(
-            _streaks_of_class(
-                low, high, cell, population.density[index] * cell**3, key, np.uint64(index),
-                sizes, -1e-3 * p.visible_diameter_ratio / population.slope_mm,
-                velocity, p.flutter_m, 2 * pi * p.flutter_hz, shutter.time_s,
-                seat, R, planes, K, shutter.velocity, shutter.exposure_s,
-                near.nearest_m, reach[index], near.fade_share * reach[index],
-                coefficients, shutter.line_delay_s, shutter.height,
-            )
+        falling = _Falling(
+            size_class=np.uint64(index), cell=cell, mean=population.density[index] * cell**3,
+            sizes=np.exp(-population.slope_mm * population.edges_mm[index : index + 2]),
+            size_scale=-1e-3 * p.visible_diameter_ratio / population.slope_mm,
+            velocity=velocity, seat=seat, flutter=p.flutter_m, flutter_rate=2 * pi * p.flutter_hz,
+            reach=reach[index], fade=near.fade_share * reach[index],
         )  # fmt: skip
+        found.append(_expose_cells(_count_in_cells(low, high, view, falling), view, falling))
     return np.concatenate(found) if found else np.empty(0, dtype=STREAK)
 
 
@@ -148,7 +203,8 @@ def _outside(point, planes, radius, reach):  # type: ignore[no-untyped-def]
 def _poisson(chance, mean):  # type: ignore[no-untyped-def]
     """Return a Poisson number by inversion; it never falls when the mean rises: populations are nested in the rate."""
     number, share = 0, exp(-mean)
-    while chance > share and number < MOST_PER_CELL:
+    most = mean + 12 * sqrt(mean) + 12  # no chance of 32 bits reaches it: rounding alone would
+    while chance > share and number < most:
         chance -= share
         number += 1
         share *= mean / number
@@ -156,134 +212,77 @@ def _poisson(chance, mean):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _turn(R, vector, out):  # type: ignore[no-untyped-def]
-    for i in range(3):
-        out[i] = R[i, 0] * vector[0] + R[i, 1] * vector[1] + R[i, 2] * vector[2]
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _sway(offset, moving, amplitude, rate, time, turn_x, turn_y, quickness, size):  # type: ignore[no-untyped-def]
-    """Add a flake's own slow elliptic motion to its position and velocity."""
-    amplitude *= 0.3 + 0.7 * size
-    rate *= 0.6 + 0.8 * quickness
-    for i in range(2):
-        own = rate * (1 - 0.23 * i)
-        phase = 2 * pi * (turn_x if i == 0 else turn_y) + own * time
-        offset[i] += amplitude * sin(phase)
-        moving[i] += amplitude * own * cos(phase)
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _expose(streak, place, motion, exposure, K):  # type: ignore[no-untyped-def]
-    """Write the pixels of a particle when the shutter opens and when it closes."""
-    z = place[2]
-    first = max(z - 0.5 * exposure * motion[2], NEAREST_Z_SHARE * z)
-    last = max(z + 0.5 * exposure * motion[2], NEAREST_Z_SHARE * z)
-    for i in range(2):
-        step = 0.5 * exposure * motion[i]
-        streak.begin[i] = K[i, i] * (place[i] - step) / first + K[i, 2]
-        streak.end[i] = K[i, i] * (place[i] + step) / last + K[i, 2]
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _seen_at(place, motion, time, K, coefficients):  # type: ignore[no-untyped-def]
-    """Return the distorted pixel of a particle at a time from the middle of the frame [px]."""
-    z = max(place[2] + time * motion[2], NEAREST_Z_SHARE * place[2])
-    x, y = (place[0] + time * motion[0]) / z, (place[1] + time * motion[1]) / z
-    x, y = distort_rays(x, y, coefficients)
-    return K[0, 0] * x + K[0, 2], K[1, 1] * y + K[1, 2]
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _expose_by_rows(streak, place, motion, exposure, K, coefficients, line_delay, height):  # type: ignore[no-untyped-def]
-    """`_expose` behind a lens, by a shutter that opens for one row after the other.
-
-    A particle is seen at the time t of its row, t = line_delay (row(t) - middle). A particle that moves in the
-    direction of the readout is exposed longer, by 1 / (1 - line_delay row'), and leaves that much more light.
-    """
-    half = 0.5 * abs(line_delay) * height
-    time = 0.0
-    for _ in range(ROW_STEPS if line_delay != 0 else 0):
-        _, row = _seen_at(place, motion, time, K, coefficients)
-        time = min(max(line_delay * (row - 0.5 * height), -half), half)
-    _, above = _seen_at(place, motion, time - 0.5 * exposure, K, coefficients)
-    _, below = _seen_at(place, motion, time + 0.5 * exposure, K, coefficients)
-    longer = 1 / max(1 - line_delay * (below - above) / exposure, 1 / MOST_LONGER)
-    streak.begin[0], streak.begin[1] = _seen_at(
-        place, motion, time - 0.5 * longer * exposure, K, coefficients
-    )
-    streak.end[0], streak.end[1] = _seen_at(place, motion, time + 0.5 * longer * exposure, K, coefficients)
-    return longer
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _streaks_of_class(  # type: ignore[no-untyped-def]
-    low, high, cell, mean, key, index, sizes, size_scale, velocity, flutter, flutter_rate, time,
-    seat, R, planes, K, camera_velocity, exposure, nearest, reach, fade, coefficients, line_delay, height,
-):  # fmt: skip
-    """Return the streaks of one size class in the cells ``low`` to ``high``, each with its own counter."""
-    streaks = np.empty(256, dtype=STREAK)
+def _count_in_cells(low, high, view, falling):  # type: ignore[no-untyped-def]
+    """Return the cells in view that hold particles: int64 [C, 4], of which the last is the number of particles."""
+    R, planes, seat, cell, key = view.R, view.planes, falling.seat, falling.cell, view.key
+    around = 0.87 * cell + falling.flutter + 0.5 * view.exposure * sqrt((view.velocity**2).sum())
+    around += 0.5 * abs(view.line_delay) * view.height * sqrt(((falling.velocity - view.velocity) ** 2).sum())
+    cells = np.empty(((high - low + 1).prod(), 4), dtype=np.int64)
     found = 0
-    offset, moving, place, motion = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    word32 = np.uint64(0xFFFFFFFF)
-    around = 0.87 * cell + flutter + 0.5 * exposure * sqrt((camera_velocity**2).sum())
-    around += 0.5 * abs(line_delay) * height * sqrt(((velocity - camera_velocity) ** 2).sum())
-    by_rows = line_delay != 0 or (coefficients != 0).any()
+    offset, place = np.empty(3), np.empty(3)
     for kx in range(low[0], high[0] + 1):
         for ky in range(low[1], high[1] + 1):
             for kz in range(low[2], high[2] + 1):
-                corner = (kx * cell - seat[0], ky * cell - seat[1], kz * cell - seat[2])
+                at = (kx, ky, kz)
                 for i in range(3):
-                    offset[i] = corner[i] + 0.5 * cell
-                _turn(R, offset, place)
-                if _outside(place, planes, around, reach):
+                    offset[i] = at[i] * cell - seat[i] + 0.5 * cell
+                turn(R, offset, place)
+                if _outside(place, planes, around, falling.reach):
                     continue
-                cx, cy, cz = np.uint64(kx) & word32, np.uint64(ky) & word32, np.uint64(kz) & word32
-                first, _, _, _ = philox(cx, cy, cz, index, key)
-                for j in range(_poisson(scale_to_unit(first), mean)):
-                    block = index + np.uint64(256 * (2 * j + 1))
-                    w0, w1, w2, w3 = philox(cx, cy, cz, block, key)
-                    offset[0], offset[1], offset[2] = scale_to_unit(w0), scale_to_unit(w1), scale_to_unit(w2)
-                    for i in range(3):
-                        offset[i] = corner[i] + cell * offset[i]
-                        moving[i] = velocity[i] - camera_velocity[i]
-                    diameter = size_scale * log(sizes[0] - scale_to_unit(w3) * (sizes[0] - sizes[1]))
-                    if flutter > 0:
-                        w0, w1, w2, w3 = philox(cx, cy, cz, block + np.uint64(256), key)
-                        _sway(
-                            offset,
-                            moving,
-                            flutter,
-                            flutter_rate,
-                            time,
-                            scale_to_unit(w0),
-                            scale_to_unit(w1),
-                            scale_to_unit(w2),
-                            scale_to_unit(w3),
-                        )
-                    distance = sqrt(offset[0] ** 2 + offset[1] ** 2 + offset[2] ** 2)
-                    if distance < nearest or distance > reach:
-                        continue
-                    _turn(R, offset, place)
-                    _turn(R, moving, motion)
-                    if place[2] < NEAREST_Z_SHARE * nearest:
-                        continue
-                    if found == len(streaks):
-                        longer = np.empty(2 * found, dtype=STREAK)
-                        for i in range(found):  # see `touched_tiles`
-                            longer[i] = streaks[i]
-                        streaks = longer
-                    streak = streaks[found]
-                    streak.share = min(1.0, (reach - distance) / fade)
-                    if by_rows:
-                        streak.share *= _expose_by_rows(
-                            streak, place, motion, exposure, K, coefficients, line_delay, height
-                        )
-                    else:
-                        _expose(streak, place, motion, exposure, K)
-                    for i in range(3):
-                        streak.direction[i] = offset[i] / distance
-                    streak.z = place[2]
-                    streak.diameter = diameter
+                first, _, _, _ = philox(
+                    np.uint64(kx) & WORD, np.uint64(ky) & WORD, np.uint64(kz) & WORD, falling.size_class, key
+                )
+                number = _poisson(scale_to_unit(first), falling.mean)
+                if number > 0:
+                    cells[found, 0], cells[found, 1], cells[found, 2], cells[found, 3] = kx, ky, kz, number
                     found += 1
+    return cells[:found]
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _expose_cells(cells, view, falling):  # type: ignore[no-untyped-def]
+    """Return the streaks of the particles in these cells that are neither too near nor too far."""
+    R, K, coefficients, camera_velocity = view.R, view.K, view.coefficients, view.velocity
+    cell, seat, velocity, sizes = falling.cell, falling.seat, falling.velocity, falling.sizes
+    streaks = np.empty(cells[:, 3].sum(), dtype=STREAK)
+    found = 0
+    offset, moving, place, motion = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    for c in range(len(cells)):
+        cx, cy, cz = (
+            np.uint64(cells[c, 0]) & WORD,
+            np.uint64(cells[c, 1]) & WORD,
+            np.uint64(cells[c, 2]) & WORD,
+        )
+        for j in range(cells[c, 3]):
+            block = falling.size_class + np.uint64(256 * (2 * j + 1))
+            w0, w1, w2, w3 = philox(cx, cy, cz, block, view.key)
+            offset[0], offset[1], offset[2] = scale_to_unit(w0), scale_to_unit(w1), scale_to_unit(w2)
+            for i in range(3):
+                offset[i] = cells[c, i] * cell - seat[i] + cell * offset[i]
+                moving[i] = velocity[i] - camera_velocity[i]
+            diameter = falling.size_scale * log(sizes[0] - scale_to_unit(w3) * (sizes[0] - sizes[1]))
+            if falling.flutter > 0:
+                w0, w1, w2, w3 = philox(cx, cy, cz, block + np.uint64(256), view.key)
+                own = (scale_to_unit(w0), scale_to_unit(w1), scale_to_unit(w2), scale_to_unit(w3))
+                sway(offset, moving, falling.flutter, falling.flutter_rate, view.time, own)
+            distance = sqrt(offset[0] ** 2 + offset[1] ** 2 + offset[2] ** 2)
+            if distance < view.nearest or distance > falling.reach:
+                continue
+            turn(R, offset, place)
+            turn(R, moving, motion)
+            if place[2] < NEAREST_Z_SHARE * view.nearest:
+                continue
+            streak = streaks[found]
+            streak.share = min(1.0, (falling.reach - distance) / falling.fade)
+            if view.by_rows:
+                streak.share *= expose_by_rows(
+                    streak, place, motion, view.exposure, K, coefficients, view.line_delay, view.height
+                )
+            else:
+                expose(streak, place, motion, view.exposure, K)
+            for i in range(3):
+                streak.direction[i] = offset[i] / distance
+            streak.z = place[2]
+            streak.diameter = diameter
+            found += 1
     return streaks[:found]
