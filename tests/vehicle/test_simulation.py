@@ -148,6 +148,22 @@ def test_a_grade_takes_its_share_of_gravity_and_pitches_the_body_as_braking_does
     assert abs(up.column("pitch")[250] - flat.column("pitch")[250]) < np.radians(0.02)
 
 
+def test_a_car_that_stands_on_a_grade_rests_on_its_lower_axle(vehicle, run):
+    """Statics: the weight along the grade, m g i, acts at the height of the centre of gravity on the wheelbase."""
+    brake = make_trace_input(np.full(800, 2.0), 0.01)
+    up, flat, down = (
+        run(brake, samples=800, conditions=Conditions(grade=0.1, direction=d)) for d in (1, 0, -1)
+    )
+    weight = 0.1 * vehicle.mass * vehicle.gravity
+    for hill, sign in ((up, 1.0), (down, -1.0)):
+        lost = flat.column("axle_load_f")[-1] - hill.column("axle_load_f")[-1]
+        assert lost == pytest.approx(sign * weight * vehicle.cg_height / vehicle.wheelbase, rel=2e-3)
+        assert hill.column("tyre_force_f")[-1] + hill.column("tyre_force_r")[-1] == pytest.approx(
+            -sign * weight
+        )
+    assert up.column("pitch")[-1] < flat.column("pitch")[-1] - np.radians(0.3)
+
+
 def test_a_measured_engine_torque_acts_through_the_wheels(vehicle, run):
     """A held torque decelerates the whole inertia; on ice it cannot take more than the tyres pass on."""
     none, torque = np.zeros(300), np.full(300, -600.0)

@@ -197,15 +197,16 @@ def compute_rolling_axle(
 
 
 @register_jitable(cache=True, error_model="numpy", forceinline=True)
-def compute_standing_axle(ground: Ground, strut: Strut, wheels: Wheels) -> AxlePorts:
+def compute_standing_axle(ground: Ground, strut: Strut, wheels: Wheels, pull: float) -> AxlePorts:
     """Return the ports of an axle at rest: the tyre holds the vehicle on the slope, the brake holds the wheel.
 
     Parameters
     ----------
     ground, strut : ground under the axle and strut above it
     wheels : wheels, brakes and longitudinal values
+    pull : part of the weight along the grade that the axle holds, rearward positive [N]
     """
-    tyre_force = -ground.load * ground.slope
+    tyre_force = -ground.load * ground.slope - pull
     return AxlePorts(
         ground,
         0.0,

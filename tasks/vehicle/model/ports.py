@@ -113,9 +113,10 @@ def compute_ports(
                 forms,
             )
     if standing:
+        pull = wheels.mass * chassis.climb / (body.static_f + body.static_r)
         front, rear = (
-            compute_standing_axle(ground_f, strut_f, wheels),
-            compute_standing_axle(ground_r, strut_r, wheels),
+            compute_standing_axle(ground_f, strut_f, wheels, body.static_f * pull),
+            compute_standing_axle(ground_r, strut_r, wheels, body.static_r * pull),
         )
     else:
         gain_f, gain_r = compute_brake_gains(instant.pressure, chassis)
