@@ -18,7 +18,9 @@ from tasks.surface.road_profile import RoadHazard, road_slope
 from tasks.surface.state import SurfaceParameters
 from tasks.surface.weather import Weather, find_weather, surface_state
 from tasks.vehicle.model.axle_ports import compute_signed_slip
+from tasks.vehicle.paper.low_speed import SteadyStop, find_rule_span
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle, compute_surface_response
+from tasks.vehicle.rollout import Rollout
 from tasks.vehicle.tyres.contract import compute_braking_slip, compute_tyre_friction
 
 TOLERANCE = 1e-9
@@ -142,25 +144,26 @@ def force_steps(
 
 
 def pitch_steps(
-    vehicle: Vehicle, response: SurfaceResponse, hazard: RoadHazard, mode: str, row: Mapping[str, Any],
-    driven: Mapping[str, NDArray[Any]],
+    vehicle: Vehicle, response: SurfaceResponse, hazard: RoadHazard, row: Mapping[str, Any], ride: Rollout,
+    steady: SteadyStop | None,
 ) -> list[Step]:  # fmt: skip
     """Brake moment at the tick, and the pitch and heave that the history up to it leaves (Eqs. 10, S15 to S17).
 
     Parameters
     ----------
     vehicle, response, hazard : as above
-    mode : paper or coupled; the moment is told in paper mode only
     row : the stored frame
-    driven : columns of the clip driven again from its scenario
+    ride : the clip driven again from its scenario; the moment is told in paper mode only
+    steady : how the end of its stop is kept steady; None takes the published rule literally
     """
     tick = int(row["tick"])
     steps = []
-    if mode == "paper":
+    if ride.mode == "paper":
         scale = response.pitch_scale * (1.0 if hazard.height_m == 0 else vehicle.coupled_pitch_scale)
         d = max(-float(row["longitudinal_acceleration"]), 0.0)
         steps.append(Step(
-            quantity="brake-pitch moment, away from the stop", symbol="M_b", equation="S16", unit="N m",
+            quantity=f"brake-pitch moment{_tell_rule(response, ride, steady, tick)}",
+            symbol="M_b", equation="S16", unit="N m",
             formula=f"{scale:.5g} * {vehicle.sprung_mass:g} * {vehicle.cg_height:g} * {d:.5g}",
             recomputed=scale * vehicle.sprung_mass * vehicle.cg_height * d,
         ))  # fmt: skip
@@ -168,9 +171,18 @@ def pitch_steps(
         *steps,
         *(Step(quantity=name, symbol=symbol, equation="10, S15", unit=unit,
                formula=f"half-car driven again from t = 0, tick {tick}",
-               recomputed=float(driven[name][tick]), stored=float(row[name]))
+               recomputed=float(ride.columns[name][tick]), stored=float(row[name]))
           for name, symbol, unit in (("pitch", "theta", "rad"), ("heave", "z_s", "m"))),
     ]  # fmt: skip
+
+
+def _tell_rule(response: SurfaceResponse, ride: Rollout, steady: SteadyStop | None, tick: int) -> str:
+    """Say when the low-speed rule acts, at a tick at which it may put another moment in the place of Eq. S16's."""
+    if steady is not None and not steady.pitch_rule:
+        return ""
+    begin, end = find_rule_span(ride.brake_onset_time, ride.stop_time, response.hold_s, response.release_s)
+    acts = begin <= float(ride.columns["t_ns"][tick]) * 1e-9 <= end
+    return f" before the low-speed rule, which acts from {begin:.3f} s to {end:.3f} s" if acts else ""
 
 
 def picture_steps(

@@ -175,7 +175,7 @@ def list_steps(asked: Asked, entries: Entries, drive: Drive) -> list[Step]:
     return [
         *surface_steps(weather_of(drive.scenario), entries.surface, vehicle, row),
         *force_steps(vehicle, response, hazard, asked.mode, row),
-        *pitch_steps(vehicle, response, hazard, asked.mode, row, drive.ride.columns),
+        *pitch_steps(vehicle, response, hazard, row, drive.ride, entries.steady),
     ]
 
 

@@ -94,15 +94,15 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
         friction=float(row["surface_friction"]),
         snow_depth_mm=float(row["snow_depth_mm"]),
     )
+    steady = load_kept_low_speed(layout.inputs)
     ride = simulate_scenario(
-        vehicle, state, controls_of(driven), hazard, mode=mode, duration_s=plan.duration_s,
-        steady=load_kept_low_speed(layout.inputs),
-    )  # fmt: skip
+        vehicle, state, controls_of(driven), hazard, mode=mode, duration_s=plan.duration_s, steady=steady
+    )
     response = compute_surface_response(vehicle, state.kind, state.friction)
     steps = [
         *surface_steps(weather_of(driven), surface, vehicle, row),
         *force_steps(vehicle, response, hazard, mode, row),
-        *pitch_steps(vehicle, response, hazard, mode, row, ride.columns),
+        *pitch_steps(vehicle, response, hazard, row, ride, steady),
         *picture_steps(vehicle, load_camera(layout.inputs / "camera.yaml"), row, first, find_route(plan.scene)),
     ]  # fmt: skip
     result = {

@@ -6,6 +6,7 @@ with the slip; steadily it is the mean over the hold time.
 """
 
 from dataclasses import dataclass
+from math import isnan, nan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +51,19 @@ class BrakedStop:
 
 NO_STOP = BrakedStop(onset=np.inf, sample=-1)
 """A drive whose pitch follows the deceleration as it is."""
+
+
+def find_rule_span(onset: float, stop: float, hold_s: float, release_s: float) -> tuple[float, float]:
+    """Return the times between which the rule may put another deceleration in the place of the drive's [s].
+
+    Parameters
+    ----------
+    onset, stop : brake onset and stop; both times are NaN where either is [s]
+    hold_s, release_s : tau_h and tau_r [s]
+    """
+    if isnan(onset + stop):
+        return nan, nan
+    return max(min(max(onset, stop - hold_s), stop - CAP_WINDOW_S), 0.0), stop + release_s
 
 
 def compute_brake_pitch_input(

@@ -47,6 +47,34 @@ def test_all_stored_numbers_follow(toy_dataset, coupled, mode, clip, frame):
     assert all(step["stored"] is not None for step in result["steps"] if step["quantity"] in CHAIN)
 
 
+def test_the_moment_says_when_the_low_speed_rule_acts(tmp_path):
+    """A stop from 5 km/h: 0.1 s before it the rule has replaced the deceleration; before the brake it has not."""
+    text = """
+name: slow
+pictures: false
+frames: 8
+frame_rate_hz: 10
+duration_s: 1.5
+scenarios:
+  stop: {initial_speed_km_h: 5, peak_pressure_mpa: 2.3, brake_onset_s: 0.1}
+"""
+    (tmp_path / "grid.yaml").write_text(text)
+    generate_dataset(str(tmp_path / "grid.yaml"), str(tmp_path / "data"), runner="threads", workers=1)
+    early, late = (
+        [
+            s["quantity"]
+            for s in explain_frame(str(tmp_path / "data"), "stop", frame)["steps"]
+            if s["symbol"] == "M_b"
+        ]
+        for frame in (2, 5)
+    )
+    assert early == ["brake-pitch moment"]
+    (told,) = late
+    begin, end = (float(t) for t in re.findall(r"(\d+\.\d+) s", told))
+    assert "before the low-speed rule, which acts from" in told
+    assert (begin, end) == (pytest.approx(0.402, abs=0.01), pytest.approx(0.662, abs=0.03))
+
+
 def test_the_horizon_moves_by_the_focal_length_times_the_pitch(toy_dataset):
     """Pinhole camera: a far point turned by theta moves by f tan(theta); the toy camera has f = 80 px."""
     steps = {s["quantity"]: s for s in explain_frame(str(toy_dataset.root), "dry/flat", 8)["steps"]}
