@@ -62,7 +62,7 @@ class SurfaceState:
     precipitation_mm_h : what falls, water equivalent [mm/h]
     film_depth_mm : total depth of the film from the bottom of the texture, h_t [mm]
     snow_depth_mm : h_s [mm]
-    snow_coverage : share of the tyre contact on snow, c_s [1]
+    snow_coverage : share of the road that snow covers, c_s; friction takes it for that of the tyres' contact [1]
     friction : reference surface coefficient, mu_c; NaN where only the picture is asked for [1]
 
     Raises

@@ -117,7 +117,7 @@ def snow_friction(film_mm: float, coverage: float, parameters: SurfaceParameters
     Parameters
     ----------
     film_mm : not used
-    coverage : share of the contact on snow, c_s [1]
+    coverage : share of the road that snow covers, c_s, taken for that of the contact [1]
     parameters : the friction anchors
 
     References

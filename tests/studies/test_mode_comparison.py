@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.vehicle_modes import HEADER, compute_differences, format_table
+from catalogs.low_speed import load_low_speed
 from tasks.studies.mode_comparison import mode_difference
 from tests.vehicle.conftest import command
 
@@ -35,6 +36,20 @@ def test_the_documented_table_is_the_computed_one(rows):
             numbers(line)[1], documented[name], tolerance, HEADER[1:], strict=True
         ):
             np.testing.assert_allclose(found, printed, atol=atol, err_msg=f"{name}, {title}")
+
+
+def test_the_documented_dive_of_slow_stops_is_the_computed_one(drive):
+    lines = DOCUMENT.read_text(encoding="utf-8").splitlines()
+    start = next(i for i, line in enumerate(lines) if line.startswith("| from [km/h]"))
+    speeds, times, paper, coupled = (numbers(lines[start + i])[1] for i in (0, 2, 3, 4))
+    for speed, time, *peaks in zip(speeds, times, paper, coupled, strict=True):
+        rides = [
+            drive(speed_km_h=speed, mode=mode, duration=4.0, steady=load_low_speed())
+            for mode in ("paper", "coupled")
+        ]
+        assert rides[0].stop_time - 1 == pytest.approx(time, abs=0.006)
+        found = [float(np.degrees(ride.columns["pitch"].max())) for ride in rides]
+        np.testing.assert_allclose(found, peaks, atol=0.006, err_msg=f"{speed:g} km/h")
 
 
 def test_the_modes_agree_on_every_condition_of_the_paper(rows):

@@ -8,6 +8,7 @@ from catalogs.vehicles import load_vehicle
 from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.brake import BrakeCommand
+from tasks.vehicle.paper.low_speed import SteadyStop
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Controls, Rollout, simulate_scenario
 
@@ -41,6 +42,7 @@ def drive(vehicle: Vehicle) -> Drive:
         hold: bool = False,
         car: Vehicle | None = None,
         step: float = 0.0005,
+        steady: SteadyStop | None = None,
     ) -> Rollout:
         controls = Controls(
             initial_speed=speed_km_h / 3.6, brake=brake or command(), hold_speed_until_brake=hold
@@ -53,6 +55,7 @@ def drive(vehicle: Vehicle) -> Drive:
             mode=mode,
             duration_s=duration,
             step_s=step,
+            steady=steady,
         )
 
     return run

@@ -56,7 +56,7 @@ class AirControls:
 
     @property
     def particles_m3(self) -> float:
-        """Number of particles of drawn sizes in a cubic metre, which rises with the rate [m-3]."""
+        """Number of particles of drawn sizes in a cubic metre, which rises with rain and falls with snow [m-3]."""
         return 0.0 if self.population is None else float(self.population.density.sum())
 
 

@@ -2,8 +2,7 @@
 
 Pavement and earth beside it drain: water fills their pores, so that they are darker, but no film stands on them.
 
-Refraction moves the texture below by under a tenth of a pixel at 480x320, and changes one road pixel in seven by one
-grey level: it is drawn where it is asked for.
+Refraction moves the texture below by under a tenth of a pixel at 480x320: it is drawn where it is asked for.
 """
 
 from dataclasses import dataclass, replace
