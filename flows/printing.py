@@ -21,7 +21,7 @@ def print_result(value: dict[str, Any]) -> None:
         if isinstance(entry, list) and entry and isinstance(entry[0], dict):
             _print_table(key, entry)
         elif isinstance(entry, list) and any(isinstance(item, str) and ", " in item for item in entry):
-            print_lines(f"{key}:", *(f"  - {_format_value(item)}" for item in entry))
+            print_lines("\n".join([f"{key}:", *(f"  - {_format_value(item)}" for item in entry)]))
         else:
             print_lines(f"{key}: {_format_value(entry)}")
 

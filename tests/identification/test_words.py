@@ -7,7 +7,7 @@ import pytest
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
-from tasks.identification.decision.answer import ChannelError, NamedEffect
+from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter
 from tasks.identification.decision.attribution import Candidate
 from tasks.identification.decision.verdict import find_pair_to_confirm
 from tasks.identification.decision.words import say_confirmation, say_rejection, tell_verdict
@@ -23,6 +23,7 @@ ERROR = ChannelError(
     worst_run="run", unit="m/s",
 )  # fmt: skip
 """Of the speed on held-out runs."""
+LATE = Parameter(name="dead_time", value=0.021, ci_low=0.01, ci_high=0.03, lower=0.0, upper=0.5, unit="s")
 
 
 def judged(
@@ -76,22 +77,44 @@ def test_where_nothing_is_missing_the_verdict_says_what_the_vehicles_own_numbers
 def test_own_numbers_are_told_where_resamples_agree_or_the_error_is_halved() -> None:
     """Of three stops, of which one was right before, one resample in 27 holds that one alone."""
     unsure = replace(ERROR, frozen=1.22, retuned=0.62, after=0.62, change_low=-1.8, change_high=0.02)
-    halved = replace(unsure, after=0.6)
-    for speed, stop, said in (
-        (unsure, halved, ()),
-        (halved, unsure, ("speed",)),
-        (halved, replace(halved, unit="m"), ("speed", "stopping distance")),
-        (replace(unsure, change_high=-0.01), unsure, ("speed",)),
-    ):
-        told = tell_verdict(
-            (), (), (), {"speed": speed}, {"stopping_distance": stop}, own="the brakes give more"
+    for speed, is_said in (
+        (unsure, False), (replace(unsure, after=0.6), True), (replace(unsure, change_high=-0.01), True),
+    ):  # fmt: skip
+        told = tell_verdict((), (), (), {"speed": speed}, {}, own="the brakes give more")
+        assert ("; its own numbers" in told) is is_said
+
+
+def test_own_numbers_are_told_with_a_stop_that_they_miss_by_more() -> None:
+    speed = replace(ERROR, frozen=0.4, retuned=0.27, after=0.27, change_low=-0.3, change_high=-0.1)
+    stop = replace(ERROR, frozen=3.31, retuned=4.0, after=4.0, unit="m")
+    told = tell_verdict((), (), (), {"speed": speed}, {"stopping_distance": stop}, own="the brakes give more")
+    assert "of the speed from 0.4 to 0.27 m/s and of the stopping distance from 3.3 to 4 m" in told
+
+
+def test_a_name_is_not_credited_with_what_the_vehicles_own_numbers_do() -> None:
+    """Brakes 21 ms late were said to take a stop's error from 7.3 to 1.1 m, which a gain 10 % off did."""
+    effect = next(e for e in load_effects() if e.name == "brake_dead_time")
+    late = replace(FORM, name=effect.name, effect_class="effect", parameters=(LATE,))
+    error = replace(ERROR, frozen=0.86, retuned=1.04, after=0.092)
+    told = tell_verdict((late,), (), (effect,), {"speed": error}, {}, own="the brakes give 9.9 % below")
+    assert told == (
+        "The brakes answer 0.021 s late; with the vehicle's own numbers fitted too (the brakes give 9.9 % below), that"
+        " takes the error of the speed from 0.86 (re-tuned 1) to 0.092 m/s, on runs to which no number was fitted."
+    )
+
+
+def test_rivals_of_one_of_several_names_are_no_rivals_of_all() -> None:
+    library = load_effects()
+    late, engine, rolling = (
+        replace(
+            FORM, name=name, effect_class="effect",
+            parameters=tuple(replace(LATE, name=p.name) for p in next(e for e in library if e.name == name).parameters),
         )
-        assert [name for name in ("speed", "stopping distance") if f"of the {name} from 1.2" in told] == [
-            *said
-        ]
-        assert told.startswith(
-            "These runs show nothing that the model lacks" + ("; its own" if said else ".")
-        )
+        for name in ("brake_dead_time", "engine_braking", "rolling_resistance")
+    )  # fmt: skip
+    told = tell_verdict((late, engine), (rolling, rolling), library, {"speed": replace(ERROR, after=0.1)}, {})
+    assert "in the place of one of these, which these runs cannot tell apart; together they take" in told
+    assert "2 other explanations" not in told, "one effect may be the rival of both"
 
 
 def test_an_error_that_reads_the_same_before_and_after_is_not_told_as_taken_from_one_to_the_other() -> None:

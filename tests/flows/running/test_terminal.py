@@ -43,6 +43,11 @@ def test_json_is_plain_ascii(capsys):
     assert capsys.readouterr().out.isascii()
 
 
+def test_each_sentence_of_a_list_has_a_line_of_its_own(capsys):
+    print_result({"reasons": ["a, b", "c\x1b"], "made": ["dry", "snow"]})
+    assert capsys.readouterr().out == "reasons:\n  - a, b\n  - c\\x1b\nmade: dry, snow\n"
+
+
 def test_only_the_line_feeds_of_several_lines_stay():
     assert escape_controls("a\n\x1b") == r"a\n\x1b"
     assert escape_lines("a\n\x1b\tb") == "a\n" + r"\x1b\tb"

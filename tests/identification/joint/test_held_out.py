@@ -12,6 +12,7 @@ from tasks.identification.joint import held_out
 from tasks.identification.joint.held_out import (
     drop_contradicted_rivals,
     drop_what_predicts_worse,
+    find_better_substitute,
     makes_difference,
 )
 from tests.identification.joint.known_car import slow_brakes
@@ -26,6 +27,30 @@ def test_a_rival_that_predicts_held_out_runs_much_worse_is_none(monkeypatch, err
     rival = SimpleNamespace(fitted=error)
     assert RULES.better_prediction_share == 0.75
     assert drop_contradicted_rivals([], 0.10, [rival], RULES) == ((rival,) if is_kept else ())
+
+
+@pytest.mark.parametrize(
+    ("cost", "error", "certainty", "taken"),
+    [(99.0, 0.1, 1.1, True), (101.0, 0.1, 1.1, False), (99.0, 0.11, 1.1, False), (99.0, 0.1, 0.9, False)],
+)
+def test_a_rival_that_explains_more_takes_the_place_of_the_name(
+    monkeypatch, cost: float, error: float, certainty: float, taken: bool
+):
+    """A lag was named with twice the cost of a dead time, which the car had and elimination had taken away."""
+    dead_time = next(n for n in load_joint_numbers() if n.name == "dead_time")
+
+    def fit_of(cost: float, error: float) -> SimpleNamespace:
+        return SimpleNamespace(cost=cost, error=error, numbers=(dead_time,), by_name={"dead_time": 0.1})
+
+    monkeypatch.setattr(held_out, "_held_out_misfit", lambda _, fit: (fit.error, 1.0))
+    monkeypatch.setattr(held_out, "measure_certainty", lambda *_: [certainty])
+    better, worse = (SimpleNamespace(name="dead_time", fitted=fit_of(c, error)) for c in (cost, cost + 0.5))
+    found = find_better_substitute([], fit_of(100.0, 0.1), [worse, better], RULES)
+    assert found is (better if taken else None)
+    at_bound = SimpleNamespace(**{**vars(better.fitted), "by_name": {"dead_time": dead_time.upper}})
+    ended = SimpleNamespace(name="dead_time", fitted=at_bound)
+    assert find_better_substitute([], fit_of(100.0, 0.1), [ended], RULES) is None
+    assert find_better_substitute([], fit_of(100.0, 0.1), [], RULES) is None
 
 
 @pytest.mark.parametrize(

@@ -48,7 +48,9 @@ def test_a_rival_is_fitted_where_its_derivatives_let_it_matter(monkeypatch, shar
 
     monkeypatch.setattr(substitutes, "refit_numbers", look_up_cost)
     monkeypatch.setattr(substitutes, "foresee_falls", foresee_little)
-    assert [one.name for one in find_substitutes([], named, named.numbers, list(NUMBERS.values()), 0.85)] == rivals
+    assert [
+        one.name for one in find_substitutes([], named, named.numbers, list(NUMBERS.values()), 0.85)
+    ] == rivals
 
 
 def test_a_gain_that_the_file_claims_to_know_may_stand_for_a_resistance(monkeypatch):

@@ -159,6 +159,8 @@ def test_tyres_at_their_limit_are_a_rival_of_the_brakes_curve():
     )  # fmt: skip
     found = name_rivals(fitted, [], [curve], RULES.joint)
     assert [rival.name for _, rival in found] == ["retuned_wet_friction"]
+    wet = replace(curve, name="retuned_wet_friction")
+    assert name_rivals(fitted, [], [curve, wet], RULES.joint) == [], "no name is a rival of one beside it"
 
 
 def test_numbers_alone_are_calibrated_and_not_named_where_the_whole_library_was_searched():
