@@ -43,8 +43,8 @@ def object_to_last(
             f"{', '.join(h.name for h in named)} would fit, but predicts {', '.join(missed)} of the held-out runs with"
             f" {ratio:.3g} times the error of re-tuning alone: not named"
         )
-    gained = any(e.after < e.retuned for e in error.values())
-    if not gained or beside > rules.retuned_limit or (number and beside >= 1.0):
+    nowhere_better = all(rules.noticed_share * e.after > e.retuned for e in error.values())
+    if nowhere_better or beside > rules.retuned_limit or (number and beside >= 1.0):
         return (
             f"{', '.join(h.name for h in named)} would fit, but re-tuning alone predicts the held-out runs better, with"
             f" {1.0 / beside:.3g} of the error: not named"
