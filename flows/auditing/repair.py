@@ -1,10 +1,9 @@
 """Repair of a finished dataset: damaged and missing files are made again byte for byte, or a sentence says why not."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import PurePosixPath
 from typing import Any
 
-import pyarrow as pa
 import pyarrow.parquet as pq
 
 from flows.auditing.verify import compare_files
@@ -13,7 +12,8 @@ from flows.making.generate import create_frame_arrays, fan_out, open_workers
 from flows.making.grid_inputs import input_sources
 from flows.making.input_changes import recorded_input
 from flows.making.plan import Plan, read_plan
-from flows.making.seal import clips_table, pairs_table, preview_sheet
+from flows.making.seal import preview_sheet
+from flows.making.summaries import SUMMARIES, summarise_clips
 from flows.running.orchestration import run_as_stage
 from flows.running.runner import RunnerName, check_runner
 from flows.store.address import open_for_writing, send_files, want_everything
@@ -22,18 +22,12 @@ from flows.store.lock import sole_writer
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
 from flows.store.staging import left_overs, remove_staged, remove_staging, scratch_dataset
-from flows.store.telemetry import write_parquet
+from flows.store.telemetry import write_parquet, write_tables
 from manifests.canonical import sha256_of_file
 from manifests.explain import as_sentences, find_tool_differences, tools_here
 from manifests.manifest import recorded_files
 from manifests.records import Manifest
 from tasks.errors import InputError
-
-SUMMARIES: Mapping[str, Callable[[list[Any]], pa.Table]] = {
-    "telemetry/clips.parquet": clips_table,
-    "telemetry/pairs.parquet": pairs_table,
-}
-"""Tables that follow from the clips' records."""
 
 
 def repair_dataset(
@@ -196,8 +190,8 @@ def _remake_summaries(
 ) -> None:
     """Tables of clips and the contact sheet, which follow from the manifest and the other files."""
     receipts = manifest["clips"]
-    for path, table_of in SUMMARIES.items():
-        write_parquet(table_of(receipts), scratch.root / path)
+    for path, tables in summarise_clips(plan, receipts):
+        write_tables(tables, scratch.root / path)
     if "previews/contact_sheet.png" in wanted:
         for path, ids in table_parts(plan, "frames").items():
             for clip_id in ids:

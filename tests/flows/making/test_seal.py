@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from flows.making.generate import RunCost
-from flows.making.seal import _join, _pack, pick_evenly
+from flows.making.seal import pick_evenly
+from flows.making.summaries import _join, _pack
 from flows.store.telemetry import labelled_table
 
 

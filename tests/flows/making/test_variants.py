@@ -1,6 +1,7 @@
 """A dataset in which one coupling is cut: the picture is the scenario's, the motion the variant's, and all say so."""
 
 import json
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +17,7 @@ from flows.auditing.audit import audit_dataset
 from flows.auditing.driven_lines import Asked, drive_clip, is_driven, load_entries, move_lines
 from flows.auditing.explain import explain_frame
 from flows.auditing.kept_lines import list_lines
+from flows.auditing.repair import repair_dataset
 from flows.exporting.export import export_dataset
 from flows.judging.physics import audit_physics, clip_columns, clip_facts
 from flows.making.catalogue import catalogue_of
@@ -24,6 +26,7 @@ from flows.making.freezing import frozen_run, problems_of
 from flows.making.generate import generate_dataset
 from flows.making.plan import freeze_grid, read_plan
 from flows.making.replay import replay_audit
+from flows.making.summaries import SUMMARIES
 from flows.reading.describe import describe_dataset, validate_grid
 from flows.reading.report import page_data
 from flows.store.frames import read_clip
@@ -171,6 +174,16 @@ def test_a_cut_dataset_is_made_again_byte_for_byte_and_obeys_the_laws_of_what_it
     physics = audit_physics(root)
     assert physics["verified"], physics["clips"]
     assert explain_frame(root, clip_facts(made[variant].root)[0]["label"], 2)["agrees"]
+
+
+@pytest.mark.parametrize("variant", CUTS)
+def test_the_summaries_of_a_cut_dataset_are_repaired_byte_for_byte(made, variant, tmp_path):
+    root = shutil.copytree(made[variant].root, tmp_path / "copy")
+    before = {path: (root / path).read_bytes() for path in SUMMARIES}
+    for path in before:
+        (root / path).unlink()
+    assert repair_dataset(str(root), runner="threads", workers=1)["repaired"]
+    assert {path: (root / path).read_bytes() for path in SUMMARIES} == before
 
 
 def test_lineage_drives_the_variant_and_finds_its_rates(made):
