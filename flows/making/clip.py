@@ -4,7 +4,6 @@ A clip is made whole by one worker. Its frames and tables are written first and 
 where the receipt exists, the clip is complete. Making a clip twice writes the same bytes.
 """
 
-import resource
 import time
 from collections.abc import Mapping
 from dataclasses import asdict, fields, replace
@@ -29,6 +28,7 @@ from flows.making.edited_scene import edit_scene
 from flows.making.places import remember_place
 from flows.making.plan import TICK_RATE_HZ, Plan, frame_ticks, read_plan
 from flows.making.traced import replay_drive, unknown_ranges
+from flows.running.processors import measure_peak_memory
 from flows.store.address import find_local, send_files
 from flows.store.frames import buffer_hash, write_clip
 from flows.store.layout import STAGED_TABLES, Layout, write_json
@@ -106,7 +106,7 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
     cost = {
         "cpu_s": time.process_time() - started[0],
         "wall_s": time.perf_counter() - started[1],
-        "peak_memory_mib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+        "peak_memory_mib": measure_peak_memory(),
     }
     return receipt | {"cost": cost}
 

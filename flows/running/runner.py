@@ -12,6 +12,7 @@ from queue import SimpleQueue
 from threading import Thread
 from typing import Any, Literal, get_args
 
+from flows.running.processors import count_processors
 from flows.running.terminal import print_lines
 from tasks.errors import InputError
 
@@ -64,7 +65,7 @@ def open_executor(
         are not set up like this machine.
     """
     check_runner(runner, scheduler)
-    count = workers or len(os.sched_getaffinity(0))
+    count = workers or count_processors()
     for name in ONE_THREAD:
         os.environ.setdefault(name, "1")
     if runner == "threads":
