@@ -42,9 +42,12 @@ REACHES = {
     "processor": (VEHICLE, RENDER),
 }
 """Stages whose bytes an input can change; motion reaches the picture because the camera rides on the body."""
-STAGE_OF_CONTENT = {"ticks": VEHICLE, "frames": JUDGING} | dict.fromkeys(
-    ("rgb", "depth", "class", "normal", "road", "flow", "marks"), RENDER
+STAGE_OF_CONTENT = (
+    dict.fromkeys(("ticks", "label", "scenario", "seed", "split", "calibration"), VEHICLE)
+    | dict.fromkeys(("rgb", "depth", "class", "normal", "road", "flow", "marks"), RENDER)
+    | dict.fromkeys(("frames", "figures", "verdict"), JUDGING)
 )
+"""Stage that makes each content of a clip, and from which on each of its records can change."""
 ABSENT = "absent"
 
 
@@ -139,7 +142,7 @@ def find_reasons(changed: Sequence[str], differences: Sequence[Mapping[str, Any]
 
     Parameters
     ----------
-    changed : contents of the clip that differ: ticks, frames, rgb, depth, class
+    changed : contents and records of the clip that differ, keys of `STAGE_OF_CONTENT`
     differences : rows of `find_input_differences`
     """
     stages = {STAGE_OF_CONTENT[name] for name in changed}

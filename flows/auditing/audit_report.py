@@ -32,7 +32,10 @@ def tell_verdict(result: Mapping[str, Any]) -> str:
             f"of {len(clips)} clips made again {same} came out as recorded and {len(clips) - same} did not"
         )
     word = "Verified" if result["verified"] else "Not verified"
-    return f"{word}: {describe_files(result)}; {remade}; {describe_signature(result)}."
+    clauses = [describe_files(result), remade, describe_signature(result)]
+    if result["contradictions"]:
+        clauses.insert(1, "its records contradict each other")
+    return f"{word}: {'; '.join(clauses)}."
 
 
 def format_text(result: Mapping[str, Any]) -> str:
@@ -48,8 +51,11 @@ def format_text(result: Mapping[str, Any]) -> str:
         f"{result['dataset']}, run {result['run_id']}, seal {result['seal']}",
         f"audited {result['ended_utc']} by musync {version} on {machine}",
         *(f"  {row['path']}: {row['damage']}" for row in result["damaged"]),
+        *(f"  {sentence}" for sentence in result["contradictions"]),
         *(f"  none could be made: {problem}" for problem in result["not_remade"]),
     ]
+    if result["remade"]:
+        lines.append(f"clips drawn by --seed {result['seed']}")
     same = [clip["label"] for clip in result["remade"] if clip["as_recorded"]]
     if same:
         lines.append(f"made again as recorded: {', '.join(same)}")
@@ -68,15 +74,18 @@ def format_text(result: Mapping[str, Any]) -> str:
 
 
 def describe_place(row: Mapping[str, Any]) -> str:
-    """Return where a clip differs first, with both values.
+    """Return where a clip differs first, with both values, or why what is stored of it cannot be read.
 
     Parameters
     ----------
     row : one of ``mismatches``
     """
+    if "problem" in row:
+        return f"{row['stage']}, {row['problem']}"
+    place = f", {row['counted_in']} {row['tick']}" if "tick" in row else ""
     pixel = f", pixel {row['pixel'][0]} right and {row['pixel'][1]} down" if "pixel" in row else ""
     values = f": {row['recorded']} recorded, {row['remade']} made again" if "recorded" in row else ""
-    return f"{row['stage']}, {row['channel']}, {row['counted_in']} {row['tick']}{pixel}{values}"
+    return f"{row['stage']}, {row['channel']}{place}{pixel}{values}"
 
 
 def write_audit_page(result: Mapping[str, Any]) -> str:

@@ -35,11 +35,18 @@ COMMANDS = (
     Command(
         name="audit",
         group=GROUP,
-        sentence="Verify every hash of a dataset and make a share of its clips again.",
+        sentence="Verify every hash of a dataset, and compare a share of its clips with the same clips made again.",
         function="flows.auditing.audit:audit_dataset",
         options=(
             DATASET,
             define_option("share", float, "Share of the clips to make again, 0 to 1.", 0.1),
+            define_option(
+                "seed",
+                int | None,
+                "Draw these clips by this number, as an earlier audit says; by default by one that nobody foresees.",
+                None,
+                minimum=0,
+            ),
             KEY,
             define_option("out", str | None, "Folder for audit.html, audit.json and audit.txt.", None),
             *RUNNER,

@@ -20,6 +20,8 @@ from tasks.errors import InputError
 def input_changes(layout: Layout, manifest: Manifest) -> list[dict[str, Any]]:
     """Every input that is no longer the recorded one, down to the value where the recorded bytes are still known.
 
+    The scene, which lies elsewhere, is left to `scene_changes`.
+
     Parameters
     ----------
     layout, manifest : of a sealed dataset
@@ -31,7 +33,7 @@ def input_changes(layout: Layout, manifest: Manifest) -> list[dict[str, Any]]:
     Raises
     ------
     InputError
-        The dataset's plan is missing or no JSON, or its scene cannot be found.
+        The dataset's plan is missing or no JSON.
     """
     plan = read_plan_record(layout)
     present = frozen_inputs(layout, manifest["inputs"])
@@ -40,7 +42,6 @@ def input_changes(layout: Layout, manifest: Manifest) -> list[dict[str, Any]]:
         **tools_here(),
         "grid": plan["grid"],
         "inputs": {name: sha256_of([content]) for name, content in present.items()},
-        "scene": {"sha256": scene_identity(find_scene(plan["scene"]))},
     }
     sources = input_sources(recorded_grid(manifest["grid"], layout.manifest))
     recorded = {
@@ -51,6 +52,18 @@ def input_changes(layout: Layout, manifest: Manifest) -> list[dict[str, Any]]:
     return find_input_differences(manifest, here, recorded, present) + find_parameter_differences(
         manifest, plan
     )
+
+
+def scene_changes(layout: Layout, manifest: Manifest) -> list[dict[str, Any]]:
+    """The row of `input_changes` on the scene, where the one at hand is another.
+
+    Raises
+    ------
+    InputError
+        The dataset's plan is missing or no JSON, or its scene cannot be found.
+    """
+    found = scene_identity(find_scene(read_plan_record(layout)["scene"]))
+    return find_input_differences(manifest, {**manifest, "scene": {"sha256": found}}, {}, {})
 
 
 def recorded_input(

@@ -15,6 +15,7 @@ from catalogs.grids import FaultyGrid, Grid, GridFile, load_grid
 from catalogs.scenario import Scenario
 from catalogs.vehicles import vehicle_provenance
 from flows.making.grid_inputs import input_sources, read_grid_inputs, recorded_settings
+from flows.making.identity import identify_clip, identify_run, list_deciding
 from flows.making.places import remember_place
 from flows.store.layout import Layout
 from flows.store.sealed import PLAN_FORMAT, read_plan_record, recorded_grid
@@ -165,20 +166,8 @@ def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, 
     if problems:
         raise InputError([f"{source}: {problem}" for problem in problems])
     hashes = {name: sha256_of([content]) for name, content in inputs.items()}
-    asked = {
-        "scene": scene,
-        "inputs": hashes,
-        "backend": backend,
-        "vehicle_mode": settings.vehicle_mode,
-        "frames": settings.frames,
-        "frame_rate_hz": settings.frame_rate_hz,
-        # a default that was introduced later is left out, so that older clips keep their ids
-        **({} if settings.composition == "linear" else {"composition": settings.composition}),
-        **({"low_speed": settings.low_speed} if settings.keeps_stops_steady else {}),
-        **({} if settings.duration_s is None else {"duration_s": settings.duration_s}),
-        **({} if settings.variant == "full" else {"variant": settings.variant}),
-    }
-    clips = tuple(_clip_plans(grid, asked))
+    deciding = list_deciding(settings, scene, hashes, backend)
+    clips = tuple(_clip_plans(grid, deciding))
     repeated = {clip.label for clip in clips} if len({clip.clip_id for clip in clips}) < len(clips) else set()
     if repeated:
         raise InputError(
@@ -190,8 +179,8 @@ def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, 
         key = "vehicle" if name.endswith(".tir") else Path(name).stem
         if getattr(settings, key, None) != getattr(recorded, key, None):
             remember_place(hashes[name], lookup())
-    run_id = content_id(
-        [asked, recorded.model_dump(mode="json"), [clip.clip_id for clip in clips], made_with]
+    run_id = identify_run(
+        deciding, recorded.model_dump(mode="json"), (clip.clip_id for clip in clips), made_with
     )
     plan = Plan(
         run_id=run_id,
@@ -267,7 +256,7 @@ def _with_vehicle(settings: GridFile, vehicle: str) -> GridFile:
     return settings.model_copy(update={"vehicle": vehicle, "vehicle_mode": mode})
 
 
-def _clip_plans(grid: Grid, asked: Mapping[str, Any]) -> Iterator[ClipPlan]:
+def _clip_plans(grid: Grid, deciding: Mapping[str, Any]) -> Iterator[ClipPlan]:
     """The clips of a grid: its scenarios, each under every visual seed."""
     seeds = range(grid.settings.seed, grid.settings.seed + grid.settings.visual_seeds)
     named = [(label, scenario, tags, seed) for (label, scenario), tags in zip(grid.scenarios, grid.tags, strict=True)
@@ -280,7 +269,7 @@ def _clip_plans(grid: Grid, asked: Mapping[str, Any]) -> Iterator[ClipPlan]:
         seed = str(int(sha256_of([f"{grid_seed}/{content_id(seen)}".encode()])[:16], 16))
         yield ClipPlan(
             index=index,
-            clip_id=content_id([asked, row, seed]),
+            clip_id=identify_clip(deciding, row, seed),
             label=label if len(seeds) == 1 else f"{label}/seed-{grid_seed}",
             seed=seed,
             scenario=scenario,

@@ -66,3 +66,16 @@ def _describe_link(root: Path, path: str) -> str:
         f"{shorten(place)}: a dataset must hold nothing but its folders and regular files; this is {kind}:"
         " remove it, or put back what belongs there"
     )
+
+
+def require_file(path: Path) -> Path:
+    """Return the path of a file that a dataset records, as it is.
+
+    Raises
+    ------
+    InputError
+        If it is missing, or lies behind a link.
+    """
+    if path.resolve() != path or not path.is_file():
+        raise InputError(f"{path}: the manifest records this file; it is missing, or behind a link")
+    return path

@@ -92,6 +92,11 @@ def scratch_dataset(layout: Layout) -> Iterator[Layout]:
     Parameters
     ----------
     layout : of the dataset
+
+    Raises
+    ------
+    InputError
+        Whatever the block raises, about the dataset: the scratch folder is gone when the sentences are read.
     """
     try:
         layout.staging.mkdir(exist_ok=True)
@@ -104,6 +109,8 @@ def scratch_dataset(layout: Layout) -> Iterator[Layout]:
     try:
         with sole_writer(scratch):  # without a lock it is left over from a killed run
             yield scratch
+    except InputError as error:
+        raise InputError([said.replace(str(folder), str(layout)) for said in error.problems]) from error
     finally:
         shutil.rmtree(folder, ignore_errors=True)
         with suppress(OSError):

@@ -1,7 +1,6 @@
 """An audit that finds a difference says where it begins and which input can be why."""
 
 import json
-import os
 import shutil
 
 import numpy as np
@@ -10,10 +9,11 @@ import pytest
 import flows.auditing.audit
 import manifests.explain
 from catalogs.scenes import load_scene, write_scene
-from flows.auditing.audit import audit_dataset, format_text
+from flows.auditing.audit import audit_dataset, draw_clips, format_text
 from flows.judging.controls import run_controls
 from flows.judging.evaluation import evaluate_dataset
 from flows.making.generate import generate_dataset
+from flows.running.processors import count_processors
 from flows.store.layout import Layout
 from tasks.errors import InputError
 from tests.toy_street import TOY_CAMERA, toy_street, write_toy_grid
@@ -102,13 +102,44 @@ def test_a_dataset_is_not_judged_beside_another_scene_than_its_own(own_dataset, 
         judge(str(own_dataset.root), out=str(tmp_path / "out"))
 
 
-def test_a_broken_scene_is_the_inputs_fault_and_one_sentence(own_dataset, tmp_path):
+def test_a_broken_scene_lets_no_clip_be_made_and_the_report_says_so_once(own_dataset, tmp_path):
     file = tmp_path / "scene" / "means.npy"
     np.save(file, np.load(file) + 1)
     load_scene.cache_clear()
-    with pytest.raises(InputError, match=r"must have the SHA-256 of scene\.json") as told:
-        audited(own_dataset, share=1.0)
-    assert len(told.value.problems) == 1
+    result = audited(own_dataset, share=1.0, out=str(tmp_path / "told"))
+    (told,) = result["not_remade"]
+    assert "must have the SHA-256 of scene.json" in told and not result["verified"] and not result["damaged"]
+    assert f"none could be made: {told}" in (tmp_path / "told" / "audit.txt").read_text()
+
+
+def test_without_its_scene_a_sound_dataset_is_verified_by_its_files_and_no_clip_is_made(
+    own_dataset, tmp_path
+):
+    shutil.rmtree(tmp_path / "scene")
+    load_scene.cache_clear()
+    assert audited(own_dataset, share=0.0)["verified"]
+    result = audited(own_dataset)
+    assert not result["verified"] and result["intact"] == result["files"] and result["rerun"] == []
+    assert [line[:24] for line in result["not_remade"]] == ["scene scene: no folder i"]
+
+
+def test_no_message_names_the_folder_in_which_clips_were_made_again(copy):
+    file = copy.inputs / "vehicle.yaml"
+    file.write_text(file.read_text().replace("cg_height: {value: 0.55", "cg_height: {value: -1"))
+    (told,) = audited(copy)["not_remade"]
+    assert str(copy.inputs / "vehicle.yaml") in told and "scratch" not in told
+
+
+def test_a_seed_draws_the_same_clips_again_and_without_one_nobody_knows_which(toy_dataset):
+    manifest = json.loads(toy_dataset.manifest.read_bytes())
+
+    def drawn(seed: int) -> tuple[str, ...]:
+        return tuple(clip["label"] for clip in draw_clips(manifest, 0.5, seed))
+
+    draws = {drawn(seed) for seed in range(100)}
+    assert drawn(7) == drawn(7) and {len(draw) for draw in draws} == {2} and len(draws) == 12
+    seeds = {audited(toy_dataset, share=0.0)["seed"] for _ in range(3)}
+    assert len(seeds) == 3 and audited(toy_dataset, share=0.0, seed=7)["seed"] == 7
 
 
 def test_another_catalogue_or_code_does_not_go_into_the_same_folder_and_both_values_are_told(
@@ -130,4 +161,4 @@ def test_an_audit_left_to_itself_takes_another_number_of_workers_than_the_run_di
     )
     audited(copy, workers=None)
     audited(copy, workers=7)
-    assert taken[0] not in (None, 0, len(os.sched_getaffinity(0))) and taken[1] == 7
+    assert taken[0] not in (None, 0, count_processors()) and taken[1] == 7
