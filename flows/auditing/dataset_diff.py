@@ -1,6 +1,6 @@
 """Two datasets side by side: which clips differ, how far their labels moved, and which input can be why."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import isnan
 from typing import Any
 
@@ -15,13 +15,14 @@ from flows.store.telemetry import read_columns
 from manifests.canonical import content_id
 from manifests.compare import find_row_difference
 from manifests.explain import find_input_differences, find_reasons
+from manifests.records import Receipt
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.eval.label_moves import compare_figures, compare_ticks
 
 
 def compare_datasets(a: str, b: str, *, out: str | None = None) -> dict[str, Any]:
-    """Compare two finished datasets clip by clip; clips are paired by their scenario.
+    """Compare two finished datasets clip by clip; clips are paired by their scenario and seed.
 
     Whether clips differ follows from the hashes that the manifests record, and not from the files.
 
@@ -44,18 +45,16 @@ def compare_datasets(a: str, b: str, *, out: str | None = None) -> dict[str, Any
     old, new = open_for_reading(a), open_for_reading(b)
     before, after = read_manifest(old), read_manifest(new)
     why = find_input_differences(before, after, _read_inputs(old, before), _read_inputs(new, after))
-    theirs = {content_id(clip["scenario"]): clip for clip in after["clips"]}
-    ours = {content_id(clip["scenario"]): clip for clip in before["clips"]}
-    pairs = [(clip, theirs[key]) for key, clip in ours.items() if key in theirs]
+    pairs, only_in_a, only_in_b = pair_clips(before["clips"], after["clips"])
     rows = [row for x, y in pairs if (row := _clip_row(old, new, x, y, why)) is not None]
     result: dict[str, Any] = {
         "a": {"dataset": str(old), "run_id": before["run_id"]},
         "b": {"dataset": str(new), "run_id": after["run_id"]},
-        "same": not rows and ours.keys() == theirs.keys(),
+        "same": not (rows or only_in_a or only_in_b),
         "why": why,
         "clips": rows,
-        "only_in_a": [clip["label"] for key, clip in ours.items() if key not in theirs],
-        "only_in_b": [clip["label"] for key, clip in theirs.items() if key not in ours],
+        "only_in_a": [clip["label"] for clip in only_in_a],
+        "only_in_b": [clip["label"] for clip in only_in_b],
         "summary": {
             "compared": len(pairs),
             "changed": len(rows),
@@ -66,6 +65,38 @@ def compare_datasets(a: str, b: str, *, out: str | None = None) -> dict[str, Any
     results.write_json("diff.json", result)
     results.write("diff.txt", format_text(result))
     return result
+
+
+def pair_clips(
+    ours: Sequence[Receipt], theirs: Sequence[Receipt]
+) -> tuple[list[tuple[Receipt, Receipt]], list[Receipt], list[Receipt]]:
+    """Pair clips of one scenario: first those of one seed, then the others in the order of each dataset.
+
+    Parameters
+    ----------
+    ours, theirs : records of the clips of two datasets
+
+    Returns
+    -------
+    The pairs, and the clips of each dataset that none of the other is left for.
+    """
+    waiting: dict[str, dict[str, Receipt]] = {}
+    for clip in theirs:
+        waiting.setdefault(content_id(clip["scenario"]), {})[clip["seed"]] = clip
+    choices = [(clip, waiting.get(content_id(clip["scenario"]), {})) for clip in ours]
+    found: dict[str, Receipt] = {}
+    for by_seed in (True, False):
+        for clip, left in choices:
+            seed = clip["seed"] if by_seed else next(iter(left), None)
+            if clip["clip_id"] not in found and seed in left:
+                found[clip["clip_id"]] = left.pop(seed)
+    pairs = [(clip, found[clip["clip_id"]]) for clip in ours if clip["clip_id"] in found]
+    taken = {clip["clip_id"] for clip in found.values()}
+    return (
+        pairs,
+        [clip for clip in ours if clip["clip_id"] not in found],
+        [clip for clip in theirs if clip["clip_id"] not in taken],
+    )
 
 
 def format_text(result: Mapping[str, Any]) -> str:

@@ -8,7 +8,7 @@ import yaml
 
 from catalogs.entries import find_entry
 from catalogs.scenes import write_scene
-from flows.auditing.dataset_diff import compare_datasets, format_text
+from flows.auditing.dataset_diff import compare_datasets, format_text, pair_clips
 from flows.making.generate import generate_dataset
 from tasks.errors import InputError
 from tests.toy_street import TOY_CAMERA, toy_street
@@ -129,3 +129,29 @@ def test_the_text_says_which_label_moved_how_far_and_why(datasets: dict[str, str
 def test_an_unfinished_or_foreign_folder_is_refused(datasets: dict[str, str], tmp_path: Path) -> None:
     with pytest.raises(InputError, match="must be a finished dataset; it has no manifest"):
         compare_datasets(datasets["a"], str(tmp_path))
+
+
+def test_clips_of_one_scenario_are_paired_by_seed_then_in_order_and_none_is_lost() -> None:
+    def list_clips(*named: str) -> list[dict]:
+        return [{"clip_id": name, "scenario": {"weather": name[0]}, "seed": name[1:]} for name in named]
+
+    def pair(ours: list[str], theirs: list[str]) -> tuple:
+        pairs, *only = pair_clips(list_clips(*ours), list_clips(*theirs))
+        told = [f"{a['clip_id']}-{b['clip_id']}" for a, b in pairs]
+        return told, *([clip["clip_id"] for clip in clips] for clips in only)
+
+    assert pair(["d1", "d2", "r1"], ["d2", "d1", "r1"]) == (["d1-d1", "d2-d2", "r1-r1"], [], [])
+    assert pair(["d1", "d2", "d3"], ["d3", "d4"]) == (["d1-d4", "d3-d3"], ["d2"], [])
+    assert pair(["d1"], ["d2", "d3", "s1"]) == (["d1-d2"], [], ["d3", "s1"])
+
+
+def test_a_dataset_with_more_seeds_is_another_one(datasets: dict[str, str], tmp_path: Path) -> None:
+    grid = Path(datasets["a"]).with_name("a-grid.yaml").read_text() + "visual_seeds: 2\n"
+    (tmp_path / "grid.yaml").write_text(grid)
+    generate_dataset(
+        str(tmp_path / "grid.yaml"), str(tmp_path / "two"), runner="threads", workers=1, pictures=False
+    )
+    result = compare_datasets(datasets["a"], str(tmp_path / "two"))
+    assert not result["same"] and result["summary"]["compared"] == 4
+    assert len(result["only_in_b"]) == 4 and all(label.endswith("/seed-2") for label in result["only_in_b"])
+    assert compare_datasets(str(tmp_path / "two"), str(tmp_path / "two"))["summary"]["compared"] == 8
