@@ -132,15 +132,11 @@ def drive_clip(asked: Asked, entries: Entries) -> Drive:
     state, ride = simulate_drive(driven, vehicle, surface, asked.mode, asked.duration_s, steady)
     ranges = ranges_of(driven, state, vehicle, surface, entries.study, asked.mode, asked.duration_s, steady)
     seen = surface_of(asked.scenario, surface)
-    straight = Route(station=np.array([0.0, 1.0]), T_world_rig=np.tile(np.eye(4), (2, 1, 1)))
-    # the telemetry may go on beyond the route, where no frame is
-    reached = (
-        ride.columns["station"]
-        if asked.route is None
-        else np.minimum(ride.columns["station"], asked.route.length)
-    )
+    station = ride.columns["station"]
+    route = asked.route or lay_straight_route(float(station.max()))
     poses = body_poses(
-        asked.route or straight, reached, ride.columns["heave"], ride.columns["pitch"],
+        # the telemetry may go on beyond the route, where no frame is
+        route, np.minimum(station, route.length), ride.columns["heave"], ride.columns["pitch"],
         cg_behind_front_axle=vehicle.cg_to_front_axle, cg_height=vehicle.cg_height,
     )  # fmt: skip
     figures = {
@@ -158,6 +154,19 @@ def drive_clip(asked: Asked, entries: Entries) -> Drive:
         **ranges,
     }
     return Drive(scenario=driven, state=state, ride=ride, numbers=numbers)
+
+
+def lay_straight_route(length: float) -> Route:
+    """A level route straight ahead, which stands in for that of a scene.
+
+    Parameters
+    ----------
+    length : that it must have [m]
+    """
+    station = np.array([0.0, max(length, 1.0)])
+    T_world_rig = np.tile(np.eye(4), (2, 1, 1))
+    T_world_rig[:, 0, 3] = station
+    return Route(station=station, T_world_rig=T_world_rig)
 
 
 def list_steps(asked: Asked, entries: Entries, drive: Drive) -> list[Step]:

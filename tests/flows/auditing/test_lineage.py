@@ -111,6 +111,16 @@ def test_json_csv_and_text_say_the_same(traced):
     assert "every tick is as recorded" in said and "full_cover_depth_mm*" in said
 
 
+def test_where_the_scene_is_not_at_hand_a_straight_road_reaches_as_far_as_the_drive(kept, monkeypatch):
+    monkeypatch.setattr(lineage, "find_route", lambda scene: None)
+    drives = []
+    monkeypatch.setattr(lineage, "move_lines", lambda asked, kept, lines, drive: drives.append(drive) or [])
+    result = trace_lineage(str(kept.root), "dry/hump")
+    assert result["follows"] and not result["scene"]["at_hand"]
+    ((last, station),) = [(d.numbers["T_world_rig"][-1], d.ride.columns["station"][-1]) for d in drives]
+    assert last[0, 3] == pytest.approx(station, abs=0.05) and station > 10
+
+
 def test_the_runs_that_a_vehicle_was_fitted_to_are_named(kept, tmp_path, quick):
     copy = Layout(tmp_path / "grown")
     shutil.copytree(kept.root, copy.root)
