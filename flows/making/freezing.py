@@ -15,6 +15,7 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from flows.making.driving import simulate_drive
 from flows.making.generate import RunReport, generate_dataset
+from flows.making.grid_inputs import find_private_entries
 from flows.making.places import find_scene
 from flows.making.plan import Plan, freeze_grid
 from flows.running.progress import progress_bar
@@ -62,7 +63,8 @@ def freeze_run(grid: str | None = None, *, out: str | None = None) -> dict[str, 
     Raises
     ------
     InputError
-        For a faulty grid, or one that is not the project's own and goes to no file.
+        For a faulty grid, one that is not the project's own and goes to no file, or one with a catalogue file outside
+        the working folder, which nobody would find again.
     """
     names = [grid] if grid is not None else list(list_frozen())
     if out is not None and grid is None:
@@ -77,6 +79,8 @@ def freeze_run(grid: str | None = None, *, out: str | None = None) -> dict[str, 
     with progress_bar("frozen", len(names)) as advance:
         for name in names:
             grid_asked = load_grid(name)
+            if problems := find_private_entries(grid_asked.settings):
+                raise InputError([f"{name}: {problem}" for problem in problems])
             file = Path(out) if out is not None else FOLDER / f"{grid_asked.settings.name}.json"
             refuse_link(file)
             before = _frozen_before(file, out is None)

@@ -39,6 +39,8 @@ LOADERS: Mapping[str, Callable[[Path], Any]] = {
 """Loaders that check the catalogue entries that a user may bring."""
 READERS: Mapping[str, Callable[[Path], bytes]] = {"vehicle.yaml": vehicle_content}
 """Entries that need other files: a dataset keeps these whole, and of any other the file's bytes."""
+OWN_ENTRIES = ("vehicle", "surface", "camera", "hazard_marking")
+"""Settings that name a catalogue entry, which may be a file of the user's."""
 
 
 def input_sources(settings: GridFile) -> dict[str, Callable[[], Path]]:
@@ -75,6 +77,16 @@ def _tyre_behind(settings: GridFile) -> Path | None:
         return None
 
 
+def find_private_entries(settings: GridFile) -> list[str]:
+    """Return a sentence for each catalogue file whose path is not recorded, so that a record cannot lead to it."""
+    return [
+        f"{name} must be a name of the catalogue or a path below the working folder, which can be recorded; it is"
+        f" {value}: copy the file there and name it so"
+        for name in OWN_ENTRIES
+        if (value := getattr(settings, name)) is not None and recorded_reference(value) != value
+    ]
+
+
 def recorded_settings(settings: GridFile) -> GridFile:
     """The settings as a dataset records them: with files by their name alone where their path is a private matter.
 
@@ -84,7 +96,7 @@ def recorded_settings(settings: GridFile) -> GridFile:
     """
     references = {
         name: recorded_reference(value)
-        for name in ("scene", "vehicle", "surface", "camera", "hazard_marking")
+        for name in ("scene", *OWN_ENTRIES)
         if (value := getattr(settings, name)) is not None
     }
     return settings.model_copy(update=references)

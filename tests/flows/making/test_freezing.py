@@ -6,6 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 import flows.making.freezing
+from catalogs.entries import find_entry
 from catalogs.grids import load_grid
 from catalogs.studies import load_conditions
 from flows.cli import app
@@ -213,3 +214,17 @@ def test_a_users_file_that_is_no_frozen_run_is_not_written_over(tmp_path):
     assert precious.read_text() == '{"mine": 1}'
     assert freeze_run(SMALL, out=str(tmp_path / "run.json"))["frozen"][0]["changed"]
     assert not freeze_run(SMALL, out=str(tmp_path / "run.json"))["frozen"][0]["changed"]
+
+
+def test_a_catalogue_file_that_nobody_would_find_again_is_refused_before_it_is_frozen(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "car.yaml").write_text(find_entry("vehicle", "paper-reference").read_text())
+    grid = "name: own\nvehicle: {}\nframes: 11\npictures: false\nscenarios: {{dry: {{initial_speed_km_h: 30}}}}\n"
+    for place in (tmp_path / "car.yaml", "../car.yaml"):
+        (tmp_path / "grid.yaml").write_text(grid.format(place))
+        with pytest.raises(InputError, match=r"vehicle must be .* path below the working folder"):
+            freeze_run("grid.yaml", out="run.json")
+    assert not (tmp_path / "run.json").exists()
+    (tmp_path / "grid.yaml").write_text(grid.format("car.yaml"))
+    freeze_run("grid.yaml", out="run.json")
+    assert problems_of(read_frozen("run.json")) == []
