@@ -44,8 +44,25 @@ def _refuse_way_out(name: str) -> str:
 
 LocalName = Annotated[Text, AfterValidator(_refuse_way_out)]
 
+EVERY_INPUT = ("camera.yaml", "gates.yaml", "surface.yaml", "vehicle.yaml")
+"""Catalogue files of every dataset, with frames or without."""
+EVERY_TABLE = ("ticks", "frames")
+"""Contents of every clip, with frames or without."""
+
+
+def _require_keys(keys: tuple[str, ...]) -> AfterValidator:
+    def check(found: dict[str, Any]) -> dict[str, Any]:
+        if lacking := [key for key in keys if key not in found]:
+            raise ValueError(f"must have the hash of {' and '.join(keys)}; it lacks {', '.join(lacking)}")
+        return found
+
+    return AfterValidator(check)
+
+
 STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
+Inputs = Annotated[dict[InputName, Sha256], _require_keys(EVERY_INPUT)]
+Content = Annotated[dict[Text, Sha256], _require_keys(EVERY_TABLE)]
 
 if TYPE_CHECKING:  # their keys follow from what they record
     ScenarioRecord = dict[str, Any]
@@ -109,7 +126,7 @@ class Receipt(ClipRecord):
     """A clip that is made: its files, the hashes of its decoded content, and what came out."""
 
     artifacts: dict[RecordedPath, Sha256]
-    content: dict[Text, Sha256]
+    content: Content
     figures: FiguresRecord
     verdict: VerdictRecord
 
@@ -123,7 +140,7 @@ class PlanRecord(TypedDict):
     grid: dict[str, Any]
     scene: SceneRecord
     backend: Text
-    inputs: dict[InputName, Sha256]
+    inputs: Inputs
     made_with: MadeWith
     clips: list[ClipRecord]
 
@@ -141,7 +158,7 @@ class ManifestHead(TypedDict):
     grid: dict[str, Any]
     scene: SceneRecord
     backend: Text
-    inputs: dict[InputName, Sha256]
+    inputs: Inputs
     made_with: MadeWith
     processor: dict[Text, Text]
     git: "GitCommit | None"
@@ -205,7 +222,7 @@ def check_record(form: type[Record], value: Any, place: object) -> Record:
         record: Record = _ADAPTERS[form].validate_python(value)
     except ValidationError as error:
         raise InputError(cap_problems(describe_rules(error, place))) from None
-    problems = _find_clip_problems(value.get("clips", []))
+    problems = _find_clip_problems(value.get("clips", [])) + _find_input_problems(value)
     if problems:
         raise InputError([f"{place}: {problem}" for problem in problems])
     return record
@@ -226,6 +243,17 @@ def _find_clip_problems(clips: Sequence[Mapping[str, Any]]) -> list[str]:
         ),
     }
     return [rule for rule, kept in rules.items() if not kept]
+
+
+def _find_input_problems(record: Mapping[str, Any]) -> list[str]:
+    """Inputs of a manifest whose two hashes, as an input and as a file, are not one."""
+    if not {"inputs", "artifacts"} <= record.keys():
+        return []
+    return [
+        f"inputs: {name} must have the hash that artifacts have of inputs/{name}; it is another"
+        for name, digest in record["inputs"].items()
+        if record["artifacts"].get(f"inputs/{name}") != digest
+    ]
 
 
 def _are_distinct(clips: Sequence[Mapping[str, Any]], key: str) -> bool:

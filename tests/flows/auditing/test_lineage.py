@@ -153,3 +153,22 @@ def test_changed_entries_and_an_unknown_clip_are_refused_in_sentences(kept, tmp_
         (False, False),
         (True, True),
     ]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda m: m["clips"][0]["content"].clear(), "must have the hash of ticks and frames; it lacks ticks, frames"),
+        (lambda m: m["inputs"].pop("vehicle.yaml"), "it lacks vehicle.yaml"),
+        (lambda m: m["inputs"].clear(), "it lacks camera.yaml, gates.yaml, surface.yaml, vehicle.yaml"),
+        (lambda m: m["inputs"].update({"vehicle.yaml": "0" * 64}), "vehicle.yaml must have the hash that artifacts"),
+        (lambda m: m["artifacts"].pop("inputs/study.yaml"), "study.yaml must have the hash that artifacts"),
+    ],
+)  # fmt: skip
+def test_a_manifest_that_lacks_what_every_dataset_has_is_refused_in_a_sentence(kept, tmp_path, change, said):
+    copy = Layout(tmp_path / "forged")
+    shutil.copytree(kept.root, copy.root)
+    reseal(copy, change)
+    with pytest.raises(InputError, match=said) as told:
+        trace_lineage(str(copy.root), "dry/flat")
+    assert len(told.value.problems) == 1
