@@ -279,7 +279,7 @@ def fan_out(layout: Layout, plan: Plan, indices: list[int], executor: Executor) 
                 raise InputError(f"{layout}: {committed} of {len(indices)} clips are committed; {told}")
             else:
                 failures[label] = error
-                advance(f"{label} failed")
+                advance(label, failed=True)
     wrong: dict[str, list[str]] = {}
     for label, error in failures.items():
         for problem in error.problems if isinstance(error, InputError) else []:

@@ -9,7 +9,7 @@ from prefect.artifacts import create_progress_artifact, update_progress_artifact
 from prefect.exceptions import PrefectException
 from prefect.logging import get_run_logger
 
-from flows.running.progress import FAILED
+from flows.running.progress import describe_piece
 from flows.running.terminal import escape_controls
 
 EVERY_S = 5.0
@@ -24,17 +24,17 @@ class RunProgress:
         self._artifact: UUID | None = None
         self._told = 0.0
 
-    def __call__(self, title: str, done: int, total: int, name: str) -> None:
+    def __call__(self, title: str, done: int, total: int, name: str, failed: bool) -> None:
         """Tell Prefect of a finished piece of work, if the last word is `EVERY_S` ago.
 
         Parameters
         ----------
-        title, done, total, name : as of `flows.running.progress.Watcher`
+        title, done, total, name, failed : as of `flows.running.progress.Watcher`
         """
-        failed, edge = name.endswith(FAILED), done in (0, total)
+        edge = done in (0, total)
         if not (failed or edge) and time.monotonic() - self._told < EVERY_S:
             return
-        line = escape_controls(f"{title} {done}/{total} {name}".rstrip())
+        line = escape_controls(f"{title} {done}/{total} {describe_piece(name, failed)}".rstrip())
         (get_run_logger().warning if failed else get_run_logger().info)(line)
         # of ten thousand failures each gets its row, and not a call of the server too
         if failed and not edge:

@@ -4,6 +4,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from typing import Protocol
 
 from rich.progress import (
     BarColumn,
@@ -16,12 +17,16 @@ from rich.progress import (
 
 from flows.running.terminal import escape_controls, open_console, print_lines
 
-Advance = Callable[[str], None]
-Watcher = Callable[[str, int, int, str], None]
-"""Called with the title, the pieces done and all pieces [1], and the name of the last one, empty at the beginning."""
-FAILED = " failed"
-"""End of the name of a piece of work that failed."""
+Watcher = Callable[[str, int, int, str, bool], None]
+"""Called with the title, the pieces done and all pieces [1], the name of the last one, empty at the beginning, and
+whether that one failed."""
 _WATCHERS: ContextVar[tuple[Watcher, ...]] = ContextVar("watchers", default=())
+
+
+class Advance(Protocol):
+    """Tells of a finished piece of work."""
+
+    def __call__(self, name: str, *, failed: bool = False) -> None: ...
 
 
 @contextmanager
@@ -39,24 +44,29 @@ def progress_bar(title: str, total: int) -> Iterator[Advance]:
     """Yield a function to call with the name of each finished piece of work."""
     done, watchers = 0, _WATCHERS.get()
 
-    def tell(name: str) -> None:
+    def tell(name: str, failed: bool) -> None:
         for watcher in watchers:
-            watcher(title, done, total, name)
+            watcher(title, done, total, name, failed)
 
     with _shown_bar(title, total) as show:
 
-        def advance(name: str) -> None:
+        def advance(name: str, *, failed: bool = False) -> None:
             nonlocal done
             done += 1
-            show(name)
-            tell(name)
+            show(describe_piece(name, failed))
+            tell(name, failed)
 
-        tell("")
+        tell("", False)
         yield advance
 
 
+def describe_piece(name: str, failed: bool) -> str:
+    """The name of a piece of work in a line for people."""
+    return f"{name} failed" if failed else name
+
+
 @contextmanager
-def _shown_bar(title: str, total: int) -> Iterator[Advance]:
+def _shown_bar(title: str, total: int) -> Iterator[Callable[[str], None]]:
     if not sys.stderr.isatty():
         done = 0
 

@@ -24,8 +24,8 @@ def test_in_a_store_the_record_is_an_object_and_the_metrics_are_a_file_here(tmp_
         keep_record("toy", "s3://data/nightly", f"s3://data/nightly/{NAME}", AT),
         progress_bar("clips", 3) as advance,
     ):
-        advance("dry")
-        advance("wet failed")
+        advance("what failed")  # a label like any other
+        advance("wet", failed=True)
         advance("snow")
         record = read_record(place.read_bytes(), place)
         assert (record.to_make, record.made, record.failed, record.ended) == (3, 2, ["wet"], None)
