@@ -18,6 +18,7 @@ from flows.reading.suggestions import suggest_names
 from flows.running.progress import progress_bar
 from flows.store.address import is_address, open_for_reading
 from flows.store.layout import PARTIAL, write_json
+from flows.store.outputs import find_dataset_problems
 from flows.store.sealed import read_manifest, refuse_changed_content
 from manifests.manifest import is_quarantined
 from tasks.errors import InputError
@@ -123,7 +124,7 @@ def part_quarantined(rows: Sequence[Mapping[str, Any]]) -> tuple[list[Mapping[st
 
 
 def choose_folder(dataset: str, to: str, out: str | None) -> Path:
-    """Return the folder of an export, outside the dataset and with nothing in it yet.
+    """Return the folder of an export, outside any dataset and with nothing in it yet.
 
     Raises
     ------
@@ -134,10 +135,8 @@ def choose_folder(dataset: str, to: str, out: str | None) -> Path:
         raise InputError("--out: must name a folder where the dataset lies in an object store")
     place = Path(dataset).resolve()
     folder = place.with_name(f"{place.name}-{to}") if out is None else Path(out)
-    if not is_address(dataset) and folder.resolve().is_relative_to(place):
-        raise InputError(
-            f"--out {folder}: must lie outside the dataset, whose files are all recorded; name another folder"
-        )
+    if problems := find_dataset_problems(f"--out {folder}", folder):
+        raise InputError(problems)
     if os.path.lexists(folder) and (folder.is_symlink() or not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"--out {folder}: must be new or an empty folder; name another one or remove it")
     return folder

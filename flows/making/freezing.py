@@ -21,7 +21,7 @@ from flows.making.plan import Plan, freeze_grid
 from flows.running.progress import progress_bar
 from flows.running.runner import RunnerChoice
 from flows.store.layout import write_atomically
-from flows.store.outputs import refuse_link
+from flows.store.outputs import find_dataset_problems, refuse_link
 from flows.store.sealed import read_manifest, recorded_grid
 from flows.store.telemetry import columns_hash
 from manifests.explain import as_sentences, find_tool_differences, parse_input, tools_here
@@ -83,6 +83,8 @@ def freeze_run(grid: str | None = None, *, out: str | None = None) -> dict[str, 
                 raise InputError([f"{name}: {problem}" for problem in problems])
             file = Path(out) if out is not None else FOLDER / f"{grid_asked.settings.name}.json"
             refuse_link(file)
+            if problems := find_dataset_problems(file, file.parent):
+                raise InputError(problems)
             before = _frozen_before(file, out is None)
             run = frozen_run(
                 grid_asked if out is not None or before is None else keep_rules(grid_asked, before)

@@ -30,6 +30,7 @@ from flows.store.address import (
 from flows.store.frames import create_arrays
 from flows.store.layout import Layout, write_atomically, write_json, write_pieces
 from flows.store.lock import sole_writer
+from flows.store.outputs import find_dataset_problems
 from flows.store.sealed import is_committed, read_manifest
 from flows.store.staging import BEGUN, is_of_begun_run, left_overs, remove_left_overs
 from manifests.manifest import is_quarantined
@@ -193,7 +194,9 @@ def prepare_dataset(layout: Layout, plan: Plan, inputs: Mapping[str, bytes]) -> 
 
 
 def _refuse_other_content(layout: Layout) -> None:
-    """Raise `InputError` unless the folder is new, empty, a dataset, or one that a stopped run began."""
+    """Raise `InputError` unless the folder is new, empty, a dataset or one that a stopped run began, and in none."""
+    if problems := find_dataset_problems(layout, layout.root.parent):
+        raise InputError(problems)
     if layout.plan.is_file() or layout.manifest.is_file() or not layout.root.exists():
         return
     if not layout.root.is_dir() or not all(

@@ -132,11 +132,8 @@ class Outputs:
             problems.append(f"{nearest}: must be a folder; name another one for the files of {self._title}")
         elif not os.access(nearest, os.W_OK | os.X_OK):
             problems.append(f"{nearest}: must be a folder that can be written; name another one")
-        elif (dataset := _find_dataset_around(folder)) is not None:
-            problems.append(
-                f"{folder}: must lie outside the dataset {dataset.name}, whose files are all recorded; name another"
-                " folder"
-            )
+        else:
+            problems += find_dataset_problems(folder, folder)
         if problems:
             raise InputError(problems)
         if not folder.is_dir():
@@ -153,11 +150,21 @@ class Outputs:
         return f"musync {self.command}"
 
 
-def _find_dataset_around(folder: Path) -> Path | None:
-    """Return the dataset that a folder is or lies in; None if there is none."""
+def find_dataset_problems(out: object, folder: Path) -> list[str]:
+    """Return a sentence where what is to be written would join the files of a dataset.
+
+    Parameters
+    ----------
+    out : what is to be written, as messages call it
+    folder : that must neither be a dataset nor lie in one; it need not exist
+    """
     place = folder.resolve()
-    places = (place, *place.parents)
-    return next((one for one in places if (one / "plan.json").is_file() and (one / "inputs").is_dir()), None)
+    return [
+        f"{out}: must lie outside the dataset {around.name}, whose files are all recorded; name another folder"
+        for around in (place, *place.parents)
+        if (around / "inputs").is_dir()
+        and ((around / "plan.json").is_file() or (around / "manifest.json").is_file())
+    ][:1]
 
 
 def find_name_problem(name: str) -> str | None:

@@ -11,6 +11,7 @@ import pytest
 import flows.making.generate
 from flows.auditing.audit import audit_dataset
 from flows.making.clip import make_clip
+from flows.making.freezing import freeze_run
 from flows.making.generate import generate_dataset
 from flows.reading.describe import describe_dataset
 from flows.running.failures import ClipsFailed
@@ -169,6 +170,17 @@ def test_another_grid_does_not_go_into_the_same_folder_and_the_difference_is_nam
     with pytest.raises(InputError, match=r"grid\.frames is 11 there and 12 here"):
         generate_dataset(str(other), str(dataset.root), runner="threads")
     assert dataset.manifest.read_bytes() == before
+
+
+@pytest.mark.parametrize("write", [generate_dataset, lambda grid, out: freeze_run("demo", out=f"{out}.json")])
+def test_nothing_is_made_inside_another_dataset(copy, grid, write):
+    before = sorted(copy.root.rglob("*"))
+    for place in ("more", "inputs/more"):
+        with pytest.raises(
+            InputError, match=r"more(\.json)?: must lie outside the dataset copy, whose files are all"
+        ):
+            write(grid, str(copy.root / place))
+    assert sorted(copy.root.rglob("*")) == before
 
 
 def test_a_second_writer_is_told(dataset, grid, tmp_path):

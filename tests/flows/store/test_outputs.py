@@ -153,17 +153,18 @@ def test_a_folder_that_cannot_be_used_is_told_before_the_work(tmp_path):
             Outputs(tmp_path / out, "audit", "audit.json")
 
 
+@pytest.mark.parametrize("record", ["plan.json", "manifest.json"])
 @pytest.mark.parametrize("place", [".", "inputs", "results/new", "../link", "../link/results"])
-def test_a_dataset_keeps_only_the_files_that_it_records(tmp_path, place):
+def test_a_dataset_keeps_only_the_files_that_it_records(tmp_path, place, record):
     dataset = tmp_path / "dataset"
     (dataset / "inputs").mkdir(parents=True)
-    (dataset / "plan.json").write_text("{}")
+    (dataset / record).write_text("{}")
     (tmp_path / "link").symlink_to(dataset)
     with pytest.raises(
         InputError, match="must lie outside the dataset dataset, whose files are all recorded"
     ):
         Outputs(dataset / place, "diff", "diff.json")
-    assert contents(dataset) == {"plan.json": b"{}"}
+    assert contents(dataset) == {record: b"{}"}
     write(tmp_path / "beside", "diff", "diff.json")
 
 
