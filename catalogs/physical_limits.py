@@ -8,20 +8,22 @@ from catalogs.quantities import CatalogueEntry, Scalar, read_entry, require_quan
 
 PHYSICAL_LIMITS = Path(__file__).with_name("physical_limits.yaml")
 
+Speed = Annotated[Scalar, require_quantity("km h-1", above=0)]
 Seconds = Annotated[Scalar, require_quantity("s", above=0)]
 Metres = Annotated[Scalar, require_quantity("m", above=0)]
 Rate = Annotated[Scalar, require_quantity("mm h-1", above=0)]
 
 
 class PhysicalLimits(CatalogueEntry):
-    """The largest value of each quantity, and the smallest length of a hazard; ``position`` is along the route,
-    ``brake_time`` any time of a brake."""
+    """The largest value of each quantity, and of a speed and a hazard's length also the smallest; ``position`` is along
+    the route, ``brake_time`` any time of a brake."""
 
     rain_rate: Rate
     snow_rate: Rate
     snow_accumulation: Annotated[Scalar, require_quantity("h", above=0)]
     snow_water_equivalent: Annotated[Scalar, require_quantity("mm", above=0)]
-    initial_speed: Annotated[Scalar, require_quantity("km h-1", above=0)]
+    initial_speed: Speed
+    slowest_initial_speed: Speed
     peak_pressure: Annotated[Scalar, require_quantity("MPa", above=0)]
     brake_time: Seconds
     position: Metres
@@ -51,3 +53,15 @@ def find_limit_problem(name: str, value: float, limit: Scalar) -> str | None:
     if not value > limit.value:
         return None
     return f"{name} must be at most {limit.value:g} {limit.unit} ({limit.source}); it is {value:g}"
+
+
+def find_least_problem(name: str, value: float, least: Scalar) -> str | None:
+    """A sentence where a value falls short of the least that it may be, else None.
+
+    Parameters
+    ----------
+    name, value, least : as of `find_limit_problem`
+    """
+    if not value < least.value:
+        return None
+    return f"{name} must be at least {least.value:g} {least.unit} ({least.source}); it is {value:g}"

@@ -7,7 +7,12 @@ from operator import attrgetter
 from typing import Any
 
 from catalogs.names import WeatherName
-from catalogs.physical_limits import PhysicalLimits, find_limit_problem, load_physical_limits
+from catalogs.physical_limits import (
+    PhysicalLimits,
+    find_least_problem,
+    find_limit_problem,
+    load_physical_limits,
+)
 from catalogs.quantities import Scalar
 from tasks.surface.weather import DRY, WEATHERS, find_weather
 
@@ -89,12 +94,9 @@ def find_scenario_problems(scenario: Scenario, unknown: Collection[str] = ()) ->
         )
     if abs(s.hazard_height_m) > 0 and s.hazard_length_m == 0:
         problems.append(f"a hazard of height {s.hazard_height_m:g} m needs hazard_length_m above 0; it is 0")
-    shortest = load_physical_limits().shortest_hazard
-    if abs(s.hazard_height_m) > 0 and 0 < s.hazard_length_m < shortest.value:
-        problems.append(
-            f"hazard_length_m must be at least {shortest.value:g} {shortest.unit} ({shortest.source});"
-            f" it is {s.hazard_length_m:g}"
-        )
+    if abs(s.hazard_height_m) > 0 and s.hazard_length_m > 0:
+        shortest = load_physical_limits().shortest_hazard
+        problems += filter(None, [find_least_problem("hazard_length_m", s.hazard_length_m, shortest)])
     return problems
 
 
@@ -131,10 +133,12 @@ def find_range_problems(scenario: Scenario) -> list[str]:
     """
     given = {name: value for name in NOT_NEGATIVE if (value := getattr(scenario, name)) is not None}
     problems = [f"{name} must not be negative; it is {value:g}" for name, value in given.items() if value < 0]
-    if scenario.initial_speed_km_h <= 0:
-        problems.append(f"initial_speed_km_h must be positive; it is {scenario.initial_speed_km_h:g}")
-    limited = _list_limits(scenario, load_physical_limits())
-    return problems + [problem for one in limited if (problem := find_limit_problem(*one)) is not None]
+    limits = load_physical_limits()
+    found = [
+        find_least_problem("initial_speed_km_h", scenario.initial_speed_km_h, limits.slowest_initial_speed)
+    ]
+    found += [find_limit_problem(*one) for one in _list_limits(scenario, limits)]
+    return problems + [problem for problem in found if problem is not None]
 
 
 def _list_limits(s: Scenario, limits: PhysicalLimits) -> list[tuple[str, float, Scalar]]:

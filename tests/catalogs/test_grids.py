@@ -117,7 +117,7 @@ def test_an_unknown_grid_lists_those_that_exist():
         ({"weather": "dry", "precipitation_mm_h": 3.0}, "dry has no precipitation"),
         ({"weather": "rain"}, "needs precipitation_mm_h above 0"),
         ({"weather": "rain", "precipitation_mm_h": 1.0, "snow_accumulation_h": 1.0}, "belongs to snow"),
-        ({"initial_speed_km_h": 0.0}, "must be positive"),
+        ({"initial_speed_km_h": 0.0}, "initial_speed_km_h must be at least 0.1 km h-1"),
         ({"peak_pressure_mpa": 2.0}, "exactly one of brake_onset_s and brake_onset_m"),
         ({"peak_pressure_mpa": 2.0, "brake_onset_s": 1.0, "brake_onset_m": 12.0}, "exactly one of"),
         ({"brake_onset_s": -1.0}, "must not be negative"),

@@ -42,6 +42,8 @@ def test_the_papers_scenarios_lie_within_the_limits():
             "precipitation_mm_h times snow_accumulation_h must be at most 1182 mm",
         ),
         (Scenario(initial_speed_km_h=1e308), "initial_speed_km_h must be at most 490.484 km h-1"),
+        (Scenario(initial_speed_km_h=1e-300), "initial_speed_km_h must be at least 0.1 km h-1"),
+        (Scenario(initial_speed_km_h=-5.0), "initial_speed_km_h must be at least 0.1 km h-1"),
         (replace(BRAKING, peak_pressure_mpa=23.0), "peak_pressure_mpa must be at most 20 MPa"),
         (replace(BRAKING, ramp_s=1e9), "ramp_s must be at most 600 s"),
         (replace(BRAKING, hold_s=1e9), "hold_s must be at most 600 s"),
