@@ -64,7 +64,7 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
     problems: list[str] = []
     planned = None
     try:
-        planned = find_clip(plan, clip, dataset)
+        planned = find_planned_clip(plan, clip, dataset)
     except InputError as error:
         problems += error.problems
     if not 0 <= frame < plan.settings.frames:
@@ -163,7 +163,7 @@ def format_text(result: Mapping[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def find_clip(plan: Plan, clip: str, dataset: str) -> ClipPlan:
+def find_planned_clip(plan: Plan, clip: str, dataset: str) -> ClipPlan:
     """Return the clip of a plan that has this label or id.
 
     Raises

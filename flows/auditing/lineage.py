@@ -16,7 +16,7 @@ from flows.auditing.driven_lines import (
     load_entries,
     move_lines,
 )
-from flows.auditing.explain import find_clip, find_route
+from flows.auditing.explain import find_planned_clip, find_route
 from flows.auditing.kept_lines import Line, describe_file, list_lines
 from flows.auditing.lineage_text import format_text
 from flows.making.input_changes import read_kept
@@ -78,7 +78,7 @@ def trace_lineage(dataset: str, clip: str, *, out: str | None = None) -> dict[st
     manifest = read_manifest(layout)
     plan = Plan.of(manifest, layout.manifest)
     refuse_traced(plan.inputs, dataset, "lineage")
-    planned = find_clip(plan, clip, dataset)
+    planned = find_planned_clip(plan, clip, dataset)
     kept = read_kept(layout, manifest["inputs"])
     asked = Asked(
         scenario=planned.scenario, mode=plan.settings.vehicle_mode, variant=plan.settings.variant,

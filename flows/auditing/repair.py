@@ -49,7 +49,8 @@ def repair_dataset(
     Returns
     -------
     ``repaired`` (all is well now), ``damaged[]`` as found, ``restored[]`` paths, ``failed[]`` paths whose bytes
-    came out otherwise, and the ``differences`` of the tools that can be why.
+    came out otherwise, the ``differences`` of the tools that can be why, and ``left_to_do[]``, a sentence for each file
+    that nobody recorded.
 
     Raises
     ------
@@ -92,6 +93,11 @@ def _repair_locked(
         "restored": restored,
         "failed": sorted(set(paths) - set(restored)),
         "differences": as_sentences(find_tool_differences(manifest, tools_here())),
+        "left_to_do": [
+            f"{layout}/{row['path']}: nobody recorded this file, and readers would take it for data: remove it"
+            for row in found["damaged"]
+            if row["damage"] == "not recorded"
+        ],
     }
 
 

@@ -104,6 +104,8 @@ def compare_files(layout: Layout) -> dict[str, Any]:
     ``damaged[]`` with ``path``, ``clip_id`` and ``damage``; ``unrecorded[]``, files in the folder that the manifest
     does not know: among the data they are damage, elsewhere they are not.
     """
+    if not layout.manifest.exists():
+        read_manifest(layout)  # says what is missing, before a folder that is no dataset is walked
     foreign = foreign_entries(layout.root)
     damaged: list[dict[str, str | None]] = [
         {"path": path, "clip_id": None, "damage": "a link, or no file"} for path in foreign

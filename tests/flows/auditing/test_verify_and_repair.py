@@ -93,6 +93,21 @@ def test_a_file_among_the_data_that_nobody_recorded_is_damage(copy):
     result = verify_dataset(str(copy.root))
     assert [row["damage"] for row in result["damaged"]] == ["not recorded"]
     assert len(result["unrecorded"]) == 2
+    repaired = repair_dataset(str(copy.root))
+    (told,) = repaired["left_to_do"]
+    assert not repaired["repaired"] and told.startswith(
+        f"{copy.root}/telemetry/ticks/family=dry/part-0009.parquet: "
+    )
+    assert (
+        told.endswith("remove it")
+        and (copy.telemetry / "ticks" / "family=dry" / "part-0009.parquet").exists()
+    )
+
+
+def test_a_folder_that_is_no_dataset_is_told_before_it_is_walked(tmp_path, monkeypatch):
+    monkeypatch.setattr("flows.auditing.verify.foreign_entries", lambda root: pytest.fail("walked"))
+    with pytest.raises(InputError, match=r"must be a finished dataset; it has no manifest\.json"):
+        verify_dataset(str(tmp_path))
 
 
 def test_everything_but_the_manifest_is_made_again_with_equal_bytes(toy_dataset, copy):
