@@ -14,10 +14,11 @@ from catalogs.studies.ablation import cut_coupling
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from flows.making.driving import simulate_drive
-from flows.making.generate import RunReport, generate_dataset
+from flows.making.generate import generate_dataset
 from flows.making.grid_inputs import find_private_entries
 from flows.making.places import find_scene
 from flows.making.plan import Plan, freeze_grid
+from flows.making.run_report import RunReport
 from flows.running.progress import progress_bar
 from flows.running.runner import RunnerChoice
 from flows.store.layout import write_atomically

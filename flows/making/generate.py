@@ -4,7 +4,6 @@ import shutil
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from functools import partial
 
 from catalogs.grids import Grid
@@ -14,11 +13,18 @@ from flows.making.clip import make_clip, warm_up
 from flows.making.input_changes import frozen_inputs, restore_inputs
 from flows.making.places import find_scene
 from flows.making.plan import Plan, hold_plan, make_plan, plan_differences, read_plan
+from flows.making.run_report import RunCost, RunReport
 from flows.making.seal import seal_dataset
 from flows.running.failures import ClipsFailed, disk_full_sentence
 from flows.running.orchestration import run_as_stage
 from flows.running.progress import progress_bar
-from flows.running.runner import RunnerChoice, check_runner, choose_runner, open_executor, run_unordered
+from flows.running.runner import (
+    RunnerChoice,
+    choose_runner,
+    list_runner_problems,
+    open_executor,
+    run_unordered,
+)
 from flows.store.address import (
     forget_begun,
     open_for_reading,
@@ -39,50 +45,6 @@ from tasks.render.rasterise.backend import select_backend
 
 SHOWN = 8
 """Differences reported when a folder holds another run."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class RunCost:
-    """Cost of all clips together; nothing of a single clip is kept.
-
-    Parameters
-    ----------
-    cpu_s, wall_s : sums over the clips [s]
-    peak_memory_mib : of the largest worker [MiB]
-    """
-
-    cpu_s: float = 0.0
-    wall_s: float = 0.0
-    peak_memory_mib: float = 0.0
-
-    def with_clip(self, cost: Mapping[str, float]) -> "RunCost":
-        """The cost with that of one more clip."""
-        return RunCost(
-            cpu_s=self.cpu_s + cost["cpu_s"],
-            wall_s=self.wall_s + cost["wall_s"],
-            peak_memory_mib=max(self.peak_memory_mib, cost["peak_memory_mib"]),
-        )
-
-
-@dataclass(frozen=True, kw_only=True)
-class RunReport:
-    """Result of a generating run.
-
-    Parameters
-    ----------
-    layout : where it lies
-    run_id : of its frozen plan
-    clips, made : clips of the dataset, and of these those made now
-    quarantined : why the pose check failed, by label of the clip; they stay in the dataset, marked
-    cost : of what was made now
-    """
-
-    layout: Layout
-    run_id: str
-    clips: int
-    made: int
-    quarantined: dict[str, list[str]]
-    cost: RunCost
 
 
 def generate_dataset(
@@ -114,8 +76,13 @@ def generate_dataset(
     cost = RunCost()
     quarantined: dict[str, list[str]] | None = None
     with open_for_writing(out, want_progress) as layout:
-        plan, inputs = make_plan(grid, select_backend(backend).name, vehicle, pictures=pictures)
-        check_runner(choose_runner(runner, plan.settings.pictures, scheduler), scheduler)
+        wrong = list_runner_problems(choose_runner(runner, pictures, scheduler), scheduler)
+        try:
+            plan, inputs = make_plan(grid, select_backend(backend).name, vehicle, pictures=pictures)
+        except InputError as error:
+            raise InputError([*wrong, *error.problems]) from None
+        if wrong:
+            raise InputError(wrong)
         _refuse_other_content(layout)
         if layout.manifest.is_file():
             _refuse_other_plan(layout, plan, inputs)

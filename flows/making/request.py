@@ -6,7 +6,8 @@ from typing import Any
 
 from catalogs.grids import load_grid
 from flows.making.freezing import reproduce_run
-from flows.making.generate import RunReport, generate_dataset
+from flows.making.generate import generate_dataset
+from flows.making.run_report import RunReport
 from tasks.errors import InputError
 
 

@@ -250,3 +250,12 @@ def test_a_faulty_grid_s_missing_entries_are_listed_with_its_other_faults(tmp_pa
     for fault in ("colour: unknown key", "precipitation_mm_h must not be negative", "tank", "nowhere"):
         assert fault in text
     assert len(caught.value.problems) == 4
+
+
+def test_faults_of_vehicle_and_runner_are_listed_together(grid, tmp_path):
+    with pytest.raises(InputError) as caught:
+        generate_dataset(
+            grid, str(tmp_path / "data"), vehicle="nope", runner="threads", scheduler="tcp://127.0.0.1:1"
+        )
+    first, second = caught.value.problems
+    assert first.startswith("--scheduler tcp://127.0.0.1:1 belongs to --runner dask") and "nope" in second

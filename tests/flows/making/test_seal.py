@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from flows.making.generate import RunCost
+from flows.making.run_report import RunCost
 from flows.making.seal import pick_evenly
 from flows.making.summaries import _join, _pack
 from flows.store.telemetry import labelled_table
