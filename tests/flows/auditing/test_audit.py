@@ -123,6 +123,16 @@ def test_without_its_scene_a_sound_dataset_is_verified_by_its_files_and_no_clip_
     assert [line[:24] for line in result["not_remade"]] == ["scene scene: no folder i"]
 
 
+def test_a_clip_that_ends_in_an_error_leaves_the_report_of_files_and_signature(copy, monkeypatch):
+    def strike(*given):
+        raise RuntimeError("lightning struck")
+
+    monkeypatch.setattr("flows.making.generate.make_clip", strike)
+    result = audited(copy)
+    assert result["not_remade"] == ["a clip ended in RuntimeError: lightning struck"]
+    assert not result["verified"] and result["intact"] == result["files"] and result["remade"] == []
+
+
 def test_no_message_names_the_folder_in_which_clips_were_made_again(copy):
     file = copy.inputs / "vehicle.yaml"
     file.write_text(file.read_text().replace("cg_height: {value: 0.55", "cg_height: {value: -1"))

@@ -118,10 +118,13 @@ def test_words_of_a_stranger_are_text_and_a_difference_is_marked(audit):
     result = audit["result"] | {
         "remade": [strange | {"as_recorded": False}],
         "mismatches": [row],
+        "contradictions": ["plan.json: clips.0.label must be <b>x</b>, as in manifest.json"],
         "verified": False,
     }
     page = write_audit_page(result | {"verdict": tell_verdict(result)})
     assert "<b>x" not in page and "&lt;b&gt;x" in page
+    assert "Records that contradict each other: plan.json: clips.0.label must be &lt;b&gt;x" in page
+    assert "; its records contradict each other; " in tell_verdict(result)
     assert "Not verified: " in page and "0 came out as recorded and 1 did not" in page
     assert (
         "vehicle, speed, tick 3: 1.0 recorded, 2.0 made again. Can come from: no input that is recorded"
