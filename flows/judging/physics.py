@@ -190,6 +190,8 @@ def read_constants(root: Path) -> Constants:
         car=_convert_numbers(car), surface=surface, tyres=tyres, mode=mode,
         ticks_per_frame=TICK_RATE_HZ / settings.frame_rate_hz,
         steady_limit=0.0 if steady is None else steady.explicit_limit,
+        held_share=0.0 if steady is None else steady.held_share,
+        low_speed_rule=steady is None or steady.pitch_rule,
     )  # fmt: skip
 
 

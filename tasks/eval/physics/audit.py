@@ -95,7 +95,7 @@ def evaluate_laws(
         *wheel_laws(ticks, facts, "r", constants, half),
         *motion_laws(ticks, facts, constants, half),
         *command_laws(ticks, facts, constants),
-        *body_laws(ticks, facts, constants),
+        *body_laws(ticks, facts, constants, half),
         *surface_laws(facts, constants),
         *frame_laws(ticks, frames, facts, constants),
         *pose_laws(frames, constants),

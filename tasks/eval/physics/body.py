@@ -4,10 +4,12 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tasks.eval.physics.constants import DT, SURFACE_FORMS, Constants, Floats, derive_surface
-from tasks.eval.physics.half_step import INNER_STEP, find_brake_onset
+from tasks.eval.physics.half_step import INNER_STEP, HalfStep, find_brake_onset
 from tasks.eval.physics.laws import Law, evaluate_law, rounding_tolerance
+from tasks.eval.physics.stop_pitch import CAP_S, compute_pitching_deceleration
 from tasks.eval.physics.superposition import sum_contact_changes
 
 ROUND = 1e-9
@@ -18,7 +20,7 @@ STOP_PASS = 10
 
 
 def body_laws(
-    ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants
+    ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants, half: HalfStep
 ) -> list[Law | None]:
     """Return the laws of rates, the half-car's four equations and contact loads (paper, Eq. app_half_car_complete).
 
@@ -27,10 +29,10 @@ def body_laws(
     ticks : columns of the tick table
     facts : the clip's row
     constants : car and pavement
+    half : state half a tick after each tick
     """
     car = constants.car
     z, dz, theta, dtheta = (ticks[c] for c in ("heave", "heave_rate", "pitch", "pitch_rate"))
-    a = ticks["longitudinal_acceleration"]
     # the brake moment follows dv/dt, so its jumps within a few ticks change both rates
     jumpy = _spread_maximum(_largest_input_changes(ticks, facts, constants), 3)
     pitch_input = 1.3 * car["sprung_mass"] * car["cg_height"] / car["pitch_inertia"]
@@ -44,7 +46,7 @@ def body_laws(
 
     forces: dict[str, Floats] = {}
     lifted = not all(np.all(ticks[f"axle_load_{axle}"] > 0) for axle in "fr")
-    moment = _brake_moment(ticks, facts, constants)
+    moment = _brake_moment(ticks, facts, constants, half)
     pushed = sum_contact_changes(ticks, moment, constants) if lifted and constants.mode == "paper" else {}
     for axle, lever in (("f", -car["cg_to_front_axle"]), ("r", car["cg_to_rear_axle"])):
         u = ticks[f"unsprung_heave_{axle}"]
@@ -75,30 +77,25 @@ def body_laws(
                 mass * bend - push[inner], 5e-3 * size + mass * 5 * jumpy[inner])
         )  # fmt: skip
     if constants.mode == "paper":
-        laws += _sprung_laws(dz, dtheta, a, forces, ticks, facts, constants, jumpy)
+        judged = _judged_rows(ticks, facts, constants)
+        laws += _sprung_laws(dz, dtheta, forces, moment, judged, constants, jumpy)
     return laws
 
 
 def _sprung_laws(
-    dz: Floats, dtheta: Floats, a: Floats, forces: Mapping[str, Floats], ticks: Mapping[str, Floats],
-    facts: Mapping[str, Any], constants: Constants, jumpy: Floats,
+    dz: Floats, dtheta: Floats, forces: Mapping[str, Floats], moment: Floats, judged: NDArray[np.bool_],
+    constants: Constants, jumpy: Floats,
 ) -> list[Law | None]:  # fmt: skip
-    car, tyre = constants.car, constants.tyres[facts["weather"]]
-    moment = _brake_moment(ticks, facts, constants)
+    car = constants.car
     up = -(forces["f"] + forces["r"]) / car["sprung_mass"]
     nose = car["cg_to_front_axle"] * forces["f"] - car["cg_to_rear_axle"] * forces["r"] + moment
     nose = nose / car["pitch_inertia"]
-    # the low-speed rule replaces the moment's input from the hold on
-    hold = len(a)
-    standing = np.flatnonzero(ticks["speed"] <= 0)
-    if standing.size:
-        tau = max(tyre.at(tyre.hold_s, facts["surface_friction"]), 0.2)
-        hold = int(standing[0]) - round(tau / DT) - 2
     laws = []
-    for name, rate, acceleration, last, per_jump in (
-        ("heave", dz, up, len(a), 0.05), ("pitch", dtheta, nose, hold, 1.0),
+    every = np.ones(len(dz), bool)
+    for name, rate, acceleration, rows, per_jump in (
+        ("heave", dz, up, every, 0.05), ("pitch", dtheta, nose, judged, 1.0),
     ):  # fmt: skip
-        k = np.arange(3, max(min(last, len(a)) - 3, 3))
+        k = np.flatnonzero(rows[3:-3]) + 3
         step = rate[k + 1] - rate[k - 1]
         drive = DT / 3 * (acceleration[k + 1] + 4 * acceleration[k] + acceleration[k - 1])
         size = np.abs(acceleration[3:-3]).max() if len(k) else 0.0
@@ -109,14 +106,32 @@ def _sprung_laws(
     return laws
 
 
-def _brake_moment(ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants) -> Floats:
-    """Pitch moment that each tick's deceleration asks for, [N] [N m]; at the end the low-speed rule replaces it."""
+def _judged_rows(
+    ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants
+) -> NDArray[np.bool_]:
+    """Rows whose brake moment follows from the ticks [N]: all but those about a literal stop on a road feature.
+
+    There the low-speed rule holds one sample of the last fixed-point pass but one, and the ticks are of the last.
+    """
+    judged = np.ones(len(ticks["speed"]), bool)
+    standing = np.flatnonzero(ticks["speed"] <= 0)
+    if standing.size and constants.held_share == 0 and facts["hazard_height_m"] != 0:
+        tyre = constants.tyres[facts["weather"]]
+        hold, release = (tyre.at(t, facts["surface_friction"]) for t in (tyre.hold_s, tyre.release_s))
+        begin = int(standing[0]) - round(max(hold, CAP_S) / DT) - STOP_PASS
+        judged[max(begin, 0) : int(standing[0]) + round(release / DT) + STOP_PASS] = False
+    return judged
+
+
+def _brake_moment(
+    ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants, half: HalfStep
+) -> Floats:
+    """Pitch moment of the brake at each tick (paper, Eq. app_brake_pitch), [N] [N m]."""
     car, tyre = constants.car, constants.tyres[facts["weather"]]
     gamma = tyre.at(tyre.pitch_scale, facts["surface_friction"])
     gamma *= 1.0 if facts["hazard_height_m"] == 0 else car["coupled_pitch_scale"]
-    moment: Floats = (
-        gamma * car["sprung_mass"] * car["cg_height"] * np.maximum(-ticks["longitudinal_acceleration"], 0.0)
-    )
+    deceleration = compute_pitching_deceleration(ticks, facts, constants, half)
+    moment: Floats = gamma * car["sprung_mass"] * car["cg_height"] * deceleration
     return moment
 
 
@@ -133,7 +148,7 @@ def _largest_input_changes(
         apart = 0 if facts["hazard_height_m"] == 0 else STOP_PASS
         hold, release = (tyre.at(t, facts["surface_friction"]) for t in (tyre.hold_s, tyre.release_s))
         # the low-speed rule starts, caps, releases and ends its input at these times before the stop
-        for before in (hold, 0.2, 0.0, -release):
+        for before in (hold, CAP_S, 0.0, -release):
             k = min(max(int(standing[0]) - round(before / DT), 1), len(swing) - 1)
             swing[max(k - 1 - apart, 0) : k + 1 + apart] = np.abs(a).max()
     return swing

@@ -51,6 +51,8 @@ class Constants:
     mode : paper or coupled
     ticks_per_frame : ticks from one frame to the next [1]
     steady_limit : explicit wheel step beyond which the wheels step implicitly, in time constants; 0 never [1]
+    held_share : part of the hold time, up to the stop, over which the released deceleration is the mean [1]
+    low_speed_rule : whether the low-speed rule replaces the deceleration that pitches the body
     """
 
     car: Mapping[str, float]
@@ -59,6 +61,8 @@ class Constants:
     mode: str
     ticks_per_frame: float
     steady_limit: float = 0.0
+    held_share: float = 0.0
+    low_speed_rule: bool = True
 
     @property
     def mass(self) -> float:

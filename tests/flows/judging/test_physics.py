@@ -1,6 +1,7 @@
 """One per cent put into any column of a dataset's telemetry is caught, and the verdict names the column."""
 
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,11 @@ from flows.store.layout import Layout
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.eval.physics.audit import audit_clip
+from tasks.vehicle.paper.low_speed import BrakedStop, compute_brake_pitch_input
 from tests.toy_street import write_toy_grid
+
+Fault = Callable[[np.ndarray, int, float], None]
+"""Changes the brake's pitch input, given the sample of the stop and the step [s]."""
 
 GRID = """
 name: laws
@@ -43,6 +48,17 @@ base: {{initial_speed_km_h: 25, peak_pressure_mpa: 2.3, ramp_s: 0, release_s: 0,
 scenarios:
   early: {{brake_onset_s: 0.2}}
   late: {{brake_onset_s: 0.7}}
+"""
+STOP = """
+name: stop
+scene: {folder}/scene
+camera: {folder}/camera.yaml
+frames: 16
+frame_rate_hz: 5
+low_speed: {low_speed}
+base: {{initial_speed_km_h: 25, peak_pressure_mpa: 2.3, brake_onset_s: 0.2}}
+scenarios:
+  stop: {{weather: dry}}
 """
 TRIALS = 60
 
@@ -75,6 +91,41 @@ def test_a_brake_that_jumps_keeps_every_law_and_one_that_acts_a_tick_late_does_n
     late = {**ticks, "brake_pressure_mpa": np.roll(ticks["brake_pressure_mpa"], 1)}
     verdict = audit_clip(late, frames, facts, read_constants(made))
     assert "brake pressure as commanded" in [law.name for law in verdict.laws if law.broken]
+
+
+def keep_nose_down(d: np.ndarray, stop: int, step: float) -> None:
+    d[stop:] = d[stop - 1]
+
+
+def rock(d: np.ndarray, stop: int, step: float) -> None:
+    d[stop:] = 4 * np.sin(2 * np.pi * step * np.arange(len(d) - stop))
+
+
+def hold_half_more(d: np.ndarray, stop: int, step: float) -> None:
+    d[stop - round(0.2 / step) : stop] *= 1.5
+
+
+def release_at_once(d: np.ndarray, stop: int, step: float) -> None:
+    d[stop:] = 0
+
+
+@pytest.mark.parametrize("low_speed", ["steady", "literal"])
+@pytest.mark.parametrize("fault", [keep_nose_down, rock, hold_half_more, release_at_once])
+def test_a_body_that_the_brake_pitches_wrongly_in_the_hold_or_after_it_breaks_its_pitch_equation_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: Fault, low_speed: str
+) -> None:
+    def pitch_wrongly(acceleration: np.ndarray, step: float, braked: BrakedStop, **rule: float) -> np.ndarray:
+        d = compute_brake_pitch_input(acceleration, step, braked, **rule)
+        assert braked.sample > 0
+        fault(d, braked.sample, step)
+        return d
+
+    monkeypatch.setattr("tasks.vehicle.paper.paper_mode.compute_brake_pitch_input", pitch_wrongly)
+    grid = write_toy_grid(tmp_path, STOP.replace("{low_speed}", low_speed))
+    generate_dataset(grid, str(tmp_path / "made"), runner="threads", workers=1, pictures=False)
+    (clip,) = audit_physics(str(tmp_path / "made"), out=str(tmp_path))["clips"]
+    assert [law["law"] for law in clip["broken"]] == ["body's pitch equation"]
+    assert clip["broken"][0]["excess"] > 10
 
 
 def test_a_dataset_with_pictures_keeps_the_laws_of_its_pose_check_too(
