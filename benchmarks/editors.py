@@ -24,7 +24,7 @@ from catalogs.vehicles import load_vehicle
 from flows.judging.video_sets.judge_set import format_cell, judge_video_set
 from flows.making.driving import simulate_drive
 from flows.store.layout import write_json
-from tasks.eval.motion_agreement import rms
+from tasks.eval.body_agreement import rms
 from tasks.eval.video_motion import PAPER_OPENING, geometry_error
 
 WIDTH, HEIGHT, FOCAL = 480, 320, 400.0

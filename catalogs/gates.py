@@ -21,10 +21,19 @@ class ForeignGateEntry(CatalogueEntry):
 
 
 class GateEntry(ForeignGateEntry):
-    """Content of a gate file for generated clips: with depth, degrees and metres are judged too."""
+    """Content of a gate file for generated clips: with depth, degrees and metres are judged too.
+
+    The file that an older dataset keeps has no limits of the rig's other motion, and leaves it unjudged.
+    """
 
     pitch_rmse_deg: Annotated[Scalar, require_quantity("deg", above=0)]
     progress_rmse_m: Annotated[Scalar, require_quantity("m", above=0)]
+    roll_rmse_deg: Annotated[Scalar, require_quantity("deg", above=0)] | None = None
+    yaw_rmse_deg: Annotated[Scalar, require_quantity("deg", above=0)] | None = None
+    lateral_rmse_m: Annotated[Scalar, require_quantity("m", above=0)] | None = None
+    rise_rmse_m: Annotated[Scalar, require_quantity("m", above=0)] | None = None
+    heave_gain_error: Annotated[Scalar, require_quantity("1", above=0)] | None = None
+    heave_gain_std: Annotated[Scalar, require_quantity("1", above=0)] | None = None
 
 
 def load_gates(path: Path = GATES) -> PoseThresholds:
@@ -51,4 +60,5 @@ def load_foreign_gates(path: Path = FOREIGN_GATES) -> PoseThresholds:
 
 
 def _read_values(entry: ForeignGateEntry) -> dict[str, float]:
-    return {name: getattr(entry, name).value for name in type(entry).model_fields}
+    given = {name: getattr(entry, name) for name in type(entry).model_fields}
+    return {name: scalar.value for name, scalar in given.items() if scalar is not None}

@@ -14,7 +14,7 @@ from typing_extensions import TypedDict
 from catalogs.scenario import SCENARIO_FIELDS, Scenario
 from catalogs.sentences import cap_problems, describe_rules, shorten_value
 from manifests.canonical import ID_LENGTH
-from tasks.conventions import CLIP_CHANNELS, LATER_CLIP_CHANNELS
+from tasks.conventions import CLIP_CHANNELS, LATER_CHECK_CHANNELS, LATER_CLIP_CHANNELS
 from tasks.errors import InputError
 from tasks.eval.motion_agreement import PoseVerdict
 
@@ -80,7 +80,10 @@ else:
     FiguresRecord = with_config(STRICT)(
         TypedDict("FiguresRecord", {**_figures, "calibration_extrapolated": bool})
     )
-    _optional = {name: kind | None for name, kind in get_type_hints(PoseVerdict).items()}
+    _optional = {
+        name: NotRequired[kind | None] if f"check_{name}" in LATER_CHECK_CHANNELS else kind | None
+        for name, kind in get_type_hints(PoseVerdict).items()
+    }
     VerdictRecord = with_config(STRICT)(TypedDict("VerdictRecord", {**_optional, "reasons": list[str]}))
 
 

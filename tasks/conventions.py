@@ -142,7 +142,20 @@ CHECK_CHANNELS: tuple[Channel, ...] = (
     Channel(name="check_progress_rmse_m", unit="m", symbol="", description="RMSE of recovered against claimed forward progress"),
     Channel(name="check_normalised_progress_rmse", unit="1", symbol="", description="the same over the whole progress"),
     Channel(name="check_failed_frames", unit="1", symbol="", description="frames without a recovered pose"),
+    Channel(name="check_judged_frames", unit="1", symbol="", description="frames after the first with a recovered pose; without any, every figure of the check is null"),
+    Channel(name="check_roll_rmse_deg", unit="deg", symbol="", description="RMSE of recovered roll against the route's, both from frame 0"),
+    Channel(name="check_yaw_rmse_deg", unit="deg", symbol="", description="RMSE of recovered yaw against the route's, both from frame 0"),
+    Channel(name="check_lateral_rmse_m", unit="m", symbol="", description="RMSE of the recovered rig's place to the left of the claimed one"),
+    Channel(name="check_rise_rmse_m", unit="m", symbol="", description="RMSE of the recovered rig's place above the claimed one"),
+    Channel(name="check_heave_gain", unit="1", symbol="", description="recovered over claimed heave, by least squares of changes over two frames"),
+    Channel(name="check_heave_gain_std", unit="1", symbol="", description="standard uncertainty of the heave gain; a large one leaves it unjudged"),
 )  # fmt: skip
+
+LATER_CHECK_CHANNELS = frozenset({
+    "check_judged_frames", "check_roll_rmse_deg", "check_yaw_rmse_deg", "check_lateral_rmse_m", "check_rise_rmse_m",
+    "check_heave_gain", "check_heave_gain_std",
+})  # fmt: skip
+"""Columns of the pose check that older datasets do not have."""
 
 PAIR_CHANNELS: tuple[Channel, ...] = (
     Channel(name="clip_id_a", unit="", symbol="", description="the sibling that comes first in the dataset"),

@@ -10,7 +10,7 @@ from flows.judging.evaluation_rows import figure_row, find_control
 from flows.judging.judged_clip import JudgedClip, Row
 from flows.judging.standards import MeantMotion, Standard, opening_of, require_whole_way
 from tasks.errors import InputError
-from tasks.eval.motion_agreement import rms
+from tasks.eval.body_agreement import rms
 from tasks.eval.poses.motion import RecoveredMotion, motion_of_telemetry
 from tasks.eval.video_motion import (
     PAPER_OPENING,

@@ -36,6 +36,7 @@ from flows.store.telemetry import columns_hash, labelled_table, write_parquet
 from manifests.canonical import sha256_of_file
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
+from tasks.eval.body_agreement import BodyClaim, pose_body
 from tasks.eval.motion_agreement import PoseVerdict, judge_pose
 from tasks.eval.poses.checks import GATE_CHECK, POSE_CHECKS, CheckedClip, JudgeCamera, prepare_clip
 from tasks.eval.poses.undistort import undistort_frames
@@ -220,7 +221,11 @@ def judge_motion(
     shown = {name: buffers[name] for name in ("rgb", "depth", "class")}
     pinhole = undistort_frames(shown, camera.K - PIXEL_CENTRE, camera.distortion)
     recovered = POSE_CHECKS[GATE_CHECK](prepare_for_checks(pinhole, frames, film_depth_mm, catalogue))
-    verdict = judge_pose(recovered, frames["pitch"], frames["station"], catalogue.gates)
+    body = pose_body(
+        frames["heave"], frames["pitch"], catalogue.vehicle.cg_to_front_axle, catalogue.vehicle.cg_height
+    )
+    claim = BodyClaim(T_world_rig=catalogue.scene.route.pose(frames["station"]) @ body, heave=frames["heave"])
+    verdict = judge_pose(recovered, frames["pitch"], frames["station"], catalogue.gates, claim)
     return {
         "recovered_pitch": recovered.pitch,
         "recovered_progress": recovered.progress,

@@ -14,7 +14,7 @@ from flows.store.address import open_for_reading, want_telemetry
 from flows.store.layout import Layout
 from flows.store.sealed import read_manifest_head
 from manifests.manifest import is_traced
-from tasks.conventions import CHECK_CHANNELS
+from tasks.conventions import CHECK_CHANNELS, LATER_CHECK_CHANNELS
 from tasks.errors import InputError
 
 MOST_COLUMNS = 500
@@ -72,7 +72,10 @@ def connect_sealed(
                 f" read_parquet({_format_list(map(_make_address, names))},"
                 f" hive_partitioning = {table in {'ticks', 'frames'}})"
             )
-        checks = ", ".join(channel.name for channel in CHECK_CHANNELS)
+        there = set(pq.read_schema(next(iter(tables["clips"].values()))).names)
+        checks = ", ".join(
+            c.name for c in CHECK_CHANNELS if c.name in there or c.name not in LATER_CHECK_CHANNELS
+        )
         connection.execute(f"CREATE VIEW verdicts AS SELECT clip_id, label, weather, {checks} FROM clips")
     except (duckdb.Error, pa.ArrowException, OSError) as error:
         connection.close()

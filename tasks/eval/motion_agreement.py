@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.errors import InputError
+from tasks.eval.body_agreement import BodyClaim, BodyErrors, compare_body, rms
 from tasks.eval.poses.motion import RecoveredMotion
 
 Floats = NDArray[np.float64]
@@ -26,6 +27,10 @@ class PoseThresholds:
     progress_rmse_m : largest RMSE of forward progress [m]; for a method that knows the scale
     normalised_progress_rmse : largest RMSE of progress over the clip's whole progress [1]
     failed_share : largest share of frames without a pose [1]
+    roll_rmse_deg, yaw_rmse_deg : largest RMSE of roll and yaw [deg]
+    lateral_rmse_m, rise_rmse_m : largest RMSE of the rig's place to the side and upward [m]
+    heave_gain_error : largest difference of the heave gain from 1 [1]
+    heave_gain_std : standard uncertainty of that gain above which there is too little heave to judge it by [1]
     """
 
     pitch_rmse_deg: float
@@ -35,6 +40,12 @@ class PoseThresholds:
     progress_rmse_m: float | None
     normalised_progress_rmse: float | None
     failed_share: float = 0.0
+    roll_rmse_deg: float | None = None
+    yaw_rmse_deg: float | None = None
+    lateral_rmse_m: float | None = None
+    rise_rmse_m: float | None = None
+    heave_gain_error: float | None = None
+    heave_gain_std: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,6 +63,9 @@ class PoseVerdict:
     progress_rmse_m : RMSE of forward progress from frame 0 [m]; NaN where the method knows no scale
     normalised_progress_rmse : RMSE of progress over the whole progress [1]; NaN for a car that stands
     failed_frames : number of frames without a pose [1]
+    judged_frames : number of frames after the first with a pose; without any, every figure is NaN [1]
+    roll_rmse_deg, yaw_rmse_deg, lateral_rmse_m, rise_rmse_m, heave_gain, heave_gain_std : as in `BodyErrors`; NaN where
+        the claim says nothing of them
     reasons : one sentence per threshold missed
     """
 
@@ -64,11 +78,33 @@ class PoseVerdict:
     progress_rmse_m: float
     normalised_progress_rmse: float
     failed_frames: int
+    judged_frames: int
+    roll_rmse_deg: float
+    yaw_rmse_deg: float
+    lateral_rmse_m: float
+    rise_rmse_m: float
+    heave_gain: float
+    heave_gain_std: float
     reasons: tuple[str, ...]
 
 
+UNKNOWN_BODY = BodyErrors(
+    roll_rmse_deg=float("nan"),
+    yaw_rmse_deg=float("nan"),
+    lateral_rmse_m=float("nan"),
+    rise_rmse_m=float("nan"),
+    heave_gain=float("nan"),
+    heave_gain_std=float("nan"),
+)
+"""Of a claim, or of pictures, that say nothing of the rig."""
+
+
 def judge_pose(
-    recovered: RecoveredMotion, claimed_pitch: Floats, claimed_station: Floats, thresholds: PoseThresholds
+    recovered: RecoveredMotion,
+    claimed_pitch: Floats,
+    claimed_station: Floats,
+    thresholds: PoseThresholds,
+    body: BodyClaim | None = None,
 ) -> PoseVerdict:
     """Compare recovered motion with the telemetry at the frame times.
 
@@ -78,6 +114,7 @@ def judge_pose(
     claimed_pitch : float64 [F] nose-down positive [rad]
     claimed_station : float64 [F] [m]
     thresholds : thresholds of the verdict
+    body : the rest of the rig's motion; None where the claim says nothing of it
 
     Raises
     ------
@@ -93,6 +130,12 @@ def judge_pose(
     if problems:
         raise InputError(problems)
     seen = ~recovered.failed
+    failed, judged_frames = int(recovered.failed.sum()), int(seen[1:].sum())
+    reasons = []
+    if failed > thresholds.failed_share * frames:
+        reasons.append(f"{failed} of {frames} frames have no pose: {recovered.failures[0]}")
+    if judged_frames == 0:
+        return _refuse_to_judge(recovered.method, failed, (*reasons, "no frame after the first has a pose"))
     claimed = np.rad2deg(claimed_pitch - claimed_pitch[0])[seen]
     pitch = np.rad2deg(recovered.pitch)[seen]
     way = (claimed_station - claimed_station[0])[seen]
@@ -104,11 +147,8 @@ def judge_pose(
     progress_rmse = rms(recovered.progress[seen] - way)
     moved = way[-1] > 0
     normalised = rms(recovered.normalised_path[seen, 0] - way / way[-1]) if moved else float("nan")
-    failed = int(recovered.failed.sum())
+    errors = UNKNOWN_BODY if body is None else compare_body(recovered, body)
 
-    reasons = []
-    if failed > thresholds.failed_share * frames:
-        reasons.append(f"{failed} of {frames} frames have no pose: {recovered.failures[0]}")
     limits: list[tuple[str, float, float | None, str]] = [
         ("pitch RMSE", pitch_rmse, thresholds.pitch_rmse_deg, "deg"),
         ("progress RMSE", progress_rmse, thresholds.progress_rmse_m, "m"),
@@ -117,6 +157,8 @@ def judge_pose(
         limits.append(("relative pitch error", relative, thresholds.pitch_relative_error, ""))
     if moved:
         limits.append(("normalised progress RMSE", normalised, thresholds.normalised_progress_rmse, ""))
+    if body is not None:
+        limits += _list_body_limits(errors, thresholds)
     for name, value, limit, unit in limits:
         # in this form NaN fails
         if limit is not None and not value <= limit:
@@ -135,10 +177,42 @@ def judge_pose(
         progress_rmse_m=progress_rmse,
         normalised_progress_rmse=normalised,
         failed_frames=failed,
+        judged_frames=judged_frames,
+        **vars(errors),
         reasons=tuple(reasons),
     )
 
 
-def rms(values: Floats) -> float:
-    """Return the root mean square [any]."""
-    return float(np.sqrt(np.mean(np.square(values))))
+def _list_body_limits(
+    errors: BodyErrors, thresholds: PoseThresholds
+) -> list[tuple[str, float, float | None, str]]:
+    """Name, value, limit and unit of each figure of the rig; of the heave only where it is certain enough."""
+    limits = [
+        ("roll RMSE", errors.roll_rmse_deg, thresholds.roll_rmse_deg, "deg"),
+        ("yaw RMSE", errors.yaw_rmse_deg, thresholds.yaw_rmse_deg, "deg"),
+        ("lateral RMSE", errors.lateral_rmse_m, thresholds.lateral_rmse_m, "m"),
+        ("RMSE of the rise", errors.rise_rmse_m, thresholds.rise_rmse_m, "m"),
+    ]
+    if thresholds.heave_gain_std is not None and errors.heave_gain_std <= thresholds.heave_gain_std:
+        gain = f"recovered heave is {errors.heave_gain:.3g} of the claimed, and their difference"
+        limits.append((gain, abs(errors.heave_gain - 1), thresholds.heave_gain_error, ""))
+    return limits
+
+
+def _refuse_to_judge(method: str, failed: int, reasons: tuple[str, ...]) -> PoseVerdict:
+    """Return the verdict on a clip of which no frame can be compared with the first."""
+    nan = float("nan")
+    return PoseVerdict(
+        method=method,
+        passed=False,
+        pitch_rmse_deg=nan,
+        pitch_relative_error=nan,
+        pitch_correlation=nan,
+        claimed_pitch_rms_deg=nan,
+        progress_rmse_m=nan,
+        normalised_progress_rmse=nan,
+        failed_frames=failed,
+        judged_frames=0,
+        **vars(UNKNOWN_BODY),
+        reasons=reasons,
+    )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tasks.errors import InputError
-from tasks.eval.motion_agreement import rms
+from tasks.eval.body_agreement import rms
 from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.poses.rigid import Floats
 from tasks.eval.video_motion import geometry_error, reference_progress

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from tasks.errors import InputError
-from tasks.eval.motion_agreement import rms
+from tasks.eval.body_agreement import rms
 from tasks.eval.poses.rigid import Floats
 
 WINDOWS: tuple[int | None, ...] = (None, 5, 7, 9)

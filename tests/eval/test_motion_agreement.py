@@ -153,9 +153,27 @@ def test_a_frame_without_a_pose_fails_the_clip_unless_a_share_of_them_is_allowed
     )
     verdict = judge_pose(gap, hump_clip.pitch, hump_clip.station, THRESHOLDS)
     assert not verdict.passed and verdict.failed_frames == 1 and "frame 5" in verdict.reasons[0]
+    assert verdict.judged_frames == n - 2
     assert np.isfinite(verdict.pitch_rmse_deg)
     lenient = replace(THRESHOLDS, failed_share=0.1)
     assert judge_pose(gap, hump_clip.pitch, hump_clip.station, lenient).passed
+
+
+def test_a_clip_of_which_no_frame_can_be_held_against_the_first_has_no_figures(hump_clip: Clip) -> None:
+    lost = np.arange(len(hump_clip.pitch)) > 0
+    gone = {
+        name: np.where(lost, np.nan, getattr(motion_with(hump_clip, hump_clip.pitch), name))
+        for name in ("pitch", "progress")
+    }
+    blind = motion_with(
+        hump_clip, hump_clip.pitch, failed=lost, failures=("exact: frame 1 has no pose: dark.",)
+    )
+    verdict = judge_pose(
+        replace(blind, **gone), hump_clip.pitch, hump_clip.station, replace(THRESHOLDS, failed_share=1.0)
+    )
+    assert not verdict.passed and verdict.judged_frames == 0 and verdict.failed_frames == lost.sum()
+    assert verdict.reasons == ("no frame after the first has a pose",)
+    assert np.isnan([verdict.pitch_rmse_deg, verdict.progress_rmse_m, verdict.claimed_pitch_rms_deg]).all()
 
 
 def test_telemetry_that_does_not_fit_the_frames_is_refused(hump_clip: Clip) -> None:

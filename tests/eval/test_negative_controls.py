@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tasks.eval.motion_agreement import rms
+from tasks.eval.body_agreement import rms
 from tasks.eval.negative_controls import (
     Claim,
     claims_differ,

@@ -1,0 +1,140 @@
+"""Roll, yaw, place and heave of the recovered rig: the claimed ones pass, and each other motion fails by its name."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from benchmarks.synthetic_street import Clip
+from catalogs.gates import load_gates
+from tasks.errors import InputError
+from tasks.eval.body_agreement import BodyClaim, compare_body, pose_body
+from tasks.eval.motion_agreement import PoseVerdict, judge_pose
+from tasks.eval.poses.motion import RecoveredMotion
+from tasks.eval.poses.pnp import recover_motion_pnp
+from tasks.eval.poses.rigid import invert_pose
+from tasks.render.camera import body_poses
+from tasks.scene.route import Route
+
+Floats = NDArray[np.float64]
+RATE_HZ = 16.0
+
+
+@pytest.fixture(scope="module")
+def recovered(hump_clip: Clip) -> RecoveredMotion:
+    clip, sky = hump_clip, ~np.isfinite(hump_clip.depth)
+    return recover_motion_pnp(clip.frames, clip.depth, clip.K, clip.T_rig_camera, sky)
+
+
+def claim_of(clip: Clip) -> BodyClaim:
+    return BodyClaim(T_world_rig=clip.T_world_rig, heave=clip.heave)
+
+
+def show_instead(motion: RecoveredMotion, clip: Clip, T_world_rig: Floats) -> RecoveredMotion:
+    """The motion as the check would have recovered it, errors and all, had the rig been elsewhere."""
+    meant, shown = (invert_pose(T[:1]) @ T for T in (clip.T_world_rig, T_world_rig))
+    return replace(motion, T_rig0_rig=shown @ invert_pose(meant) @ motion.T_rig0_rig)
+
+
+def judge(motion: RecoveredMotion, clip: Clip) -> PoseVerdict:
+    return judge_pose(motion, clip.pitch, clip.station, load_gates(), claim_of(clip))
+
+
+def turn(clip: Clip, axis: int, angle: Floats | float) -> Floats:
+    i, j = {0: (1, 2), 2: (0, 1)}[axis]
+    turned = np.tile(np.eye(4), (len(clip.pitch), 1, 1))
+    turned[:, i, i] = turned[:, j, j] = np.cos(angle)
+    turned[:, i, j], turned[:, j, i] = -np.sin(angle), np.sin(angle)
+    return clip.T_world_rig @ turned
+
+
+def shift(clip: Clip, axis: int, way: Floats) -> Floats:
+    shifted = clip.T_world_rig.copy()
+    shifted[:, :3, 3] += way[:, None] * clip.T_world_rig[:, :3, axis]
+    return shifted
+
+
+def pitch_by(clip: Clip, angle: Floats | float) -> Floats:
+    nothing = np.zeros(len(clip.pitch))
+    return pose_body(nothing, nothing + angle, 0.0, 0.0)
+
+
+def swing(clip: Clip, hertz: float) -> Floats:
+    return np.sin(2 * np.pi * hertz * np.arange(len(clip.pitch)) / RATE_HZ)
+
+
+FORGERIES = {
+    "no heave": ("heave", lambda clip: shift(clip, 2, -clip.heave)),
+    "heave upside down": ("heave", lambda clip: shift(clip, 2, -2 * clip.heave)),
+    "heave three times": ("heave", lambda clip: shift(clip, 2, 2 * clip.heave)),
+    "turned by 3 deg": ("lateral", lambda clip: turn(clip, 2, np.deg2rad(3))),
+    "roll of 3 deg": ("roll", lambda clip: turn(clip, 0, np.deg2rad(3) * swing(clip, 0.5))),
+    "yaw of 2 deg": ("yaw", lambda clip: turn(clip, 2, np.deg2rad(2) * swing(clip, 0.3))),
+    "sway of 0.3 m": ("lateral", lambda clip: shift(clip, 1, 0.3 * swing(clip, 0.3))),
+    "2 deg more pitch all along": (
+        "rise",
+        lambda clip: clip.T_world_rig @ pose_body(0 * clip.pitch, 0 * clip.pitch + 0.035, 0, 0),
+    ),
+}
+
+
+def test_the_claimed_rig_passes(recovered: RecoveredMotion, hump_clip: Clip) -> None:
+    verdict = judge(recovered, hump_clip)
+    assert verdict.passed, verdict.reasons
+    assert verdict.heave_gain == pytest.approx(1, abs=0.1) and verdict.heave_gain_std < 0.1
+
+
+@pytest.mark.parametrize("forgery", FORGERIES)
+def test_a_rig_that_moves_otherwise_than_claimed_fails_by_its_name(
+    recovered: RecoveredMotion, hump_clip: Clip, forgery: str
+) -> None:
+    name, forge = FORGERIES[forgery]
+    verdict = judge(show_instead(recovered, hump_clip, forge(hump_clip)), hump_clip)
+    assert not verdict.passed and any(name in reason for reason in verdict.reasons), verdict.reasons
+
+
+def test_a_heave_below_the_checks_own_uncertainty_is_not_judged(
+    recovered: RecoveredMotion, hump_clip: Clip
+) -> None:
+    shaken = shift(hump_clip, 2, 0.01 * np.random.default_rng(0).standard_normal(len(hump_clip.pitch)))
+    motion = show_instead(recovered, hump_clip, shaken)
+    quiet = replace(hump_clip, heave=0.1 * hump_clip.heave)
+    verdict = judge(motion, quiet)
+    assert verdict.heave_gain_std > 0.1 and abs(verdict.heave_gain - 1) > 0.5
+    assert not any("heave" in reason for reason in verdict.reasons)
+
+
+def test_a_pitch_that_drifts_does_not_turn_the_way_into_heave(hump_clip: Clip) -> None:
+    drift = np.deg2rad(0.3) * np.linspace(0, 1, len(hump_clip.pitch))
+    there = invert_pose(hump_clip.T_world_rig[:1]) @ hump_clip.T_world_rig
+    exact = replace(_placed(hump_clip), T_rig0_rig=there @ pitch_by(hump_clip, drift))
+    gain = compare_body(exact, claim_of(hump_clip)).heave_gain
+    assert gain == pytest.approx(1, abs=0.02)
+
+
+def _placed(clip: Clip) -> RecoveredMotion:
+    n, nothing = len(clip.pitch), np.zeros(len(clip.pitch))
+    return RecoveredMotion(
+        method="exact", T_rig0_rig=np.tile(np.eye(4), (n, 1, 1)), pitch=nothing, heave=nothing, lateral=nothing,
+        progress=nothing, normalised_path=np.zeros((n, 3)), pitch_std=nothing, progress_std=nothing,
+        inliers=np.ones(n, np.int64), failed=np.zeros(n, bool), failures=(),
+    )  # fmt: skip
+
+
+def test_the_judges_body_is_the_renderers() -> None:
+    draw = np.random.default_rng(1)
+    heave, pitch = 0.1 * draw.standard_normal((2, 7))
+    ends = np.tile(np.eye(4), (2, 1, 1))
+    ends[1, 0, 3] = 10.0
+    road = Route(station=np.array([0.0, 10.0]), T_world_rig=ends)
+    shown = body_poses(road, np.zeros(7), heave, pitch, cg_behind_front_axle=1.2, cg_height=0.5)
+    np.testing.assert_allclose(pose_body(heave, pitch, 1.2, 0.5), shown, atol=1e-15)
+
+
+def test_a_claim_that_does_not_fit_the_frames_is_refused(hump_clip: Clip) -> None:
+    holed = hump_clip.heave.copy()
+    holed[2] = np.nan
+    with pytest.raises(InputError) as caught:
+        compare_body(_placed(hump_clip), BodyClaim(T_world_rig=hump_clip.T_world_rig[1:], heave=holed))
+    assert len(caught.value.problems) == 2
