@@ -13,6 +13,7 @@ from tasks.eval.physics.constants import Constants
 from tasks.eval.physics.frames import frame_laws, pose_laws
 from tasks.eval.physics.half_step import follow_half_step
 from tasks.eval.physics.laws import Law, command_laws, motion_laws, wheel_laws
+from tasks.eval.physics.pose_check import pose_check_laws
 
 COPIED = "frame rows are ticks: "
 """Prefix of the names of the laws that relate the two tables."""
@@ -99,7 +100,8 @@ def evaluate_laws(
         *surface_laws(facts, constants),
         *frame_laws(ticks, frames, facts, constants),
         *pose_laws(frames, constants),
-        *outcome_laws(ticks, frames, facts, constants),
+        *outcome_laws(ticks, facts, constants),
+        *pose_check_laws(frames, facts),
     ]
     return tuple(x for x in found if x is not None)
 

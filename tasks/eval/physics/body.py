@@ -186,13 +186,13 @@ def surface_laws(facts: Mapping[str, Any], constants: Constants) -> list[Law | N
 
 
 def outcome_laws(
-    ticks: Mapping[str, Floats], frames: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants
+    ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants
 ) -> list[Law | None]:
-    """Return the laws of stop, distance, peak pitch and the recorded pose check, each computed again.
+    """Return the laws of stop, distance, peak pitch and wheel lift, each computed again.
 
     Parameters
     ----------
-    ticks, frames : columns of the two tables
+    ticks : columns of the tick table
     facts : the clip's row
     constants : car and pavement
     """
@@ -221,44 +221,4 @@ def outcome_laws(
                 evaluate_law("stopping distance from the onset", "clips.stopping_distance station",
                     np.array([facts["stopping_distance"] - way]), 1e-5)
             )  # fmt: skip
-    seen = np.isfinite(frames["recovered_pitch"])
-    if not seen.any():  # a dataset of telemetry alone has no pose check
-        return laws
-    claimed = np.rad2deg(frames["pitch"] - frames["pitch"][0])[seen]
-    found = np.rad2deg(frames["recovered_pitch"])[seen]
-    way = (frames["station"] - frames["station"][0])[seen]
-    response = float(np.sqrt(np.mean(claimed**2)))
-    error = float(np.sqrt(np.mean((found - claimed) ** 2)))
-    drift = float(np.sqrt(np.mean((frames["recovered_progress"][seen] - way) ** 2)))
-    checks = [
-        ("check_claimed_pitch_rms_deg", "frames.pitch ticks.pitch", response),
-        ("check_pitch_rmse_deg", "frames.recovered_pitch frames.pitch ticks.pitch", error),
-        ("check_progress_rmse_m", "frames.recovered_progress frames.station ticks.station", drift),
-        ("check_failed_frames", "frames.recovered_pitch", float(np.sum(~seen))),
-    ]
-    if np.isfinite(facts["check_pitch_relative_error"]):
-        checks.append(
-            ("check_pitch_relative_error", "frames.recovered_pitch frames.pitch ticks.pitch clips.check_pitch_rmse_deg",
-             error / response)
-        )  # fmt: skip
-    if np.isfinite(facts["check_pitch_correlation"]):
-        correlation = float(np.corrcoef(found, claimed)[0, 1])
-        checks.append(
-            ("check_pitch_correlation", "frames.recovered_pitch frames.pitch ticks.pitch", correlation)
-        )
-    if way[-1] > 0 and np.isfinite(facts["check_normalised_progress_rmse"]):
-        progress = frames["recovered_progress"][seen]
-        share = float(np.sqrt(np.mean((progress / progress[-1] - way / way[-1]) ** 2)))
-        checks.append(
-            (
-                "check_normalised_progress_rmse",
-                "frames.recovered_progress frames.station ticks.station",
-                share,
-            )
-        )
-    laws += [
-        evaluate_law(f"{name} worked out again", f"clips.{name} {columns}",
-            np.array([facts[name] - value]), 1e-9 * (1 + abs(value)))
-        for name, columns, value in checks
-    ]  # fmt: skip
     return laws

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.conventions import TICK_CHANNELS
+from tasks.eval.body_agreement import pose_body
 from tasks.eval.physics.constants import Constants, Floats
 from tasks.eval.physics.laws import Law, evaluate_law
 from tasks.eval.poses.rigid import invert_pose
@@ -60,19 +61,14 @@ def pose_laws(frames: Mapping[str, NDArray[Any]], constants: Constants) -> list[
     T = frames["T_world_rig"].reshape(-1, 4, 4)
     turn = T[:, :3, :3]
     heave, pitch, station = frames["heave"], frames["pitch"], frames["station"]
-    body = np.tile(np.eye(4), (len(T), 1, 1))
-    body[:, 0, 0] = body[:, 2, 2] = np.cos(pitch)
-    body[:, 0, 2], body[:, 2, 0] = np.sin(pitch), -np.sin(pitch)
-    centre = np.array([-constants.car["cg_to_front_axle"], 0.0, constants.car["cg_height"]])
-    body[:, :3, 3] = centre - body[:, :3, :3] @ centre
-    body[:, 2, 3] += heave
+    body = pose_body(heave, pitch, constants.car["cg_to_front_axle"], constants.car["cg_height"])
     route = T @ invert_pose(body)
     move = np.diff(route[:, :3, 3], axis=0)
     middle = route[1:, :3, :3] + route[:-1, :3, :3]
     across = np.einsum("nij,ni->nj", middle / np.linalg.norm(middle, axis=1, keepdims=True), move)
     gone = np.diff(station)
     # chords of a bend are shorter than its arc, and the road's crown and slope turn the axes a little
-    slack = 1e-3 * gone + 1e-4
+    slack, aside = 1e-3 * gone + 1e-4, 0.02 * gone + 1e-4
     identity = np.eye(3) - np.swapaxes(turn, 1, 2) @ turn
     return [
         evaluate_law("rig poses are rigid", "T_world_rig", np.abs(identity).max(axis=(1, 2)), 1e-9, "frames"),
@@ -81,5 +77,6 @@ def pose_laws(frames: Mapping[str, NDArray[Any]], constants: Constants) -> list[
         evaluate_law("rig moves by the station", "T_world_rig station ticks.station",
             np.linalg.norm(move, axis=1) - gone, slack, "frames"),
         evaluate_law("rig less heave and pitch stays on the route", "T_world_rig heave pitch ticks.heave ticks.pitch",
-            across[:, 2], 0.02 * gone + 1e-4, "frames"),
+            across[:, 2], aside, "frames"),
+        evaluate_law("rig less heave and pitch goes along its heading", "T_world_rig", across[:, 1], aside, "frames"),
     ]  # fmt: skip

@@ -239,3 +239,32 @@ def test_a_dataset_on_another_tyre_is_refused_by_its_name(dataset: Path, tmp_pat
         file.write("\ntyre: pacejka-205-60r15\n")
     with pytest.raises(InputError, match=r"knows Burckhardt's tyre; .* drives on pacejka-205-60r15"):
         read_constants(copy)
+
+
+def test_a_clip_without_a_judged_frame_has_no_figures_of_the_check_and_keeps_its_laws(
+    toy_dataset: Layout,
+) -> None:
+    facts = next(row for row in clip_facts(toy_dataset.root) if row["label"] == "snow-3/hump")
+    ticks, frames = (clip_columns(toy_dataset.root, table, facts) for table in ("ticks", "frames"))
+    lost = np.arange(len(frames["frame"])) > 0
+    frames |= {
+        name: np.where(lost, np.nan, frames[name]) for name in ("recovered_pitch", "recovered_progress")
+    }
+    blind = {name: np.nan for name in facts if name.startswith("check_") and isinstance(facts[name], float)}
+    counts = {"check_failed_frames": int(lost.sum()), "check_judged_frames": 0}
+    constants = read_constants(toy_dataset.root)
+    assert audit_clip(ticks, frames, {**facts, **blind, **counts}, constants).passed
+    wrong = audit_clip(ticks, frames, {**facts, **blind, **counts, "check_judged_frames": 1}, constants)
+    assert [law.name for law in wrong.broken] == ["check_judged_frames worked out again"]
+
+
+@pytest.mark.parametrize("angle_deg", [-3, 3])
+def test_a_rig_that_is_turned_off_its_way_all_along_breaks_a_law(dataset: Path, angle_deg: float) -> None:
+    facts = clip_facts(dataset)[0]
+    ticks, frames = (clip_columns(dataset, table, facts) for table in ("ticks", "frames"))
+    turned = np.eye(4)
+    cos, sin = np.cos(np.deg2rad(angle_deg)), np.sin(np.deg2rad(angle_deg))
+    turned[:2, :2] = [[cos, -sin], [sin, cos]]
+    T = (frames["T_world_rig"].reshape(-1, 4, 4) @ turned).reshape(-1, 16)
+    verdict = audit_clip(ticks, {**frames, "T_world_rig": T}, facts, read_constants(dataset))
+    assert "rig less heave and pitch goes along its heading" in [law.name for law in verdict.broken]
