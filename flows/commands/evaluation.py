@@ -102,7 +102,7 @@ COMMANDS = (
     Command(
         name="controls",
         group=GROUP,
-        sentence="Desynchronise a dataset's claims in seven ways, and say which metric detects which fault.",
+        sentence="Falsify a dataset's claims and motions in fourteen ways, and say which metric detects which fault.",
         function="flows.judging.controls:run_controls",
         options=(DATASET, OUT),
         brief=shorten_controls,

@@ -1,6 +1,7 @@
-"""Negative controls: desynchronised copies of a dataset's claims, and which metric sees which."""
+"""Negative controls: desynchronised claims and false motions of a dataset's clips, and which metric sees which."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,9 @@ from flows.store.address import open_for_reading
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest, refuse_changed_content, require_frames
 from tasks.errors import InputError
+from tasks.eval.body_agreement import BodyClaim
+from tasks.eval.false_rigs import FALSE_RIGS
+from tasks.eval.motion_agreement import PoseThresholds
 from tasks.eval.negative_controls import (
     Claim,
     claims_differ,
@@ -30,6 +34,7 @@ from tasks.eval.negative_controls import (
     delay_claim,
     scale_claimed_pitch,
     score_claim,
+    shows_another_rig,
 )
 from tasks.eval.video_motion import path_error, weather_error
 
@@ -41,6 +46,13 @@ CONTROLS: dict[str, str] = {
     "amplitude-0.8": "pitch at 80 %",
     "sign-flip": "pitch upside down",
     "other-clip": "telemetry of another clip",
+    "no-heave": "pictures without heave",
+    "heave-flip": "pictures with heave upside down",
+    "heave-3": "pictures with heave three times",
+    "roll": "pictures that roll by 3 deg",
+    "yaw": "pictures that yaw by 2 deg",
+    "aside": "pictures turned by 3 deg all along",
+    "sway": "pictures that sway by 0.3 m",
 }
 UNREAD: dict[str, str] = {
     **dict.fromkeys(("localised_edit_rate", "anchor_error", "temporal_iou"), "paired-lab"),
@@ -48,14 +60,14 @@ UNREAD: dict[str, str] = {
     **dict.fromkeys(("severity_rank_correlation", "severity_adjacent_accuracy"), "image statistics"),
     **dict.fromkeys(("piqe", "temporal_error"), "no reference"),
 }
-"""Metrics of the evaluation that no claim of pitch and way enters, by their method."""
+"""Metrics of the evaluation that no claim enters, by their method."""
 BLIND_BY_DESIGN = "never reads the claim"
-LEAST_PITCH, LEAST_WAY = np.deg2rad(0.05), 0.2
-"""A copy that differs by less in pitch [rad] and way [m] is no fault."""
+LEAST_PITCH, LEAST_WAY, LEAST_MOVE = np.deg2rad(0.05), 0.2, 0.005
+"""A copy that differs by less in angles [rad], in way [m], and to the side and upward [m] is no fault."""
 
 
 def run_controls(dataset: str, *, out: str | None = None) -> dict[str, Any]:
-    """Desynchronise a dataset in seven ways and report which metric detects which fault, and from what threshold.
+    """Desynchronise a dataset in seven ways, falsify its rig's motion in seven, and report which metric detects which.
 
     All are detected only if each could be tried; `undetected` says of the others what kept them.
 
@@ -146,12 +158,13 @@ def list_untried(clips: list[JudgedClip], false: list[dict[str, Claim]]) -> dict
         changed = [clip for clip, claims in zip(clips, false, strict=True) if name in claims]
         if not changed:
             kept[name] = (
-                f"not tried: in none of {len(clips)} clips does it change the claim by"
-                f" {np.rad2deg(LEAST_PITCH):.2g} deg or {LEAST_WAY:g} m; add clips in which it does"
+                f"not tried: in none of {len(clips)} clips does it change the motion by"
+                f" {np.rad2deg(LEAST_PITCH):.2g} deg, {LEAST_WAY:g} m of way or {LEAST_MOVE:g} m across; add clips in"
+                " which it does"
             )
         elif not any(_is_whole(clip, method) for clip in changed for method in METHODS):
             kept[name] = (
-                f"not tried: in the {len(changed)} clips whose claim it changes every method misses the pose of a"
+                f"not tried: in the {len(changed)} clips whose motion it changes every method misses the pose of a"
                 " frame; add clips that can be tracked"
             )
     return kept
@@ -165,12 +178,12 @@ def score_controls(clips: list[JudgedClip], false: list[dict[str, Claim]]) -> It
     clips : as their judges saw them
     false : of `make_false_claims`
     """
-    response = float(np.deg2rad(load_gates().response_deg))
+    gates = load_gates()
     true = _true_claims(clips)
     dry = [find_control(clip, clips, weather=True) for clip in clips]
 
     def scores(k: int, method: str, claim: Claim) -> dict[str, float]:
-        return _score_claim(clips[k], dry[k], method, claim, response)
+        return _score_claim(clips[k], dry[k], method, claim, gates)
 
     for method in METHODS:
         whole = [k for k, clip in enumerate(clips) if _is_whole(clip, method)]
@@ -218,7 +231,14 @@ def list_unread_rows() -> Iterator[dict[str, Any]]:
 
 
 def _true_claims(clips: list[JudgedClip]) -> list[Claim]:
-    return [Claim(pitch=clip.frames["pitch"], station=clip.frames["station"]) for clip in clips]
+    return [
+        Claim(pitch=clip.frames["pitch"], station=clip.frames["station"], body=_true_body(clip))
+        for clip in clips
+    ]
+
+
+def _true_body(clip: JudgedClip) -> BodyClaim:
+    return BodyClaim(T_world_rig=clip.frames["T_world_rig"].reshape(-1, 4, 4), heave=clip.frames["heave"])
 
 
 def _is_whole(clip: JudgedClip, method: str) -> bool:
@@ -226,11 +246,12 @@ def _is_whole(clip: JudgedClip, method: str) -> bool:
 
 
 def _score_claim(
-    clip: JudgedClip, dry: JudgedClip | None, method: str, claim: Claim, response: float
+    clip: JudgedClip, dry: JudgedClip | None, method: str, claim: Claim, gates: PoseThresholds
 ) -> dict[str, float]:
     """Scores of a claim on its clip and, where both were tracked, on the clip and its dry sibling."""
     motion = clip.motions[method]
-    scores = score_claim(motion, claim, response, clip.times, clip.opening)
+    response, certain = float(np.deg2rad(gates.response_deg)), gates.heave_gain_std or 0.0
+    scores = score_claim(motion, claim, response, clip.times, clip.opening, certain)
     if dry is None or not _is_whole(dry, method) or not claim.station[-1] > claim.station[0]:
         return scores
     seen, control = motion.normalised_path, dry.motions[method].normalised_path
@@ -248,7 +269,8 @@ def _make_faulty_claims(
     """Faulty claims of one clip that differ from its true one."""
     scenario = next(c.scenario for c in plan.clips if c.clip_id == clips[k].facts["clip_id"])
     made = {"one-frame-delay": delay_claim(true[k], 1), "amplitude-0.8": scale_claimed_pitch(true[k], 0.8),
-            "sign-flip": scale_claimed_pitch(true[k], -1.0), "other-clip": true[(k + 1) % len(true)]}  # fmt: skip
+            "sign-flip": scale_claimed_pitch(true[k], -1.0)}  # fmt: skip
+    made["other-clip"] = replace(true[(k + 1) % len(true)], body=None)
     ticks = np.rint(np.arange(plan.settings.frames) * TICK_RATE_HZ / plan.settings.frame_rate_hz).astype(int)
     for variant in CUTS:
         _, ride = simulate_drive(
@@ -260,6 +282,10 @@ def _make_faulty_claims(
             catalogue.steady,
         )
         made[variant] = Claim(pitch=ride.columns["pitch"][ticks], station=ride.columns["station"][ticks])
+    for name, move in FALSE_RIGS.items():
+        falsified = replace(true[k], shown=move(_true_body(clips[k]), clips[k].times))
+        if shows_another_rig(falsified, LEAST_PITCH, LEAST_MOVE):
+            yield name, falsified
     for name, claim in made.items():
         if claims_differ(claim, true[k], LEAST_PITCH, LEAST_WAY):
             yield name, claim

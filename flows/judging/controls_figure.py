@@ -21,7 +21,7 @@ def roc_figure(rows: Sequence[Mapping[str, Any]], meanings: Mapping[str, str]) -
     """
     tried = [name for name in meanings if any(row["control"] == name for row in rows)]
     metrics = sorted({row["metric"] for row in rows})
-    colours = dict(zip(metrics, matplotlib.colormaps["tab10"].colors, strict=False))  # type: ignore[attr-defined]
+    colours = dict(zip(metrics, matplotlib.colormaps["tab20"].colors, strict=False))  # type: ignore[attr-defined]
     lines = -(-len(tried) // COLUMNS)
     figure = Figure(figsize=(2.9 * COLUMNS, 3.1 * lines), layout="constrained")
     panels = figure.subplots(lines, COLUMNS, squeeze=False, sharex=True, sharey=True).ravel()

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tasks.errors import InputError
-from tasks.eval.body_agreement import rms
+from tasks.eval.body_agreement import BodyClaim, compare_body, rms
+from tasks.eval.false_rigs import show_rig
 from tasks.eval.poses.motion import RecoveredMotion
-from tasks.eval.poses.rigid import Floats
+from tasks.eval.poses.rigid import Floats, invert_pose
 from tasks.eval.video_motion import geometry_error, reference_progress
 
 SEES, PARTLY = 0.9, 0.5
@@ -24,10 +25,14 @@ class Claim:
     ----------
     pitch : [F] nose-down positive [rad]
     station : [F] [m]
+    body : the rest of the rig's motion; None where it is not claimed
+    shown : [F, 4, 4] rig poses that the pictures are taken to show in place of the claimed ones [m]; None for the true
     """
 
     pitch: Floats
     station: Floats
+    body: BodyClaim | None = None
+    shown: Floats | None = None
 
 
 def delay_claim(claim: Claim, frames: int) -> Claim:
@@ -54,6 +59,22 @@ def scale_claimed_pitch(claim: Claim, factor: float) -> Claim:
     return Claim(pitch=rest + factor * (claim.pitch - rest), station=claim.station)
 
 
+def shows_another_rig(claim: Claim, least_turn: float, least_move: float) -> bool:
+    """Return whether the pictures are taken to show another rig than claimed, by a least turn or move.
+
+    Parameters
+    ----------
+    claim : with `body`
+    least_turn : largest turn that counts as none [rad]
+    least_move : the same for a move [m]
+    """
+    if claim.body is None or claim.shown is None:
+        return False
+    error = invert_pose(claim.body.T_world_rig) @ claim.shown
+    turn = np.abs(error[:, [2, 1], [1, 0]]).max()
+    return bool(turn > least_turn or np.abs(error[:, 1:3, 3]).max() > least_move)
+
+
 def claims_differ(claim: Claim, other: Claim, least_pitch: float, least_way: float) -> bool:
     """Return whether two claims differ by more than a least pitch or a least distance.
 
@@ -69,7 +90,12 @@ def claims_differ(claim: Claim, other: Claim, least_pitch: float, least_way: flo
 
 
 def score_claim(
-    recovered: RecoveredMotion, claim: Claim, response: float, times: Floats, opening: float | None
+    recovered: RecoveredMotion,
+    claim: Claim,
+    response: float,
+    times: Floats,
+    opening: float | None,
+    certain: float = np.inf,
 ) -> dict[str, float]:
     """Return the misfit of a claim to the recovered motion by every metric that can be formed; larger is worse.
 
@@ -80,11 +106,12 @@ def score_claim(
     response : RMS of claimed pitch below which relative figures are left out [rad]
     times : [F] of the frames [s]
     opening : when the road feature's event window opens; None without a feature [s]
+    certain : standard uncertainty of the heave gain above which the misfit of heave is left out [1]
 
     Returns
     -------
     pitch_rmse [rad], pitch_relative_error, pitch_decorrelation, normalised_progress_rmse, e_geometry [1],
-    progress_rmse [m]
+    progress_rmse [m]; with the whole rig also roll_rmse, yaw_rmse [deg], lateral_rmse, rise_rmse [m], heave_misfit [1]
     """
     meant, way = claim.pitch - claim.pitch[0], claim.station - claim.station[0]
     error = rms(recovered.pitch - meant)
@@ -101,7 +128,21 @@ def score_claim(
     if opening is not None:
         with suppress(InputError):  # a clip that ends too early has no event to judge
             scores["e_geometry"] = geometry_error(times, recovered.pitch, claim.pitch, opening, None)
+    if claim.body is not None:
+        scores |= _score_body(recovered, claim.body, claim.shown, certain)
     return scores
+
+
+def _score_body(
+    recovered: RecoveredMotion, body: BodyClaim, shown: Floats | None, certain: float
+) -> dict[str, float]:
+    seen = recovered if shown is None else show_rig(recovered, body, shown)
+    errors = compare_body(seen, body)
+    scores = {"roll_rmse": errors.roll_rmse_deg, "yaw_rmse": errors.yaw_rmse_deg,
+              "lateral_rmse": errors.lateral_rmse_m, "rise_rmse": errors.rise_rmse_m}  # fmt: skip
+    if errors.heave_gain_std <= certain:
+        scores["heave_misfit"] = abs(errors.heave_gain - 1.0)
+    return {name: value for name, value in scores.items() if np.isfinite(value)}
 
 
 @dataclass(frozen=True, kw_only=True)
