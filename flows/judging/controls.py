@@ -55,7 +55,7 @@ CONTROLS: dict[str, str] = {
     "sway": "pictures that sway by 0.3 m",
 }
 UNREAD: dict[str, str] = {
-    **dict.fromkeys(("localised_edit_rate", "anchor_error", "temporal_iou"), "paired-lab"),
+    **dict.fromkeys(("localised_edit_rate", "anchor_error", "temporal_iou", "edit_outside"), "paired-lab"),
     **dict.fromkeys(("twin_ssim", "twin_flip"), "off the feature"),
     **dict.fromkeys(("severity_rank_correlation", "severity_adjacent_accuracy"), "image statistics"),
     **dict.fromkeys(("piqe", "temporal_error"), "no reference"),

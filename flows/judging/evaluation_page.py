@@ -38,6 +38,7 @@ MEANING = {
     "localised_edit_rate": "Appendix A.6: active frames with a change where the feature is",
     "anchor_error": "Appendix A.6: distance of centroids over the diagonal",
     "temporal_iou": "Appendix A.6: overlap of masks along the optical flow",
+    "edit_outside": "share of the changed pixels that lie off the dilated target, which the three above do not see",
     "twin_ssim": "feature clip against its flat twin off the feature, before contact; 1: nothing else changed",
     "twin_flip": "the same by FLIP; 0: nothing else changed",
     "piqe": "share of distortion in the blocks that are looked at, 0 to 100",

@@ -42,11 +42,14 @@ def road_edit_rows(view: View, clips: list[JudgedClip]) -> list[Row]:
         pictures = [view.arrays(c.facts["index"], "rgb")[0] for c in (clip, flat)]
         score = score_road_edit(list(pictures[0]), list(pictures[1]), list(targets))
         true = score_true_masks(list(pictures[0]), list(targets))
-        for name in ("localised_edit_rate", "anchor_error", "temporal_iou"):
+        for name in ("localised_edit_rate", "anchor_error", "temporal_iou", "edit_outside"):
             note = "the target is never seen" if score is None else ""
             if score is not None:
                 note = f"{score.active_frames} frames, {score.unregistered} not registered"
-            value, floor = (None if found is None else getattr(found, name) for found in (score, true))
+            value, floor = (
+                None if found is None or np.isnan(getattr(found, name)) else getattr(found, name)
+                for found in (score, true)
+            )
             rows.append(
                 figure_row(name, "paired-lab", clip.facts["label"], value, "1", note=note, floor=floor)
             )

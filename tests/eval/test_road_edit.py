@@ -44,6 +44,22 @@ def test_no_edit_and_an_edit_elsewhere_are_missing() -> None:
         assert (score.localised_edit_rate, score.anchor_error, score.temporal_iou) == (0.0, 1.0, 0.0)
 
 
+def test_an_edit_of_the_whole_road_shows_in_the_share_outside_alone() -> None:
+    """The mask is cut at the dilated target, so the paper's three figures take it for a localised edit."""
+    road = np.zeros_like(SPOT)
+    road[64:, 24:216] = True
+    pair = [edit_picture(GROUND, SPOT)] * 3, [edit_picture(GROUND, road)] * 3
+    local, wide = (score_road_edit(feature, [GROUND] * 3, [SPOT] * 3) for feature in pair)
+    assert local is not None and wide is not None
+    assert wide.localised_edit_rate == 1.0 and wide.anchor_error < 0.05
+    assert local.edit_outside == 0.0 and wide.edit_outside > 0.6
+
+
+def test_where_nothing_changed_there_is_no_share_outside() -> None:
+    score = score_road_edit([GROUND] * 2, [GROUND] * 2, [SPOT] * 2)
+    assert score is not None and np.isnan(score.edit_outside)
+
+
 def test_a_target_below_80_pixels_is_not_active() -> None:
     small = np.zeros_like(SPOT)
     small[90:98, 100:109] = True

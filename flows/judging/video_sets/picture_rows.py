@@ -20,11 +20,11 @@ PIXELS = "pixels"
 MASK_LEVEL = 127
 """Grey level above which a pixel of a target's video is the target (paper, Appendix A.6)."""
 LEARNED = ("dover_overall", "dover_technical", "dover_aesthetic", "fast_vqa")
-ROAD_EDIT = ("localised_edit_rate", "temporal_iou", "anchor_error")
+ROAD_EDIT = ("localised_edit_rate", "temporal_iou", "anchor_error", "edit_outside")
 
 
 def edit_rows(judged: JudgedSet, model: str, seed: str) -> Iterator[Row]:
-    """Edit rate, T-IoU and anchor error of each feature video against the model's flat control."""
+    """Edit rate, T-IoU, anchor error and share outside of each feature video against the model's flat control."""
     protocol = judged.protocol
     flat = judged.find(model, seed, f"geometry/{protocol.geometry_control}", VIDEO_METHOD)
     for feature in protocol.geometry_features:

@@ -109,8 +109,8 @@ def test_every_metric_has_rows_and_a_row_without_a_value_says_why(judged: Path) 
     rows = json.loads((judged / "evaluation.json").read_text())["rows"]
     names = {row["metric"] for row in rows}
     assert {"pitch_rmse", "e_weather", "e_geometry_hump", "e_path", "localised_edit_rate", "temporal_iou",
-            "anchor_error", "severity_rank_correlation", "piqe", "temporal_error", "twin_ssim", "twin_flip",
-            *NOT_RUN} <= names  # fmt: skip
+            "anchor_error", "edit_outside", "severity_rank_correlation", "piqe", "temporal_error", "twin_ssim",
+            "twin_flip", *NOT_RUN} <= names  # fmt: skip
     assert all(row["note"] for row in rows if row["value"] is None)
     edits = [row for row in rows if row["method"] == "paired-lab" and row["averaged"] is None]
     assert edits and all(row["floor"] is not None for row in edits if row["value"] is not None)
