@@ -81,6 +81,7 @@ PAGES: dict[str, tuple[str, str, tuple[str, ...]]] = {
             "tasks.eval.poses.essential",
             "tasks.eval.state_agreement",
             "tasks.eval.motion_agreement",
+            "tasks.eval.body_agreement",
             "tasks.eval.video_motion",
             "tasks.eval.road_edit",
             "tasks.eval.severity",
