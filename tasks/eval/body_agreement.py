@@ -109,6 +109,8 @@ def compare_body(recovered: RecoveredMotion, claim: BodyClaim) -> BodyErrors:
 
 def _fit_heave_gain(recovered: RecoveredMotion, meant: Floats, heave: Floats) -> tuple[float, float]:
     """Gain of the recovered heave and its standard uncertainty [1], without what the track drifts by each frame."""
+    if len(heave) <= HEAVE_SPAN:
+        return float("nan"), float("nan")
     # steps in the axes of the frame before: there a pitch that drifts does not turn the way into heave
     steps = recovered.T_previous_rig[1:, :3, 3] - (invert_pose(meant[:-1]) @ meant[1:])[:, :3, 3]
     up = np.einsum("nj,nj->n", meant[:-1, 2, :3], steps)

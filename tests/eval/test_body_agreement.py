@@ -89,6 +89,18 @@ def test_a_pitch_that_drifts_does_not_turn_the_way_into_heave(hump_clip: Clip) -
     assert gain == pytest.approx(1, abs=0.02)
 
 
+@pytest.mark.parametrize("frames", [1, 2, 3])
+def test_a_clip_too_short_for_a_change_of_heave_has_no_gain(hump_clip: Clip, frames: int) -> None:
+    clip = replace(
+        hump_clip,
+        T_world_rig=hump_clip.T_world_rig[:frames],
+        pitch=hump_clip.pitch[:frames],
+        heave=hump_clip.heave[:frames],
+    )
+    errors = compare_body(_placed(clip), claim_of(clip))
+    assert np.isnan(errors.heave_gain) and np.isfinite(errors.lateral_rmse_m)
+
+
 def _placed(clip: Clip) -> RecoveredMotion:
     n, nothing = len(clip.pitch), np.zeros(len(clip.pitch))
     return RecoveredMotion(
