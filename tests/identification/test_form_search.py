@@ -96,7 +96,9 @@ def test_a_weak_linear_hint_leads_to_forms(
     runs = SimpleNamespace(rules=RULES, samples=1000)
     form = make_candidate("friction ~ a exp(-(4x - 1)^2)", "form", 150.0)
     monkeypatch.setattr(form_search, "compute_inflation", lambda *_: 1.0)
-    monkeypatch.setattr(form_search, "fit_residual_splines", lambda *_: [SimpleNamespace(gain=share * needed)])
+    monkeypatch.setattr(
+        form_search, "fit_residual_splines", lambda *_: [SimpleNamespace(gain=share * needed)]
+    )
     monkeypatch.setattr(form_search, "make_form_hypotheses", lambda *_: [form.hypothesis])
     monkeypatch.setattr(form_search, "judge_hypothesis", lambda *_: form)
     monkeypatch.setattr(form_search, "is_session_number", lambda _: False)
