@@ -11,7 +11,7 @@ from catalogs.gates import GATES
 from catalogs.grids import Grid, GridFile
 from catalogs.hazard_markings import load_marking
 from catalogs.low_speed import LOW_SPEED, NO_LOW_SPEED_RULE, is_rule_applied, load_low_speed
-from catalogs.scenario import find_route_problems
+from catalogs.scenario import find_range_problems, find_route_problems
 from catalogs.scenes import load_scene, scene_identity
 from catalogs.studies import SENSITIVITY
 from catalogs.studies.ablation import ABLATION, cut_coupling, load_families
@@ -25,7 +25,7 @@ from flows.making.traced import read_trace_inputs
 from tasks.errors import InputError
 from tasks.render.sensor import Sensor
 from tasks.render.weather.snow.layer import HIGHEST_LUMP
-from tasks.surface.weather import WEATHERS
+from tasks.surface.weather import WEATHERS, find_weather_problem
 
 LOADERS: Mapping[str, Callable[[Path], Any]] = {
     "vehicle.yaml": load_vehicle,
@@ -193,7 +193,10 @@ def _find_buried_cameras(grid: Grid) -> list[str]:
         f"scenario {label}: snow must be less than {deepest_mm:g} mm deep in a picture: its lumps reach the camera"
         f" {height_m:g} m above the road; it is {depth_mm:g} mm: take a shorter snow_accumulation_h or pictures: false"
         for label, scenario in grid.scenarios
-        if (depth_mm := surface_of(scenario, surface).snow_depth_mm) >= deepest_mm
+        # a faulty scenario has been told of
+        if find_weather_problem(scenario.weather) is None
+        and not find_range_problems(scenario)
+        and (depth_mm := surface_of(scenario, surface).snow_depth_mm) >= deepest_mm
     ]
 
 
