@@ -182,8 +182,9 @@ def _number_json(
 
 def _say_own_numbers(outcome: SearchOutcome | JointOutcome, library: Sequence[Effect]) -> str:
     """Return what the numbers that the file hardly knew say of the car, else, beside no name, the one pulled most."""
-    if outcome.calibrated:
-        return join_phrases(say_effect(effect, library) for effect in outcome.calibrated)
+    told = {rival.name for _, rival in outcome.verdict.rivals}
+    if own := [effect for effect in outcome.calibrated if effect.name not in told]:
+        return join_phrases(say_effect(effect, library) for effect in own)
     if isinstance(outcome, JointOutcome) or outcome.verdict.effects:
         return ""
     base = outcome.end.base
