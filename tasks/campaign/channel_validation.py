@@ -163,15 +163,16 @@ def find_plausibility_problems(
         channel = CHANNELS_BY_NAME[name]
         if name == "brake_pressure" and stands_in:
             continue  # a command or torque in its place has a scale that nobody knows
+        unit = "" if channel.unit == "1" else f" {channel.unit}"
         peak = float(np.max(np.abs(values)))
         if peak > channel.limit:
             problems.append(
-                f"channel {name} reaches {peak:.4g} {channel.unit}, which no road car does (limit {channel.limit:g}):"
+                f"channel {name} reaches {peak:.4g}{unit}, which no road car does (limit {channel.limit:g}):"
                 " correct its unit or scale"
             )
         elif (low := float(np.min(values))) < channel.lowest:
             problems.append(
-                f"channel {name} falls to {low:.4g} {channel.unit}, which no road car does (limit {channel.lowest:g}):"
+                f"channel {name} falls to {low:.4g}{unit}, which no road car does (limit {channel.lowest:g}):"
                 " turn its sign over, or correct its offset"
             )
     smooth = {name: smooth_channel(values, interval) for name, values in columns.items()}

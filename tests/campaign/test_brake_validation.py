@@ -41,7 +41,7 @@ def test_a_signal_that_is_negative_while_the_car_brakes_is_turned_over(name: str
 )
 def test_a_brake_that_pulls_is_an_offset(name: str, brake: float) -> None:
     (problem,) = problems_of(name, BRAKE + brake * (TIME < 0.1), 5.0 * BRAKE)
-    assert problem.startswith(f"channel {name} falls to {brake * UNIT[name]:g} ")
+    assert problem.startswith(f"channel {name} falls to {brake * UNIT[name]:g}")
 
 
 @pytest.mark.parametrize("name", UNIT)

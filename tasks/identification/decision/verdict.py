@@ -34,7 +34,7 @@ from tasks.identification.decision.rivals import RivalComparison, compare_with_r
 from tasks.identification.decision.screening import can_show, find_detectable_sizes
 from tasks.identification.decision.search import SearchState
 from tasks.identification.decision.superseded import drop_superseded, is_named
-from tasks.identification.decision.words import say_confirmation, say_rejection
+from tasks.identification.decision.words import say_confirmation, say_rejection, tell_present_effects
 from tasks.identification.inference.evidence import RunEvidence
 from tasks.identification.inference.fit import Fit
 from tasks.identification.inference.forward import predict_channels
@@ -147,9 +147,7 @@ def find_missing_effects(
     if not named and not reasons:
         reasons.append(say_rejection(tried))
     reasons += tell_log_faults(campaign, named, [rival.name for _, rival in near])
-    present = [name for name, value in vehicle.effects.items() if value] + [f.name for f in vehicle.forms]
-    if present:
-        reasons.append(f"{vehicle.name} already has {', '.join(present)}: what is named comes on top of that")
+    reasons += tell_present_effects(vehicle)
     experiment = None
     pair = _to_tell_apart(compared, near_form, start) if compared else find_pair_to_confirm(tried, start.base)
     if pair is not None:

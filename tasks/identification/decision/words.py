@@ -7,6 +7,7 @@ from tasks.identification.decision.attribution import Candidate
 from tasks.identification.decision.held_out import is_lowered
 from tasks.identification.inference.hypothesis import moves_speed
 from tasks.vehicle.effects.library import Effect, say_number
+from tasks.vehicle.parameters import Vehicle
 
 
 def say_effect(effect: NamedEffect, library: Sequence[Effect]) -> str:
@@ -145,6 +146,19 @@ def say_confirmation(named: Candidate) -> str | None:
         " the training runs, each predicted from the others, confirm it"
         f" (gain {named.cross_validated_gain:.1f}, a name needs {named.rules.cross_validated_gain:g})"
     )
+
+
+def tell_present_effects(vehicle: Vehicle) -> list[str]:
+    """Return a sentence where a vehicle has effects or forms already, on top of which others are named.
+
+    Parameters
+    ----------
+    vehicle : that is judged
+    """
+    present = [name for name, value in vehicle.effects.items() if value] + [f.name for f in vehicle.forms]
+    if not present:
+        return []
+    return [f"{vehicle.name} already has {', '.join(present)}: what is named comes on top of that"]
 
 
 def join_phrases(phrases: Iterable[str]) -> str:

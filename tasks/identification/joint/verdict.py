@@ -1,7 +1,7 @@
 """The verdict on a car that the vehicle file hardly knows: calibrated, then named what earns its place."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from tasks.identification.decision.answer import (
 from tasks.identification.decision.held_out import find_worse_channels, is_lowered
 from tasks.identification.decision.log_faults import tell_log_faults
 from tasks.identification.decision.missed import compare_with_noise, tell_miss
+from tasks.identification.decision.words import tell_present_effects
 from tasks.identification.inference.disturbance import Disturbance
 from tasks.identification.joint.elimination import drop_at_bounds, refit_numbers
 from tasks.identification.joint.fit import JointFit, measure_misfit
@@ -40,6 +41,7 @@ from tasks.identification.joint.words import (
     tell_guessed_lift,
     tell_lumped_resistance,
     tell_rivals,
+    tell_unlogged_driver,
     tell_what_was_used,
 )
 from tasks.identification.rules import DecisionRules
@@ -173,6 +175,7 @@ def judge_jointly(
     reasons += tell_what_was_used(campaign, train, agreeing, joint)
     reasons += tell_rivals(effects, rivals, shown)
     reasons += tell_log_faults(campaign, effects, [rival.name for _, rival in rivals])
+    reasons += tell_present_effects(vehicle)
     reasons += tell_lumped_resistance(fitted.numbers, [stop.model for stop in train], joint)
     reasons += tell_guessed_lift(fitted.numbers, fitted.delay_doubt)
     verdict = Verdict(
@@ -197,8 +200,11 @@ def judge_jointly(
         reasons=tuple(reasons),
         disagreement=disagreement,
     )  # fmt: skip
+    verdict = tell_miss(verdict, campaign, joint.foreign_misfit, left.follows)
+    if verdict.misses:
+        verdict = replace(verdict, reasons=(*verdict.reasons, *tell_unlogged_driver(train)))
     return JointOutcome(
-        verdict=tell_miss(verdict, campaign, joint.foreign_misfit, left.follows),
+        verdict=verdict,
         calibrated=tuple(calibrated) if effects or is_lowered(left.error["speed"]) else (),
         fitted=fitted,
         errors=compute_told_errors(fitted, joint),

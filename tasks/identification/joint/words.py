@@ -147,6 +147,21 @@ def tell_guessed_lift(fitted: Sequence[JointNumber], doubt: float) -> list[str]:
     ]
 
 
+def tell_unlogged_driver(train: Sequence[Stop]) -> list[str]:
+    """Return a sentence where nobody knows what drove the car before the brake, for stops that are missed.
+
+    Parameters
+    ----------
+    train : the training runs
+    """
+    if not any(stop.guesses_lift for stop in train):
+        return []
+    return [
+        "no channel says what drove the car before the brake, or when the driver lifted, and the fit guesses it: log"
+        " the throttle or the engine's torque, or coast for a second before the brake"
+    ]
+
+
 def find_separating_run(numbers: Sequence[JointNumber]) -> str | None:
     """Return the run that tells numbers apart, the first of `SEPARATE` for a group of theirs; None where none is known.
 

@@ -40,7 +40,15 @@ def test_a_stop_that_is_missed_beside_a_name_is_told():
     outcome = judge_car(replace(late, runs=(*late.runs[:-1], windy.runs[-1])), numbers=FEW)
     assert outcome.verdict.effects and outcome.verdict.disagreement == ""
     said = "what is named is not all that the model lacks"
-    assert outcome.verdict.reasons[-1].endswith(said)
+    *_, missed, driver = outcome.verdict.reasons
+    assert missed.endswith(said)
+    assert driver.startswith("no channel says what drove the car before the brake")
+    assert driver not in slow_brakes().verdict.reasons
+    logged = [
+        replace(run, drive_torque=np.zeros(len(run.pressure))) for run in (*late.runs[:-1], windy.runs[-1])
+    ]
+    told = judge_car(replace(late, runs=tuple(logged)), numbers=FEW).verdict
+    assert told.misses and driver not in told.reasons
     # why single effects could not be told does not say that these stops are missed
     foreign = replace(outcome.verdict, reasons=("the runs disagree",), disagreement="the runs disagree")
     assert tell_miss(foreign, late, RULES.joint.foreign_misfit).reasons[-1].endswith(said)

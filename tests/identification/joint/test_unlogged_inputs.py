@@ -79,7 +79,7 @@ def test_a_common_slope_that_would_be_steeper_than_two_tolerances_is_none():
     """A force that holds a racing car back looks like a hill of 8 %: it is not one."""
     outcome = judge_car(hilly_campaign(-0.03), numbers=BRAKES_AND_ROAD)
     assert "slope" not in outcome.fitted.by_name
-    assert any("the road falls or climbs by -0.02" in reason for reason in outcome.verdict.reasons)
+    assert any("the road's slope is off by -2" in reason for reason in outcome.verdict.reasons)
 
 
 def test_a_re_tuned_slope_that_makes_up_for_a_name_is_given_up_at_its_bound_too(monkeypatch):

@@ -72,6 +72,12 @@ def test_a_gain_that_predicts_unseen_stops_is_told_and_grown_although_nothing_is
     assert [effect.name for effect in outcome.calibrated] == ["retuned_pressure_gain"]
 
 
+def test_a_joint_fit_says_what_the_file_has_already():
+    lagging = replace(VEHICLE, effects={"lag": 0.06})
+    told = judge_car(campaign_of({"lag": 0.06}), lagging, numbers=FEW).verdict
+    assert f"{VEHICLE.name} already has lag: what is named comes on top of that" in told.reasons
+
+
 def test_a_car_that_is_as_its_file_says_lacks_nothing():
     outcome = judge_car(campaign_of({}))
     assert outcome.verdict.verdict == "NOTHING" and not named_intervals(outcome)
