@@ -72,6 +72,36 @@ def test_a_gain_that_predicts_unseen_stops_is_told_and_grown_although_nothing_is
     assert [effect.name for effect in outcome.calibrated] == ["retuned_pressure_gain"]
 
 
+DELAYS = (*FEW, *(n for n in load_joint_numbers() if n.name == "dead_time"))
+
+
+@pytest.mark.parametrize(("feigned", "names", "rivals"), [("lag", [], []), ("dead_time", ["brake_lag"], [])])
+def test_what_an_unlogged_driver_may_feign_is_neither_name_nor_rival(
+    monkeypatch, feigned: str, names: list[str], rivals: list[str]
+):
+    monkeypatch.setattr(
+        verdict, "make_driver_check", lambda *_: lambda fit: [n for n in fit.numbers if n.name == feigned]
+    )
+    numbers = FEW if feigned == "lag" else DELAYS
+    told = judge_car(campaign_of({"pressure_gain": 0.3, "lag": 0.09}), numbers=numbers).verdict
+    assert [e.name for e in told.effects if e.effect_class == "effect"] == names
+    assert [rival.name for of, rival in told.rivals if of == "brake_lag"] == rivals
+    assert any("no channel says what drove the car" in r for r in told.reasons) is (feigned == "lag")
+
+
+def test_a_rival_that_explains_more_is_named_in_the_place_of_a_name(monkeypatch):
+    asked = []
+
+    def prefer_first(_held_out, fitted, rivals, _rules):
+        asked.append(fitted)
+        return rivals[0] if len(asked) == 1 else None
+
+    monkeypatch.setattr(verdict, "find_better_substitute", prefer_first)
+    outcome = judge_car(campaign_of({"pressure_gain": 0.3, "lag": 0.09}), numbers=DELAYS)
+    assert [e.name for e in outcome.verdict.effects] == ["brake_dead_time"]
+    assert "lag" in asked[0].by_name and asked[1] is outcome.fitted and "dead_time" in asked[1].by_name
+
+
 def test_a_joint_fit_says_what_the_file_has_already():
     lagging = replace(VEHICLE, effects={"lag": 0.06})
     told = judge_car(campaign_of({"lag": 0.06}), lagging, numbers=FEW).verdict
