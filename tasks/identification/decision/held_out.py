@@ -13,6 +13,7 @@ from tasks.identification.inference.fit import Fit, fit_hypotheses
 from tasks.identification.inference.forward import predict_channels
 from tasks.identification.inference.hypothesis import compose_parameters
 from tasks.identification.inference.linearisation import BODY_CHANNELS
+from tasks.identification.rules import DecisionRules
 from tasks.vehicle.effects.table import EFFECT_TABLE
 
 HeldOutErrors = tuple[dict[str, ChannelError], dict[str, ChannelError]]
@@ -124,6 +125,18 @@ def compare_with_retuned(error: Mapping[str, ChannelError]) -> float:
     """
     ratios = [e.after / e.retuned for e in error.values() if e.after > 0.0 and e.retuned > 0.0]
     return float(np.exp(np.mean(np.log(ratios)))) if ratios else 1.0
+
+
+def is_better_retuned(error: Mapping[str, ChannelError], rules: DecisionRules) -> bool:
+    """Whether re-tuning alone predicts all channels together much better, or every one of them noticeably.
+
+    Parameters
+    ----------
+    error : by channel
+    rules : of the decision
+    """
+    everywhere = all(rules.noticed_share * e.after > e.retuned for e in error.values())
+    return everywhere or compare_with_retuned(error) > rules.retuned_limit
 
 
 def find_missed_channels(error: Mapping[str, ChannelError], limit: float) -> list[str]:

@@ -11,6 +11,7 @@ from tasks.identification.decision.held_out import (
     compute_held_out_errors,
     find_missed_channels,
     find_worse_channels,
+    is_better_retuned,
     is_noticed,
 )
 from tasks.identification.decision.search import SearchState
@@ -43,8 +44,7 @@ def object_to_last(
             f"{', '.join(h.name for h in named)} would fit, but predicts {', '.join(missed)} of the held-out runs with"
             f" {ratio:.3g} times the error of re-tuning alone: not named"
         )
-    nowhere_better = all(rules.noticed_share * e.after > e.retuned for e in error.values())
-    if nowhere_better or beside > rules.retuned_limit or (number and beside >= 1.0):
+    if is_better_retuned(error, rules) or (number and beside >= 1.0):
         return (
             f"{', '.join(h.name for h in named)} would fit, but re-tuning alone predicts the held-out runs better, with"
             f" {1.0 / beside:.3g} of the error: not named"

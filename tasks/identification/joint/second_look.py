@@ -6,10 +6,10 @@ from dataclasses import replace
 from tasks.campaign.campaign import Campaign
 from tasks.identification.decision.disputes import ForeignCarError, moves_body_alone
 from tasks.identification.decision.held_out import (
-    compare_with_retuned,
     compute_held_out_errors,
     find_missed_channels,
     find_worse_channels,
+    is_better_retuned,
 )
 from tasks.identification.decision.screening import compute_inflation
 from tasks.identification.decision.verdict import SearchOutcome
@@ -106,7 +106,7 @@ def _look_along_road(
     if (
         find_worse_channels(error, rules.worse_limit, speed_decides=moved)
         or find_missed_channels(error, rules.retuned_limit)
-        or compare_with_retuned(error) > rules.retuned_limit
+        or is_better_retuned(error, rules)
     ):
         return None
     alone = join_phrases(name.replace("_", " ") for name in kept)

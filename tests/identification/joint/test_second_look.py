@@ -159,6 +159,20 @@ def test_a_second_look_holds_unless_the_retuned_model_predicts_a_channel_much_be
         assert bool(look_twice(campaign).verdict.effects) is is_named
 
 
+@pytest.mark.parametrize(("share", "is_named"), [(1.01, True), (1.03, False)])
+def test_a_second_look_does_not_hold_where_the_retuned_model_predicts_every_channel_better(
+    campaign, lag_found, no_name, monkeypatch, share: float, is_named: bool
+):
+    """An accelerometer 18 ms late was named, and every channel of the held-out runs was missed by a tenth more."""
+    error = {
+        name: replace(e, after=share * e.retuned, frozen=2.0 * share * e.retuned)
+        for name, e in lag_found.verdict.error.items()
+    }
+    answer_searches(monkeypatch, no_name, lag_found)
+    monkeypatch.setattr(second_look, "compute_held_out_errors", lambda *_: (error, {}))
+    assert bool(look_twice(campaign).verdict.effects) is is_named
+
+
 def test_whether_runs_disagree_is_read_from_four_training_runs_on(campaign, lag_found, no_name, monkeypatch):
     asked = answer_searches(monkeypatch, no_name, lag_found)
     monkeypatch.setattr(second_look, "compute_inflation", compute_inflation)
