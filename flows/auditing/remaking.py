@@ -22,7 +22,7 @@ from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 
 RECORDED = ("label", "scenario", "seed", "split", "calibration", "figures", "verdict")
-"""What a record says of a clip beside the hashes of its content."""
+"""Entries of a clip's record beside the hashes of its content."""
 STAGES = {"ticks": "vehicle", "frames": "frames"} | dict.fromkeys(RECORDED, "record")
 """Stage of each content and record; arrays are of the renderer."""
 

@@ -17,7 +17,7 @@ HEAVE_SPAN = 2
 
 @dataclass(frozen=True, kw_only=True)
 class BodyClaim:
-    """What a claim says of the whole rig at the frames.
+    """Claimed motion of the whole rig at the frames.
 
     Parameters
     ----------

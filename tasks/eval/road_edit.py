@@ -51,7 +51,7 @@ class RoadEditSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class DetectedEdit:
-    """What changed in a frame.
+    """Pixels of a frame that an edit changed.
 
     Parameters
     ----------

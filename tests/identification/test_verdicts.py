@@ -1,7 +1,6 @@
 """Every kind of verdict, from whole campaigns of known truth made unlike the model that judges them."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,10 +14,9 @@ from catalogs.vehicles import load_vehicle
 from tasks.campaign.campaign import CHANNELS
 from tasks.campaign.planned_runs import RICH, RunPlan, make_planned_run, plan_experiments
 from tasks.identification.benchmark import make_synthetic_campaign
-from tasks.identification.decision import discovery, experiment, objection
-from tasks.identification.decision.answer import ChannelError, Verdict
+from tasks.identification.decision import discovery, experiment
+from tasks.identification.decision.answer import Verdict
 from tasks.identification.decision.disputes import ForeignCarError
-from tasks.identification.decision.objection import object_to_last
 from tasks.identification.decision.screening import can_show
 from tasks.identification.decision.verdict import find_missing_effects
 from tasks.identification.inference.forward import predict_channels, prepare_run
@@ -109,109 +107,6 @@ def test_an_effect_is_found_beside_a_gain_that_the_file_hardly_knows() -> None:
     (lag,), (gain,) = (effect.parameters for effect in verdict.effects)
     assert lag.ci_low < 0.08 < lag.ci_high and lag.ci_high - lag.ci_low < 0.02
     assert gain.ci_low < 0.3 < gain.ci_high and gain.ci_high - gain.ci_low < 0.08
-
-
-@pytest.mark.parametrize(("least", "is_named"), [(None, True), (0.85, False)])
-def test_what_no_held_out_error_feels_is_no_discovery_where_the_gain_was_not_known(
-    monkeypatch: pytest.MonkeyPatch, least: float | None, is_named: bool
-) -> None:
-    error = make_error(0.9)
-    monkeypatch.setattr(objection, "compute_held_out_errors", lambda *_: (make_error(1.0), {}))
-    found = found_last("relaxation_length", "effect", "slip", 0.2)
-    start = SimpleNamespace(evidence=None, base=None)
-    objected = object_to_last(found, start, error, least)
-    assert (objected is None) == is_named
-    assert is_named or "makes no difference of 15%" in str(objected)
-
-
-@pytest.mark.parametrize(
-    ("name", "variable", "is_named"),
-    [("sensor_mount_tilt", "mount", True), ("sensor_speed_scale", "speed", False)],
-)
-def test_an_accelerometer_answers_for_its_own_channel_and_a_speedometer_for_the_speed(
-    name: str, variable: str, is_named: bool
-) -> None:
-    worse = replace(make_error(1.3)["speed"], change_low=0.1)
-    error = {"speed": worse, "longitudinal_acceleration": make_error(0.2)["speed"]}
-    objected = object_to_last(found_last(name, "sensor", variable, 0.1), None, error, None)
-    assert (objected is None) == is_named
-
-
-@pytest.mark.parametrize(
-    ("effect_class", "name", "retuned", "is_named"),
-    [
-        ("retune", "slip_stiffness", 0.89, False),
-        ("retune", "slip_stiffness", 0.91, True),
-        ("retune", "mass", 0.65, True),
-        ("retune", "mass", 0.64, False),
-        ("effect", "ploughing", 0.65, True),
-        ("effect", "ploughing", 0.64, False),
-    ],
-)
-def test_a_number_beats_retuning_unless_retuning_moves_it_and_no_name_is_much_worse(
-    effect_class: str, name: str, retuned: float, is_named: bool
-) -> None:
-    """A tyre 1.2 % stiffer was named on a car that lacked nothing: it took up another anti-lock brake's slip."""
-    # of two channels, whose mean counts, one is predicted better than by re-tuning
-    shares = {"speed": 1.0, "pitch": retuned**2}
-    error = {channel: replace(make_error(0.9)["speed"], retuned=share) for channel, share in shares.items()}
-    objected = object_to_last(found_last(name, effect_class, "slip", 0.1), None, error, None)
-    assert (objected is None) == is_named
-    assert is_named or "re-tuning alone" in str(objected)
-
-
-@pytest.mark.parametrize(("retuned", "is_named"), [(0.495, True), (0.485, False)])
-def test_no_name_stands_where_re_tuning_alone_predicts_every_channel_better(
-    retuned: float, is_named: bool
-) -> None:
-    """An accelerometer 18 ms late was named, and every channel of the held-out runs was missed by a tenth more."""
-    error = {"speed": replace(make_error(0.9)["speed"], retuned=0.8)}
-    error["longitudinal_acceleration"] = replace(make_error(0.5)["speed"], retuned=retuned)
-    objected = object_to_last(
-        found_last("sensor_acceleration_delay", "sensor", "time", 0.02), None, error, None
-    )
-    assert (objected is None) == is_named
-
-
-def test_no_name_stands_where_the_body_is_missed_by_far_for_it() -> None:
-    body = {name: replace(make_error(0.9)["speed"], retuned=0.1) for name in ("pitch", "pitch_rate")}
-    error = {**make_error(1.0), **body}
-    objected = object_to_last(
-        found_last("rolling_coefficient", "effect", "constant", 0.047), None, error, None
-    )
-    assert objected is not None and "re-tuning alone predicts the held-out runs better" in objected
-
-
-def test_no_name_stands_where_one_channel_is_missed_for_it() -> None:
-    """Rolling resistance of 4.7 % of the weight stood against a slope, which an accelerometer felt as 0.5 m/s2."""
-    error = {name: make_error(0.5)["speed"] for name in ("speed", "wheel_speed_front", "wheel_speed_rear")}
-    error["longitudinal_acceleration"] = replace(make_error(0.6)["speed"], frozen=0.23, retuned=0.19)
-    objected = object_to_last(
-        found_last("rolling_coefficient", "effect", "constant", 0.047), None, error, None
-    )
-    assert objected == (
-        "rolling_coefficient would fit, but predicts longitudinal_acceleration of the held-out runs with 3.16 times the"
-        " error of re-tuning alone: not named"
-    )
-
-
-def found_last(name: str, effect_class: str, variable: str, value: float) -> SimpleNamespace:
-    """Return a search that named one number last, as far as objections look at it."""
-    hypothesis = SimpleNamespace(name=name, effect_class=effect_class, variable=variable, names=(name,))
-    return SimpleNamespace(
-        evidence=SimpleNamespace(rules=RULES),
-        base=SimpleNamespace(values=np.array([value])),
-        rounds=[SimpleNamespace(accepted=SimpleNamespace(hypothesis=hypothesis), base=None)],
-    )
-
-
-def make_error(after: float) -> dict[str, ChannelError]:
-    return {
-        "speed": ChannelError(
-            frozen=1.0, retuned=1.0, after=after, ci_low=0.0, ci_high=2.0, change_low=-1.0, change_high=1.0, wins=1,
-            worst_run="run", unit="m/s",
-        )
-    }  # fmt: skip
 
 
 def test_a_named_effect_about_which_the_runs_disagree_is_left_to_the_joint_fit() -> None:
@@ -343,22 +238,3 @@ def test_an_effect_by_slip_needs_a_wheel_speed_and_a_pitch_moment_a_channel_of_t
     library = load_effects()
     found = {effect.name for effect in library if can_show(effect, VEHICLE, channels)}
     assert found == {e.name for e in library} - unseen
-
-
-@pytest.mark.parametrize(
-    ("effect_class", "name", "value", "is_named"),
-    [
-        ("retune", "slip_stiffness", -0.029, False),
-        ("retune", "slip_stiffness", -0.031, True),
-        ("retune", "mass", 0.005, True),
-        ("effect", "relaxation_length", 0.02, True),
-    ],
-)
-def test_a_number_that_is_off_by_less_than_it_is_known_to_is_not_wrong(
-    effect_class: str, name: str, value: float, is_named: bool
-) -> None:
-    """Tyres 1.3 % stiffer were named beside a right load sensitivity."""
-    error = {"speed": replace(make_error(0.5)["speed"], retuned=0.9)}
-    objected = object_to_last(found_last(name, effect_class, "slip", value), None, error, None)
-    assert (objected is None) == is_named
-    assert is_named or "less than such a number is known to (0.03)" in str(objected)

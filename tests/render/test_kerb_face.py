@@ -28,7 +28,7 @@ def street_with_kerb() -> Gaussians:
     return append_gaussians(append_gaussians(road(half_width=FACE_Y, spacing=0.05), face), top)
 
 
-def sunk(height_m: float) -> tuple[Gaussians, Gaussians]:
+def shape_road(height_m: float) -> tuple[Gaussians, Gaussians]:
     """The street with a road feature, before and after its kerbs follow it."""
     relief = relief_of(RoadHazard(center_m=6.0, length_m=3.0, height_m=height_m))
     shaped = apply_road_profile(street_with_kerb(), relief, FACE_Y, -FACE_Y)[0]
@@ -44,13 +44,13 @@ def count_holes(gaussians: Gaussians) -> int:
 
 @pytest.mark.parametrize("depth_m", [0.15, 0.2, 0.4])
 def test_nobody_sees_under_the_pavement_where_the_road_sinks(depth_m):
-    before, after = sunk(-depth_m)
+    before, after = shape_road(-depth_m)
     assert count_holes(before) > 10
     assert count_holes(after) == 0
 
 
 def test_the_face_alone_is_continued_and_down_to_the_road():
-    before, after = sunk(-0.2)
+    before, after = shape_road(-0.2)
     for name in ("means", "normals", "sh", "class_id"):
         np.testing.assert_array_equal(getattr(after, name)[: len(before)], getattr(before, name))
     copies = after.means[len(before) :]
@@ -61,5 +61,5 @@ def test_the_face_alone_is_continued_and_down_to_the_road():
 
 @pytest.mark.parametrize("height_m", [0.1, 0.0])
 def test_a_hump_and_a_flat_road_leave_the_kerb_as_it_is(height_m):
-    before, after = sunk(height_m)
+    before, after = shape_road(height_m)
     assert after is before

@@ -1,4 +1,4 @@
-"""What explains nearly as much as a named number in its place: its rivals on the training runs."""
+"""Rivals of a named number on the training runs: others that explain nearly as much in its place."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

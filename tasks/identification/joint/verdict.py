@@ -52,7 +52,7 @@ from tasks.vehicle.parameters import Vehicle
 
 @dataclass(frozen=True, kw_only=True)
 class _Prediction:
-    """What a fit makes of the held-out runs.
+    """Predictions of the held-out runs by a fit, and their errors.
 
     Parameters
     ----------

@@ -4,7 +4,6 @@ import csv
 import json
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pyarrow as pa
@@ -13,19 +12,18 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
-from catalogs.effects import load_effects
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_provenance
 from flows.cli import app
 from flows.making.plan import make_plan
-from flows.measured.closing import _say_own_numbers, close_loop, find_unused_tolerances, verdict_json
+from flows.measured.closing import close_loop, find_unused_tolerances, verdict_json
 from flows.measured.closing_ledger import record_reading
 from flows.measured.friction_pulls import find_pulled_runs, tell_friction_pulls
 from flows.measured.grown_vehicle import grown_vehicle
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS, SESSION, Campaign
 from tasks.campaign.planned_runs import RunPlan
 from tasks.identification.benchmark import TOLERANCES, make_synthetic_campaign
-from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter, Verdict, make_estimate
+from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter, Verdict
 from tasks.identification.inference.disturbance import Disturbance
 
 VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
@@ -332,27 +330,3 @@ def test_a_folder_that_is_no_campaign_is_the_users_mistake(tmp_path: Path) -> No
 
     with pytest.raises(InputError, match=r"needs campaign\.yaml"):
         close_loop(str(tmp_path), out=str(tmp_path / "out"))
-
-
-def test_a_number_that_stands_as_a_rival_is_not_told_again_among_the_vehicles_own():
-    def number(name: str, value: float) -> NamedEffect:
-        effect = next(e for e in load_effects() if e.name == name)
-        p = Parameter(
-            name=effect.parameters[0].name,
-            value=value,
-            ci_low=0.0,
-            ci_high=1.0,
-            lower=0.0,
-            upper=1.0,
-            unit="1",
-        )
-        return make_estimate(effect, p, 0.1)
-
-    grip, gain = number("retuned_friction_level", 0.65), number("retuned_pressure_gain", 0.51)
-    told = SimpleNamespace(rivals=[("pressure_nonlinearity", grip)], effects=[grip])
-    outcome = SimpleNamespace(verdict=told, calibrated=(gain, grip))
-    assert (
-        _say_own_numbers(outcome, load_effects())
-        == "the brakes give 51 % above the torque of the vehicle file"
-    )
-    assert _say_own_numbers(SimpleNamespace(verdict=told, calibrated=(grip,)), load_effects()) == ""

@@ -13,13 +13,13 @@ ROW_STEPS, MOST_LONGER = 8, 4.0
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def turn(R, vector, out):  # type: ignore[no-untyped-def]
+def rotate_vector(R, vector, out):  # type: ignore[no-untyped-def]
     for i in range(3):
         out[i] = R[i, 0] * vector[0] + R[i, 1] * vector[1] + R[i, 2] * vector[2]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def sway(offset, moving, amplitude, rate, time, chances):  # type: ignore[no-untyped-def]
+def add_flutter(offset, moving, amplitude, rate, time, chances):  # type: ignore[no-untyped-def]
     """Add a flake's own slow elliptic motion to its position and velocity.
 
     Its four chances from 0 to 1 are the phases in x and y, its quickness and its amplitude.

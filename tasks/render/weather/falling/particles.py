@@ -15,7 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.render.lens import Lens, undistort_points
-from tasks.render.weather.falling.exposure import NEAREST_Z_SHARE, expose, expose_by_rows, sway, turn
+from tasks.render.weather.falling.exposure import (
+    NEAREST_Z_SHARE,
+    add_flutter,
+    expose,
+    expose_by_rows,
+    rotate_vector,
+)
 from tasks.render.weather.falling.precipitation import NearField, Population, drawn_reach
 from tasks.render.weather.random_streams import philox, scale_to_unit, stream_key
 
@@ -226,7 +232,7 @@ def _count_in_cells(low, high, view, falling):  # type: ignore[no-untyped-def]
                 at = (kx, ky, kz)
                 for i in range(3):
                     offset[i] = at[i] * cell - seat[i] + 0.5 * cell
-                turn(R, offset, place)
+                rotate_vector(R, offset, place)
                 if _outside(place, planes, around, falling.reach):
                     continue
                 first, _, _, _ = philox(
@@ -264,12 +270,12 @@ def _expose_cells(cells, view, falling):  # type: ignore[no-untyped-def]
             if falling.flutter > 0:
                 w0, w1, w2, w3 = philox(cx, cy, cz, block + np.uint64(256), view.key)
                 own = (scale_to_unit(w0), scale_to_unit(w1), scale_to_unit(w2), scale_to_unit(w3))
-                sway(offset, moving, falling.flutter, falling.flutter_rate, view.time, own)
+                add_flutter(offset, moving, falling.flutter, falling.flutter_rate, view.time, own)
             distance = sqrt(offset[0] ** 2 + offset[1] ** 2 + offset[2] ** 2)
             if distance < view.nearest or distance > falling.reach:
                 continue
-            turn(R, offset, place)
-            turn(R, moving, motion)
+            rotate_vector(R, offset, place)
+            rotate_vector(R, moving, motion)
             if place[2] < NEAREST_Z_SHARE * view.nearest:
                 continue
             streak = streaks[found]

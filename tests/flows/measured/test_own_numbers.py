@@ -1,0 +1,31 @@
+"""A verdict tells the vehicle's own numbers that its prediction rests on, each once."""
+
+from types import SimpleNamespace
+
+from catalogs.effects import load_effects
+from flows.measured.closing import _say_own_numbers
+from tasks.identification.decision.answer import NamedEffect, Parameter, make_estimate
+
+
+def test_a_number_that_stands_as_a_rival_is_not_told_again_among_the_vehicles_own():
+    def number(name: str, value: float) -> NamedEffect:
+        effect = next(e for e in load_effects() if e.name == name)
+        p = Parameter(
+            name=effect.parameters[0].name,
+            value=value,
+            ci_low=0.0,
+            ci_high=1.0,
+            lower=0.0,
+            upper=1.0,
+            unit="1",
+        )
+        return make_estimate(effect, p, 0.1)
+
+    grip, gain = number("retuned_friction_level", 0.65), number("retuned_pressure_gain", 0.51)
+    told = SimpleNamespace(rivals=[("pressure_nonlinearity", grip)], effects=[grip])
+    outcome = SimpleNamespace(verdict=told, calibrated=(gain, grip))
+    assert (
+        _say_own_numbers(outcome, load_effects())
+        == "the brakes give 51 % above the torque of the vehicle file"
+    )
+    assert _say_own_numbers(SimpleNamespace(verdict=told, calibrated=(grip,)), load_effects()) == ""
