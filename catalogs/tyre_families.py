@@ -7,6 +7,7 @@ from pydantic import model_validator
 
 from catalogs.quantities import CatalogueEntry, Table, require_quantity
 from tasks.vehicle.parameters import TyreFamily
+from tasks.vehicle.tyres.burckhardt import BurckhardtCurve
 
 Scales = Annotated[Table, require_quantity("1", above=0)]
 Durations = Annotated[Table, require_quantity("s", above=0)]
@@ -45,4 +46,5 @@ class FamilyEntry(CatalogueEntry):
     @property
     def family(self) -> TyreFamily:
         """The family's numbers."""
-        return TyreFamily(**{name: getattr(self, name).value for name in FamilyEntry.model_fields})
+        values = {name: getattr(self, name).value for name in FamilyEntry.model_fields}
+        return TyreFamily(**{**values, "burckhardt": BurckhardtCurve(*values["burckhardt"])})

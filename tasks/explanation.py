@@ -21,7 +21,7 @@ from tasks.vehicle.model.axle_ports import compute_signed_slip
 from tasks.vehicle.paper.low_speed import SteadyStop, find_rule_span
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle, compute_surface_response
 from tasks.vehicle.rollout import Rollout
-from tasks.vehicle.tyres.contract import compute_braking_slip, compute_tyre_friction
+from tasks.vehicle.tyres.contract import compute_braking_slip, compute_tyre_friction, find_law
 
 TOLERANCE = 1e-9
 """Largest difference from the stored number, relative to it, that rounding explains [1]."""
@@ -108,13 +108,12 @@ def force_steps(
     steps, forces = [], []
     speed, radius = float(row["speed"]), vehicle.wheel_radius
     standing = speed <= 0
-    law = f"mu_B({response.slip_stiffness:.4g} * {{kappa:.4g}})"
-    if vehicle.tyre is not None:
-        law = "mu_MF({kappa:.4g}, {load:.6g})"
+    formula = find_law(type(response.tyre)).formula
     for axle, name in (("f", "front"), ("r", "rear")):
         omega, load = float(row[f"wheel_speed_{axle}"]), float(row[f"tyre_load_{axle}"])
         kappa = slip_of(speed, radius * omega, vehicle.slip_speed_floor)
         mu = copysign(compute_tyre_friction(abs(kappa), load, response.tyre), kappa)
+        law = formula.format(kappa=kappa, load=load, stiffness=response.slip_stiffness)
         forces.append(mu * load)
         steps += [
             Step(quantity=f"{name} braking slip", symbol=f"kappa_{axle}", equation="8", unit="1",
@@ -122,7 +121,7 @@ def force_steps(
                  f" {vehicle.slip_speed_floor:g}), {lowest}, 1)",
                  recomputed=kappa, stored=float(row[f"braking_slip_{axle}"])),
             Step(quantity=f"{name} tyre force", symbol=f"F_x,{axle}", equation="8, S7", unit="N",
-                 formula=f"{law.format(kappa=kappa, load=load)} * F_z = {mu:.5g} * {load:.6g}",
+                 formula=f"{law} * F_z = {mu:.5g} * {load:.6g}",
                  recomputed=mu * load, stored=float(row[f"tyre_force_{axle}"])),
         ]  # fmt: skip
     station = float(row["station"])

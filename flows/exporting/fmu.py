@@ -33,8 +33,8 @@ from flows.store.outputs import Outputs
 from manifests.provenance import code_version
 from tasks.errors import InputError
 from tasks.kernel_cache import sources_hash
-from tasks.surface.weather import WEATHERS, Weather, surface_state
-from tasks.vehicle.model.embedded import STEP, compile_advance, find_weathers
+from tasks.surface.weather import Weather, find_weather, surface_state
+from tasks.vehicle.model.embedded import STEP, compile_advance
 from tasks.vehicle.model.embedded_variables import INPUTS, OUTPUTS
 from tasks.vehicle.parameters import Vehicle
 
@@ -91,7 +91,7 @@ def write_fmu(
         "vehicle": car.name,
         "platforms": compilable,
         "step_s": STEP,
-        "weathers": find_weathers(car),
+        "weathers": car.find_weathers(),
         "parameters": [row.name for row in INPUTS if row.role == "parameter"],
         "inputs": [row.name for row in INPUTS if row.role == "input"],
         "outputs": [row.name for row in OUTPUTS],
@@ -108,10 +108,10 @@ def pack_fmu(car: Vehicle, content: bytes, surface: str, platforms: Sequence[str
     surface : the pavement whose dry friction is the friction at the start
     platforms : where it will run, of `PLATFORMS`
     """
-    weathers = find_weathers(car)
+    weathers = car.find_weathers()
     first = surface_state(Weather(kind=weathers[0]), load_surface(surface))
     starts = {row.name: row.start for row in INPUTS} | {
-        "weather": float(list(WEATHERS).index(weathers[0]) + 1),
+        "weather": float(find_weather(weathers[0]).code),
         "road_friction": first.friction,
     }
     guid = _make_guid(content, repr(starts).encode(), FRAME.read_bytes(), sources_hash().encode())

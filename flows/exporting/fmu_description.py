@@ -80,8 +80,8 @@ def write_unit(unit: str) -> str:
 
 
 def _number_weathers(weathers: Sequence[str]) -> str:
-    """The numbers of the kinds of weather in which a vehicle has a tyre, in words."""
-    return ", ".join(f"{number} {kind}" for number, kind in enumerate(WEATHERS, 1) if kind in weathers)
+    """The codes of the kinds of weather in which a vehicle has a tyre, in words."""
+    return ", ".join(f"{WEATHERS[kind].code} {kind}" for kind in weathers)
 
 
 def _add_variable(
@@ -98,7 +98,7 @@ def _add_variable(
         return
     if row.kind == "choice":
         # not an Enumeration: some importers (libcosim, Ecos) do not know that type, and could not choose
-        given = {"min": "1", "max": str(len(WEATHERS)), "start": str(int(start or 1))}
+        given = {"min": "1", "max": str(int(row.maximum)), "start": str(int(start or 1))}
         ElementTree.SubElement(variable, "Integer", given)
         return
     bounds = {"min": row.minimum, "max": row.maximum, "start": start}

@@ -183,8 +183,7 @@ def read_constants(root: Path) -> Constants:
         raise InputError(
             f"{root}: the physics audit knows Burckhardt's tyre; this dataset's vehicle drives on {car['tyre']}"
         )
-    families = {**vehicle.shared_families, **vehicle.families}
-    tyres = {kind: TyreTables(**vars(family)) for kind, family in families.items()}
+    tyres = {kind: TyreTables(**vars(vehicle.find_tyre_family(kind))) for kind in vehicle.find_weathers()}
     surface = {name: value for name, value in vars(pavement).items() if isinstance(value, float)}
     return Constants(
         car=_convert_numbers(car), surface=surface, tyres=tyres, mode=mode,

@@ -152,7 +152,8 @@ def _read_entries(
     inputs: dict[str, bytes] = {}
     scene: dict[str, str] = {}
     problems: list[str] = []
-    unasked = {f"weather/{kind}.yaml" for kind in WEATHERS if kind not in weathers}
+    needed = {row.tyre_family for kind in weathers if (row := WEATHERS.get(kind))} | set(weathers)
+    unasked = {f"weather/{kind}.yaml" for kind in WEATHERS if kind not in needed}
     for name, lookup in input_sources(settings).items():
         if name in unasked:
             continue

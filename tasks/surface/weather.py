@@ -201,6 +201,7 @@ class WeatherKind:
     Parameters
     ----------
     name : what scenarios, telemetry, tyre families and the entry in ``catalogs/weather/`` call it
+    code : its number where a number stands for it, as in an FMU; never that of another kind, never changed [1]
     film : depth of the film on the road; None where it leaves none [mm]
     snow : depth of the snow on it; None where it leaves none [mm]
     friction : film depth [mm], snow coverage [1] and pavement to mu_c [1]
@@ -209,9 +210,11 @@ class WeatherKind:
     accumulates : it lies as deep as the hours make it
     overcast : there is cloud in place of the sun, and an entry in ``catalogs/weather/`` that says how it looks
     wet : liquid water lies under the wheels
+    grips_as : kind whose tyre family it takes; None has a family of its own
     """
 
     name: str
+    code: int
     film: Law | None = None
     snow: Law | None = None
     friction: Callable[[float, float, SurfaceParameters], float]
@@ -220,6 +223,12 @@ class WeatherKind:
     accumulates: bool = False
     overcast: bool = True
     wet: bool = False
+    grips_as: str | None = None
+
+    @property
+    def tyre_family(self) -> str:
+        """The kind of weather whose tyre family it takes."""
+        return self.grips_as or self.name
 
 
 DRY = "dry"
@@ -228,18 +237,25 @@ DRY = "dry"
 WEATHERS: Mapping[str, WeatherKind] = {
     row.name: row
     for row in (
-        WeatherKind(name=DRY, friction=dry_friction, derive=derive_dry, overcast=False),
+        WeatherKind(name=DRY, code=1, friction=dry_friction, derive=derive_dry, overcast=False),
         WeatherKind(
-            name="rain", film=film_depth, friction=wet_friction, derive=derive_rain, rate_limit="rain_rate", wet=True
+            name="rain", code=2, film=film_depth, friction=wet_friction, derive=derive_rain, rate_limit="rain_rate",
+            wet=True,
         ),
         WeatherKind(
-            name="snow", snow=snow_depth, friction=snow_friction, derive=derive_snow, rate_limit="snow_rate",
+            name="snow", code=3, snow=snow_depth, friction=snow_friction, derive=derive_snow, rate_limit="snow_rate",
             accumulates=True,
         ),
-        WeatherKind(name="ice", film=glaze_depth, friction=ice_friction, derive=derive_ice),
+        WeatherKind(name="ice", code=4, film=glaze_depth, friction=ice_friction, derive=derive_ice),
     )
 }  # fmt: skip
 """Every kind of weather there is, by its name."""
+
+
+def list_by_code() -> tuple[str, ...]:
+    """Return the name of the kind of each code, from 1 on; empty where no kind has the code."""
+    names = {row.code: row.name for row in WEATHERS.values()}
+    return tuple(names.get(code, "") for code in range(1, max(names) + 1))
 
 
 def find_weather_problem(name: str) -> str | None:

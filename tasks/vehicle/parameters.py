@@ -8,12 +8,10 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from tasks.errors import InputError
-from tasks.surface.weather import find_weather
+from tasks.surface.weather import WEATHERS, find_weather
 from tasks.vehicle.effects.forms import Form
-from tasks.vehicle.tyres.burckhardt import scale_burckhardt
-from tasks.vehicle.tyres.contract import Tyre
-from tasks.vehicle.tyres.magic_formula import MagicFormula
-from tasks.vehicle.tyres.magic_formula_tyre import scale_magic_formula
+from tasks.vehicle.tyres.burckhardt import BurckhardtCurve
+from tasks.vehicle.tyres.contract import Curve, Tyre, scale_curve
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,7 +20,7 @@ class TyreFamily:
 
     Parameters
     ----------
-    burckhardt : c1, c2, c3 of the base curve [1]
+    burckhardt : base curve
     surface_friction : ascending knots mu_c of the tables below [1]
     efficiency : eta_tire at each knot, scales mu_c to the tyre's peak [1]
     slip_stiffness : beta_kappa at each knot, scales slip [1]
@@ -31,7 +29,7 @@ class TyreFamily:
     release_s : tau_r at each knot, low-speed release of paper mode [s]
     """
 
-    burckhardt: tuple[float, float, float]
+    burckhardt: BurckhardtCurve
     surface_friction: tuple[float, ...]
     efficiency: tuple[float, ...]
     slip_stiffness: tuple[float, ...]
@@ -107,7 +105,7 @@ class Vehicle:
     lock_speed: float
     gravity: float
     families: Mapping[str, TyreFamily]
-    tyre: MagicFormula | None = None
+    tyre: Curve | None = None
     effects: Mapping[str, float] = field(default_factory=dict)
     forms: tuple[Form, ...] = ()
     shared_families: Mapping[str, TyreFamily] = field(default_factory=dict)
@@ -124,14 +122,36 @@ class Vehicle:
         InputError
             If there is no such kind, or neither has a family for it.
         """
-        find_weather(weather)
-        family = self.families.get(weather, self.shared_families.get(weather))
+        name = find_weather(weather).tyre_family
+        family = self.families.get(name, self.shared_families.get(name))
         if family is None:
             raise InputError(
                 f"vehicle {self.name} has no tyre family for weather {weather}, only for {', '.join(self.families)}:"
-                f" add families.{weather} to its file"
+                f" add families.{name} to its file"
             )
         return family
+
+    def find_weathers(self) -> list[str]:
+        """Return the kinds of weather in which the vehicle has a tyre family."""
+        return [
+            name
+            for name, row in WEATHERS.items()
+            if row.tyre_family in self.families or row.tyre_family in self.shared_families
+        ]
+
+    def find_curve(self, weather: str) -> Curve:
+        """Return the curve that is scaled to a surface: the vehicle's own, else that of the tyre family.
+
+        Parameters
+        ----------
+        weather : name of the kind
+
+        Raises
+        ------
+        InputError
+            As `find_tyre_family` raises it.
+        """
+        return self.find_tyre_family(weather).burckhardt if self.tyre is None else self.tyre
 
     @property
     def mass(self) -> float:
@@ -236,14 +256,10 @@ def compute_surface_response(vehicle: Vehicle, family: str, surface_friction: fl
     peak, slip_stiffness = compute_tyre_scale(
         surface_friction, knots, np.array(table.efficiency), np.array(table.slip_stiffness)
     )
-    if vehicle.tyre is None:
-        tyre: Tyre = scale_burckhardt(table.burckhardt, peak, slip_stiffness)
-    else:
-        tyre = scale_magic_formula(vehicle.tyre, peak, slip_stiffness)
     # The knots are printed with six digits, so a friction within their rounding is on the end knot.
     rounding = 5e-7
     return SurfaceResponse(
-        tyre=tyre,
+        tyre=scale_curve(vehicle.find_curve(family), peak, slip_stiffness),
         slip_stiffness=slip_stiffness,
         pitch_scale=interpolate(table.pitch_scale),
         hold_s=interpolate(table.hold_s),

@@ -1,18 +1,19 @@
 """The table of weathers: one row a kind, the judge's own table beside it, and no kind beyond them anywhere."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import pytest
 
 from catalogs.physical_limits import PhysicalLimits, load_physical_limits
 from catalogs.scenario import Scenario, find_scenario_problems
 from catalogs.surfaces import load_surface
+from catalogs.vehicles import load_vehicle
 from flows.making.driving import weather_of
 from tasks.campaign.planned_runs import RunPlan, make_planned_run
 from tasks.errors import InputError
 from tasks.eval.physics.constants import SURFACE_FORMS, derive_surface
 from tasks.surface.state import SurfaceParameters, SurfaceState
-from tasks.surface.weather import DRY, WEATHERS, Weather, find_weather, surface_state
+from tasks.surface.weather import DRY, WEATHERS, Weather, find_weather, list_by_code, surface_state
 
 ASPHALT = load_surface("dense-asphalt")
 
@@ -79,6 +80,20 @@ def test_an_unknown_kind_is_refused_and_the_known_are_listed(use):
     known = ", ".join(list(WEATHERS)[:-1]) + f" or {list(WEATHERS)[-1]}"
     with pytest.raises(InputError, match=f"weather must be {known}; it is 'hail'"):
         use()
+
+
+def test_a_kinds_code_stays_what_files_and_fmus_hold():
+    assert {name: row.code for name, row in WEATHERS.items()} == {"dry": 1, "rain": 2, "snow": 3, "ice": 4}
+
+
+def test_a_kind_may_grip_as_another_does_and_leave_codes_free(monkeypatch):
+    """Without a tyre family of its own; an FMU refuses the codes that no kind has."""
+    gravel = replace(WEATHERS["dry"], name="gravel", code=7, grips_as="dry")
+    monkeypatch.setitem(WEATHERS, "gravel", gravel)
+    vehicle = load_vehicle("paper-reference")
+    assert vehicle.find_tyre_family("gravel") is vehicle.find_tyre_family("dry")
+    assert vehicle.find_weathers() == ["dry", "rain", "snow", "ice", "gravel"]
+    assert list_by_code() == ("dry", "rain", "snow", "ice", "", "", "gravel")
 
 
 def test_dry_is_the_kind_that_changes_no_picture():

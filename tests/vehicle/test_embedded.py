@@ -7,7 +7,7 @@ import pytest
 
 from tasks.surface.road_profile import RoadHazard
 from tasks.vehicle.model.brake_input import compute_input_pressure, make_trace_input
-from tasks.vehicle.model.embedded import STEP, count_held_samples, find_weathers
+from tasks.vehicle.model.embedded import STEP, count_held_samples
 from tasks.vehicle.model.embedded_variables import INPUTS, OUTPUTS
 from tasks.vehicle.parameters import interpolate_knots
 from tasks.vehicle.road import RoadLine, compute_road_height, compute_road_slope, make_road_feature
@@ -54,5 +54,5 @@ def test_the_samples_that_are_held_reach_back_to_the_dead_time(vehicle, dead_tim
 
 
 def test_a_weather_without_a_tyre_family_is_none_of_a_vehicles(vehicle):
-    assert find_weathers(vehicle) == ["dry", "rain", "snow", "ice"]
-    assert find_weathers(replace(vehicle, shared_families={})) == ["dry", "rain", "snow"]
+    assert vehicle.find_weathers() == ["dry", "rain", "snow", "ice"]
+    assert replace(vehicle, shared_families={}).find_weathers() == ["dry", "rain", "snow"]

@@ -15,8 +15,7 @@ import numpy as np
 from numba import carray, cfunc, njit, types
 from numpy.typing import NDArray
 
-from tasks.errors import InputError
-from tasks.surface.weather import WEATHERS
+from tasks.surface.weather import WEATHERS, list_by_code
 from tasks.vehicle.effects.slots import pack_slots
 from tasks.vehicle.model.brake_input import NO_COMMAND, BrakeInput
 from tasks.vehicle.model.chassis import Chassis, Conditions, build_chassis
@@ -25,9 +24,7 @@ from tasks.vehicle.model.simulation import integrate_motion
 from tasks.vehicle.model.states import STATE_WIDTH, make_rolling_state, unpack_state
 from tasks.vehicle.parameters import TyreFamily, Vehicle, compute_surface_response, compute_tyre_scale
 from tasks.vehicle.road import RoadFeature, RoadLine
-from tasks.vehicle.tyres.burckhardt import scale_burckhardt
-from tasks.vehicle.tyres.contract import Tyre
-from tasks.vehicle.tyres.magic_formula_tyre import scale_magic_formula
+from tasks.vehicle.tyres.contract import Tyre, scale_curve
 
 STEP = 0.0005
 """Internal step [s]."""
@@ -67,24 +64,6 @@ def measure_block(vehicle: Vehicle) -> int:
     return _PRESSURES + 2 * count_held_samples(vehicle)
 
 
-def find_weathers(vehicle: Vehicle) -> list[str]:
-    """Return the kinds of weather in which a vehicle has a tyre.
-
-    Parameters
-    ----------
-    vehicle : the vehicle
-    """
-
-    def has_tyre(weather: str) -> bool:
-        try:
-            vehicle.find_tyre_family(weather)
-        except InputError:
-            return False
-        return True
-
-    return [name for name in WEATHERS if has_tyre(name)]
-
-
 def compile_advance(vehicle: Vehicle) -> Any:
     """Compile the model of a vehicle, as a C function of a block and a number of steps.
 
@@ -98,13 +77,13 @@ def compile_advance(vehicle: Vehicle) -> Any:
     ``rows`` are room for two states and two rows of outputs. `START` steps put the block to the start of a drive by its
     parameters; then the function takes steps of `STEP`, fills the outputs and returns `DONE`.
     """
-    known = find_weathers(vehicle)
+    known, names = vehicle.find_weathers(), list_by_code()
     fixed = build_chassis(vehicle, compute_surface_response(vehicle, known[0], 0.5), Conditions())
-    wet = np.array([float(row.wet) for row in WEATHERS.values()])
+    wet = np.array([name in WEATHERS and float(WEATHERS[name].wet) for name in names], dtype=np.float64)
     tables = [form.slot for form in vehicle.forms]
     slots = pack_slots(tables) if tables else None
     make_tyre = _compile_tyre(vehicle)
-    has_tyre = np.array([name in known for name in WEATHERS])
+    has_tyre = np.array([name in known for name in names])
     held, width = count_held_samples(vehicle), measure_block(vehicle)
 
     def advance(numbers: Any, two_states: Any, two_rows: Any, steps: int) -> int:
@@ -168,25 +147,21 @@ def push_sample(samples: NDArray[np.float64], value: float) -> None:
 
 def _compile_tyre(vehicle: Vehicle) -> Callable[[int, float], Tyre]:
     """Return a kernel that gives the tyre in a weather at a friction, as `compute_surface_response` does."""
-    known = find_weathers(vehicle)
-    families = [vehicle.find_tyre_family(name if name in known else known[0]) for name in WEATHERS]
+    known = vehicle.find_weathers()
+    names = [name if name in known else known[0] for name in list_by_code()]
+    families = [vehicle.find_tyre_family(name) for name in names]
     knots, efficiency, stiffness = (
         _stack_tables(families, field) for field in ("surface_friction", "efficiency", "slip_stiffness")
     )
-    if vehicle.tyre is None:
-        curves = tuple(family.burckhardt for family in families)
+    curves = tuple(vehicle.find_curve(name) for name in names)
 
-        @njit(error_model="numpy")
-        def make_tyre(weather: int, friction: float) -> Tyre:
-            scale = compute_tyre_scale(friction, knots[weather], efficiency[weather], stiffness[weather])
-            return scale_burckhardt(curves[weather], scale[0], scale[1])
-    else:
-        formula = vehicle.tyre
-
-        @njit(error_model="numpy")
-        def make_tyre(weather: int, friction: float) -> Tyre:
-            scale = compute_tyre_scale(friction, knots[weather], efficiency[weather], stiffness[weather])
-            return scale_magic_formula(formula, scale[0], scale[1])
+    @njit(error_model="numpy")
+    def make_tyre(weather: int, friction: float) -> Tyre:
+        peak, slip_stiffness = compute_tyre_scale(
+            friction, knots[weather], efficiency[weather], stiffness[weather]
+        )
+        tyre: Tyre = scale_curve(curves[weather], peak, slip_stiffness)
+        return tyre
 
     return make_tyre
 

@@ -6,7 +6,7 @@ from math import inf
 from typing import Literal
 
 from tasks.conventions import CHANNELS_BY_NAME
-from tasks.surface.weather import WEATHERS
+from tasks.surface.weather import list_by_code
 from tasks.vehicle.model.simulation import COLUMNS
 
 
@@ -22,7 +22,7 @@ class EmbeddedVariable:
     start : value where none is given
     minimum, maximum : values that are taken
     role : a parameter is given once, before the start; an input may change from step to step
-    kind : a choice counts the kinds of weather from 1
+    kind : a choice is the code of a kind of weather
     """
 
     name: str
@@ -46,7 +46,7 @@ INPUTS = (
     _define_input("brake_pressure", "MPa", "pressure that the driver gives", 0.0, 0.0, 50.0),
     _define_input("engine_torque", "N m", "torque of the engine at the wheels, driving positive, divided between the axles as the brake torque is"),
     _define_input("hold_speed", "1", "keeps the speed, as a driver does who does not brake yet", 0.0, 0.0, 1.0, kind="boolean"),
-    _define_input("weather", "1", "what lies on the road; it chooses the tyre's family", 1.0, 1.0, float(len(WEATHERS)), kind="choice"),
+    _define_input("weather", "1", "what lies on the road; it chooses the tyre's family", 1.0, 1.0, float(len(list_by_code())), kind="choice"),
     _define_input("road_friction", "1", "reference friction of the surface, the surface_friction of a dataset", 0.8, 0.01, 2.0),
     _define_input("snow_depth", "mm", "depth of the snow, which some vehicles plough", 0.0, 0.0, 1000.0),
     _define_input("ground_height_f", "m", "road height under the front axle when the step begins, added to the road feature's"),

@@ -7,6 +7,19 @@ from numba import njit
 from numba.extending import register_jitable
 
 
+class BurckhardtCurve(NamedTuple):
+    """A base curve that rises and then falls, mu = c1 (1 - exp(-c2 kappa)) - c3 kappa (paper, Appendix B).
+
+    Parameters
+    ----------
+    c1, c2, c3 : coefficients [1]
+    """
+
+    c1: float
+    c2: float
+    c3: float
+
+
 class BurckhardtTyre(NamedTuple):
     """A Burckhardt curve scaled to one surface: mu = rise (1 - exp(-decay kappa)) - fall kappa.
 
@@ -25,18 +38,16 @@ class BurckhardtTyre(NamedTuple):
 
 
 @register_jitable
-def scale_burckhardt(
-    burckhardt: tuple[float, float, float], peak: float, slip_stiffness: float
-) -> BurckhardtTyre:
+def scale_burckhardt(curve: BurckhardtCurve, peak: float, slip_stiffness: float) -> BurckhardtTyre:
     """Scale a base curve to its peak and stiffness on a surface, mu_B(beta kappa; mu_eff) (paper, Appendix B).
 
     Parameters
     ----------
-    burckhardt : c1, c2, c3 of a curve that rises and then falls [1]
+    curve : base curve
     peak : mu_eff [1]
     slip_stiffness : horizontal scale, beta [1]
     """
-    c1, c2, c3 = burckhardt
+    c1, c2, c3 = curve
     peak_slip = min(log(c1 * c2 / c3) / c2, 1.0)
     scale = peak / (c1 * (1 - exp(-c2 * peak_slip)) - c3 * peak_slip)
     return BurckhardtTyre(
