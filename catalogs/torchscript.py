@@ -46,8 +46,8 @@ def load_network(path: Path, name: str) -> Any:
     if calls:
         found = ", ".join(dict.fromkeys(calls))
         raise InputError(
-            f"{name} must be a network that only computes; its program has {shorten(found)}, with which it can reach files"
-            " or other programs: do not use it"
+            f"{name} must be a network that only computes; its program has {shorten(found)}, with which it can reach"
+            " files or other programs: do not use it"
         )
     return network
 
@@ -71,5 +71,9 @@ def _find_calls(record: str, content: bytes) -> Iterator[str]:
     for node in ast.walk(tree):
         words = (getattr(node, name, None) for name in ("id", "attr", "value"))  # a name, x.name or "name"
         yield from (word for word in words if isinstance(word, str) and word in REACHES_FILES)
-        if isinstance(node, ast.Attribute) and ast.unparse(node.value) == "ops" and node.attr not in NAMESPACES:
+        if (
+            isinstance(node, ast.Attribute)
+            and ast.unparse(node.value) == "ops"
+            and node.attr not in NAMESPACES
+        ):
             yield f"ops.{shorten(node.attr)}"

@@ -16,6 +16,10 @@ from tasks.conventions import CHANNELS_BY_NAME, Channel
 from tasks.errors import InputError
 
 ROW_GROUP_ROWS = 100_000
+CLIPS_PER_FILE = 100
+MOST_COLUMNS, LONGEST_NAME = 500, 200
+"""Columns of a table that is read, and characters of a column's name [1]. muSync writes a tenth of the columns; DuckDB
+takes minutes for some thousands."""
 SHOWN_COLUMNS = 8
 SEALED = "musync repair makes it again"
 STAGED = "remove it, and the same musync generate command makes its clip again"
@@ -131,18 +135,22 @@ def _parquet_pieces(tables: Iterable[pa.Table]) -> Iterator[bytes]:
     pa.default_memory_pool().release_unused()  # what encoding took, which it would keep for the next time
 
 
-def read_parts(paths: Iterable[Path]) -> Iterator[pa.Table]:
+def read_parts(paths: Iterable[Path], most: int) -> Iterator[pa.Table]:
     """Yield the tables of files one at a time, with common dictionaries: together they are one table.
 
     Parameters
     ----------
     paths : Parquet files of one schema, fewer than a process may have open
+    most : rows that each may have [1]
 
     Raises
     ------
     InputError
         If one is missing, or is no table as muSync writes it.
     """
+    paths = list(paths)
+    for path in paths:
+        refuse_footer(path, most, STAGED)
     # without buffers ahead, which a file would hold until it is closed
     options = {"pre_buffer": False, **CHECKED}
     files = [(path, _read_file(path, pq.ParquetFile, path, remedy=STAGED, **options)) for path in paths]
@@ -162,7 +170,53 @@ def read_parts(paths: Iterable[Path]) -> Iterator[pa.Table]:
         yield table
 
 
-def read_table(path: Path, clip_id: str | None = None, required: Iterable[str] = ()) -> pa.Table:
+def refuse_footer(path: Path, most: int, remedy: str = SEALED) -> None:
+    """Refuse a table by its footer: a few kilobytes hold rows and names that no memory does.
+
+    Parameters
+    ----------
+    path : of a Parquet file
+    most : rows that it may have by its dataset's plan [1]
+    remedy : what the sentence tells to do
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or has more rows, more columns or longer names.
+    """
+    footer = _read_file(path, pq.read_metadata, path, remedy=remedy)
+    counts = {
+        "rows": (footer.num_rows, most),
+        "columns": (footer.num_columns, MOST_COLUMNS),
+        "characters in a column's name": (max(map(len, footer.schema.names), default=0), LONGEST_NAME),
+    }
+    problems = [
+        f"{path}: must have at most {bound:,} {what}; it has {count:,}: {remedy}"
+        for what, (count, bound) in counts.items()
+        if not 0 <= count <= bound
+    ]
+    if problems:
+        raise InputError(problems)
+
+
+def refuse_rows(path: Path, clip_id: str, rows: int) -> None:
+    """Raise `InputError` for a staged table that does not hold just the rows of one clip.
+
+    Parameters
+    ----------
+    path : of the table
+    clip_id : whose rows
+    rows : how many [1]
+    """
+    refuse_footer(path, rows, STAGED)
+    names = _read_file(path, pq.read_table, path, remedy=STAGED, columns=["clip_id"], **CHECKED)["clip_id"]
+    if len(names) != rows or names.unique().to_pylist() != [clip_id]:
+        raise InputError(f"{path}: must hold {rows} rows of clip {clip_id} and no others: {STAGED}")
+
+
+def read_table(
+    path: Path, clip_id: str | None = None, required: Iterable[str] = (), *, most: int
+) -> pa.Table:
     """A Parquet file, or a folder of them.
 
     Parameters
@@ -170,12 +224,16 @@ def read_table(path: Path, clip_id: str | None = None, required: Iterable[str] =
     path : file or folder
     clip_id : clip whose rows are read; None takes all
     required : names of columns that must be there
+    most : rows of the clip, or without one of the table, by the plan: no file has more than those of `CLIPS_PER_FILE`
+        clips [1]
 
     Raises
     ------
     InputError
         If there is no such file, it is no table as muSync writes it, lacks a column, or has no row of the clip.
     """
+    for file in sorted(path.rglob("*.parquet")) if path.is_dir() else [path]:
+        refuse_footer(file, most if clip_id is None else most * CLIPS_PER_FILE)
     filters = None if clip_id is None else [("clip_id", "==", clip_id)]
     table = _read_file(path, pq.read_table, path, filters=filters, **CHECKED)
     _refuse_columns(table, path, required, clip_id)
@@ -222,24 +280,24 @@ def _refuse_columns(
 
 
 def read_columns(
-    path: Path, clip_id: str | None = None, required: Iterable[str] = (), rows: int | None = None
+    path: Path, clip_id: str | None = None, required: Iterable[str] = (), *, most: int, exact: bool = True
 ) -> dict[str, np.ndarray]:
     """The columns of `read_table` as NumPy arrays.
 
     Parameters
     ----------
-    path, clip_id, required : as of `read_table`
-    rows : how many there must be; None takes any number [1]
+    path, clip_id, required, most : as of `read_table`
+    exact : whether the clip must have just as many rows
 
     Raises
     ------
     InputError
         As `read_table` raises it, or for another number of rows.
     """
-    table = read_table(path, clip_id, required)
-    if rows is not None and len(table) != rows:
+    table = read_table(path, clip_id, required, most=most)
+    if exact and len(table) != most:
         raise InputError(
-            f"{path}: must hold {rows} rows of clip {clip_id}; it holds {len(table)}: musync repair makes the table"
+            f"{path}: must hold {most} rows of clip {clip_id}; it holds {len(table)}: musync repair makes the table"
             " again"
         )
     return table_columns(table)
