@@ -29,8 +29,8 @@ _MEMORY = re.compile(
 )
 """What the loader of libraries, threads and allocators say."""
 OUT_OF_MEMORY = (
-    "memory ran out; what is committed is kept: raise the limit (ulimit -v), or give fewer --workers, or fewer or smaller"
-    " frames, and run the same command again"
+    "memory ran out; what is committed is kept: raise the limit (ulimit -v), give fewer --workers, or fewer or"
+    " smaller frames, and run the same command again"
 )
 AGAIN = "what is committed is kept: {} and run the same command again"
 FULL = {

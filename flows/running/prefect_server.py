@@ -33,7 +33,7 @@ QUIET_AND_LOCAL = {
     # the server's own pages are of its origin; this one is nobody's
     "PREFECT_SERVER_CORS_ALLOWED_ORIGINS": "https://musync.invalid",
 }
-START_S, STOP_S = 120.0, 30.0
+START_S, STOP_S = 300.0, 30.0
 
 
 def set_up_prefect() -> None:
