@@ -16,8 +16,9 @@ from flows.making.summaries import SUMMARIES, summarise_clips
 from flows.store.arrays import arrays_of
 from flows.store.layout import STAGED_TABLES, Layout
 from flows.store.links import require_file
+from flows.store.parquet_files import refuse_footer
 from flows.store.sealed import read_plan_record
-from flows.store.telemetry import read_columns, refuse_footer, table_columns
+from flows.store.telemetry import read_columns, table_columns
 from manifests.compare import find_row_difference
 from manifests.explain import find_value_differences, format_value
 from manifests.manifest import recorded_files

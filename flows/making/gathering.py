@@ -8,7 +8,8 @@ from flows.making.plan import Plan
 from flows.running.runner import run_unordered
 from flows.store.address import fetch_files, find_local, send_files
 from flows.store.layout import STAGED_TABLES, Layout
-from flows.store.telemetry import CLIPS_PER_FILE, read_parts, write_tables
+from flows.store.parquet_files import CLIPS_PER_FILE
+from flows.store.telemetry import read_parts, write_tables
 from manifests.canonical import sha256_of_file
 
 

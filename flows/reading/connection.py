@@ -12,8 +12,8 @@ from catalogs.sentences import shorten
 from flows.reading.table_files import SCHEME, TableFiles, bound_rows, table_files
 from flows.store.address import open_for_reading, want_telemetry
 from flows.store.layout import Layout
+from flows.store.parquet_files import refuse_footer
 from flows.store.sealed import read_manifest_head
-from flows.store.telemetry import refuse_footer
 from manifests.manifest import is_traced
 from tasks.conventions import CHECK_CHANNELS, LATER_CHECK_CHANNELS
 from tasks.errors import InputError

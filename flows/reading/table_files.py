@@ -20,8 +20,8 @@ from fsspec import AbstractFileSystem  # type: ignore[import-untyped]
 
 from catalogs.sentences import shorten, shorten_value
 from flows.store.layout import Layout
+from flows.store.parquet_files import CHECKED, CLIPS_PER_FILE, refuse_footer
 from flows.store.sealed import recorded_grid
-from flows.store.telemetry import CHECKED, CLIPS_PER_FILE, refuse_footer
 from tasks.errors import InputError
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from flows.store.arrays import arrays_of
 from flows.store.frame_metadata import check_array, check_frames, read_local_metadata
 from flows.store.frames import read_frames
 from flows.store.layout import Layout
-from flows.store.telemetry import CHECKED, CLIPS_PER_FILE, refuse_footer
+from flows.store.parquet_files import CHECKED, CLIPS_PER_FILE, refuse_footer
 from manifests.manifest import is_quarantined
 from tasks.errors import InputError
 

@@ -12,7 +12,7 @@ from catalogs.grids.form import BEFORE
 from catalogs.sentences import cap_problems, describe_rules, shorten_value
 from flows.store.arrays import arrays_of
 from flows.store.layout import RECORD, STAGED_TABLES, Layout, read_json
-from flows.store.telemetry import refuse_rows
+from flows.store.parquet_files import refuse_rows
 from manifests.canonical import sha256_of_file
 from manifests.manifest import MANIFEST_FORMAT, head_of_sealed, is_sealed
 from manifests.records import Manifest, ManifestHead, PlanRecord, Receipt, check_record

@@ -1,6 +1,6 @@
 """Telemetry as Arrow tables and Parquet files, labelled from the one table of conventions."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -9,22 +9,14 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from catalogs.sentences import shorten
 from flows.store.layout import write_pieces
+from flows.store.parquet_files import CHECKED, CLIPS_PER_FILE, STAGED, call_reader, refuse_footer
 from manifests.canonical import sha256_of
 from tasks.conventions import CHANNELS_BY_NAME, Channel
 from tasks.errors import InputError
 
 ROW_GROUP_ROWS = 100_000
-CLIPS_PER_FILE = 100
-MOST_COLUMNS, LONGEST_NAME = 500, 200
-"""Columns of a table that is read, and characters of a column's name [1]. muSync writes a tenth of the columns; DuckDB
-takes minutes for some thousands."""
 SHOWN_COLUMNS = 8
-SEALED = "musync repair makes it again"
-STAGED = "remove it, and the same musync generate command makes its clip again"
-CHECKED: Mapping[str, Any] = {"page_checksum_verification": True}
-"""How pyarrow is to read Parquet: each page is held against the checksum that it was written with."""
 
 
 def labelled_table(columns: Mapping[str, Any], constants: Mapping[str, Any] | None = None) -> pa.Table:
@@ -153,14 +145,14 @@ def read_parts(paths: Iterable[Path], most: int) -> Iterator[pa.Table]:
         refuse_footer(path, most, STAGED)
     # without buffers ahead, which a file would hold until it is closed
     options = {"pre_buffer": False, **CHECKED}
-    files = [(path, _read_file(path, pq.ParquetFile, path, remedy=STAGED, **options)) for path in paths]
+    files = [(path, call_reader(path, pq.ParquetFile, path, remedy=STAGED, **options)) for path in paths]
     encoded = [field.name for field in files[0][1].schema_arrow if pa.types.is_dictionary(field.type)]
     constants = pa.concat_tables(
-        _read_file(path, file.read, encoded, remedy=STAGED, use_threads=False) for path, file in files
+        call_reader(path, file.read, encoded, remedy=STAGED, use_threads=False) for path, file in files
     ).unify_dictionaries()
     common = {name: constants[name].chunk(0).slice(0, 0) for name in encoded}
     for path, file in files:
-        table = _read_file(path, file.read, remedy=STAGED, use_threads=False)
+        table = call_reader(path, file.read, remedy=STAGED, use_threads=False)
         file.close()
         _refuse_columns(table, path)
         for name, empty in common.items():
@@ -168,50 +160,6 @@ def read_parts(paths: Iterable[Path], most: int) -> Iterator[pa.Table]:
             place = table.schema.get_field_index(name)
             table = table.set_column(place, table.schema.field(place), pa.chunked_array(chunks))
         yield table
-
-
-def refuse_footer(path: Path, most: int, remedy: str = SEALED) -> None:
-    """Refuse a table by its footer: a few kilobytes hold rows and names that no memory does.
-
-    Parameters
-    ----------
-    path : of a Parquet file
-    most : rows that it may have by its dataset's plan [1]
-    remedy : what the sentence tells to do
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, or has more rows, more columns or longer names.
-    """
-    footer = _read_file(path, pq.read_metadata, path, remedy=remedy)
-    counts = {
-        "rows": (footer.num_rows, most),
-        "columns": (footer.num_columns, MOST_COLUMNS),
-        "characters in a column's name": (max(map(len, footer.schema.names), default=0), LONGEST_NAME),
-    }
-    problems = [
-        f"{path}: must have at most {bound:,} {what}; it has {count:,}: {remedy}"
-        for what, (count, bound) in counts.items()
-        if not 0 <= count <= bound
-    ]
-    if problems:
-        raise InputError(problems)
-
-
-def refuse_rows(path: Path, clip_id: str, rows: int) -> None:
-    """Raise `InputError` for a staged table that does not hold just the rows of one clip.
-
-    Parameters
-    ----------
-    path : of the table
-    clip_id : whose rows
-    rows : how many [1]
-    """
-    refuse_footer(path, rows, STAGED)
-    names = _read_file(path, pq.read_table, path, remedy=STAGED, columns=["clip_id"], **CHECKED)["clip_id"]
-    if len(names) != rows or names.unique().to_pylist() != [clip_id]:
-        raise InputError(f"{path}: must hold {rows} rows of clip {clip_id} and no others: {STAGED}")
 
 
 def read_table(
@@ -235,23 +183,9 @@ def read_table(
     for file in sorted(path.rglob("*.parquet")) if path.is_dir() else [path]:
         refuse_footer(file, most if clip_id is None else most * CLIPS_PER_FILE)
     filters = None if clip_id is None else [("clip_id", "==", clip_id)]
-    table = _read_file(path, pq.read_table, path, filters=filters, **CHECKED)
+    table = call_reader(path, pq.read_table, path, filters=filters, **CHECKED)
     _refuse_columns(table, path, required, clip_id)
     return table
-
-
-def _read_file(
-    path: Path, read: Callable[..., Any], *arguments: Any, remedy: str = SEALED, **options: Any
-) -> Any:
-    """Call a reader of Parquet, whose errors become sentences about the file."""
-    try:
-        return read(*arguments, **options)
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file; is this a finished muSync dataset?") from None
-    except (pa.ArrowException, OSError, ValueError, TypeError) as error:
-        raise InputError(
-            f"{path}: must be a Parquet table as muSync writes it; {shorten(error)}: {remedy}"
-        ) from None
 
 
 def _refuse_columns(
