@@ -4,6 +4,7 @@ It is stopped while the third run is going. Takes about four minutes, because cr
 benchmarks.scheduled_runs``.
 """
 
+import base64
 import json
 import os
 import re
@@ -80,12 +81,12 @@ def main() -> int:
 
 
 def _list_artifacts(log: str) -> set[str]:
-    """Keys of the artifacts that the schedule's own server shows."""
-    found = re.search(r"http://127\.0\.0\.1:\d+", log)
+    """Keys of the artifacts that the schedule's own server shows to who has its password."""
+    found = re.search(r"(http://127\.0\.0\.1:\d+) \(their password is in (.*)\)", log)
     assert found is not None
-    request = urllib.request.Request(
-        f"{found[0]}/api/artifacts/latest/filter", b"{}", {"Content-Type": "application/json"}
-    )
+    password = base64.b64encode(Path(found[2]).read_bytes().strip()).decode()
+    headers = {"Content-Type": "application/json", "Authorization": f"Basic {password}"}
+    request = urllib.request.Request(f"{found[1]}/api/artifacts/latest/filter", b"{}", headers)
     with urllib.request.urlopen(request, timeout=30) as answer:
         return {artifact["key"] for artifact in json.load(answer)}
 

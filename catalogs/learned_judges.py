@@ -12,6 +12,7 @@ snow), a row a kind of weather in the file's order.
 import os
 import zipfile
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 from catalogs.clip_prompts import load_prompts
 from catalogs.quantities import CatalogueEntry, Text, read_entry
 from catalogs.sentences import shorten
+from catalogs.torchscript import load_network
 from tasks.errors import InputError
 
 JUDGES = ("clip", "dover", "fast_vqa", "lpips")
@@ -74,7 +76,8 @@ def load_judges(path: str | Path | None) -> dict[str, LoadedJudge]:
     Raises
     ------
     InputError
-        The YAML is wrong, or a file that is there is no TorchScript module or holds no such features.
+        The YAML is wrong, or a file that is there is no TorchScript module, or one that reaches files, or holds no such
+        features.
     """
     if path is None:
         return {name: _make_missing("not run: checkpoint missing") for name in JUDGES}
@@ -97,21 +100,13 @@ def load_judges(path: str | Path | None) -> dict[str, LoadedJudge]:
 
 
 def _load_judge(path: Path, entry: Checkpoint) -> LoadedJudge:
-    try:
-        import torch
-    except ImportError:
-        raise InputError("a learned judge needs the package torch: install it") from None
-
+    if find_spec("torch") is None:
+        raise InputError("a learned judge needs the package torch: install it")
     needed = [entry.checkpoint, *([entry.text_features] if isinstance(entry, ClipCheckpoint) else [])]
     for name in needed:
         if not os.path.isfile(path.parent / name):
             return _make_missing(f"not run: checkpoint missing: {name}")
-    try:
-        network = torch.jit.load(path.parent / entry.checkpoint, map_location="cpu").eval()
-    except (RuntimeError, ValueError, OSError, EOFError) as error:
-        raise InputError(
-            f"{shorten(entry.checkpoint)} must be a TorchScript module; {shorten(error)}"
-        ) from None
+    network = load_network(path.parent / entry.checkpoint, shorten(entry.checkpoint))
     features = None
     if isinstance(entry, ClipCheckpoint):
         try:

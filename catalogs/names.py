@@ -22,6 +22,8 @@ def find_name_problem(name: str) -> str | None:
         return f"have 1 to {LONGEST_NAME} characters; it has {len(name)}"
     if not name.isprintable() or not is_encodable(name) or name != name.strip():
         return f"be printable characters without blanks at its ends; it is {shorten_value(name)}"
+    if name.startswith("-"):
+        return f"begin with another character than -, which commands take for an option; it is {shorten_value(name)}"
     if "/" in name or "\\" in name or name in (".", ".."):
         return f"be no path; it is {shorten_value(name)}"
     return None

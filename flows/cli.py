@@ -8,15 +8,16 @@ from flows.parser import build_parser
 from flows.running.failures import INTERRUPTED, explain_end
 from flows.running.terminal import print_lines
 
-QUIET = {"OPENCV_FFMPEG_LOGLEVEL": "-8", "OPENCV_LOG_LEVEL": "ERROR"}
-"""OpenCV would print names and tags of a video unescaped; muSync reports faults of a video itself."""
+SETTINGS = {"OPENCV_FFMPEG_LOGLEVEL": "-8", "OPENCV_LOG_LEVEL": "ERROR", "PYTHONSAFEPATH": "1"}
+"""OpenCV would print names and tags of a video unescaped; muSync reports faults of a video itself. Worker processes
+would run a multiprocessing.py that lies in the working folder."""
 
 app = build_parser()
 
 
 def main() -> None:
     """Entry point: exit codes 0 done, 1 a check failed, 2 the input is wrong, 3 something broke, 130 interrupted."""
-    for name, value in QUIET.items():
+    for name, value in SETTINGS.items():
         os.environ.setdefault(name, value)
     run_to_end(app)
 

@@ -67,14 +67,15 @@ def run_function(command: Command, given: Mapping[str, Any], as_flow: bool) -> A
     if command.one_thread:
         # many small linear systems: the threads of a BLAS spend more time waiting for each other than computing
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    if as_flow and command.is_flow:
-        from flows import prefect_flows
-
-        function: Callable[..., Any] = getattr(prefect_flows, flow_name(command))
-    else:
-        function = import_function(command)
     try:
-        return function(**given)
+        if not (as_flow and command.is_flow):
+            return import_function(command)(**given)
+        from flows.running.prefect_server import prefect_api
+
+        with prefect_api(pages=False):
+            from flows import prefect_flows
+
+            return getattr(prefect_flows, flow_name(command))(**given)
     except (EOFError, BrokenPipeError) as error:
         # Typer takes these for the end of its own streams, and ends with the code of a failed check
         raise RuntimeError(f"{type(error).__name__}: {error}") from error

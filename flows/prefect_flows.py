@@ -5,26 +5,15 @@ Each command of the registry that is a flow stands here under its name, with und
 Results are never persisted by Prefect: receipts and hashes on disk decide what is done.
 """
 
-import os
 from collections.abc import Callable
 from datetime import UTC, datetime
 from functools import wraps
 from pathlib import Path
 from typing import Any
 
-QUIET_AND_LOCAL = {
-    "DO_NOT_TRACK": "1",
-    "PREFECT_SERVER_ANALYTICS_ENABLED": "false",
-    # rows of a run's log on the server; on the terminal the command says in a sentence why a run ended
-    "PREFECT_LOGGING_LEVEL": "INFO",
-    "PREFECT_LOGGING_HANDLERS_CONSOLE_LEVEL": "CRITICAL",
-    "PREFECT_SERVER_EPHEMERAL_STARTUP_TIMEOUT_SECONDS": "120",
-    "PREFECT_HOME": str(Path.cwd() / ".musync" / "prefect"),
-}
-for _name, _value in QUIET_AND_LOCAL.items():
-    os.environ.setdefault(_name, _value)
-# Prefect's database fails to open in a home that does not exist yet
-Path(os.environ["PREFECT_HOME"]).mkdir(parents=True, exist_ok=True)
+from flows.running.prefect_server import set_up_prefect
+
+set_up_prefect()
 
 from prefect import flow  # noqa: E402  (reads the environment when it is imported)
 from prefect.logging import get_run_logger  # noqa: E402

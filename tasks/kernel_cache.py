@@ -37,6 +37,7 @@ def place_kernel_cache() -> None:
         config.CACHE_DIR = str(folder)
     if not os.path.isdir(folder):
         _forget_old(folder.parent)
+    _make_private(folder)
 
 
 def cache_root() -> Path:
@@ -76,6 +77,15 @@ def sources_hash(package: Path = Path(__file__).parent) -> str:
     for name in sorted(sources):
         digest.update(f"{name} {len(sources[name])}\n".encode() + sources[name])
     return digest.hexdigest()[:16]
+
+
+def _make_private(folder: Path) -> None:
+    """Make the folder of a state so that nobody else writes there, whatever the umask: what lies in it is run."""
+    with suppress(OSError):
+        folder.parent.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        for place in (folder.parent, folder):
+            place.mkdir(mode=0o700, exist_ok=True)
+            place.chmod(0o700)
 
 
 def _forget_old(folder: Path) -> None:

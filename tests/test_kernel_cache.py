@@ -1,6 +1,7 @@
 """A compiled kernel never outlives the source of anything it calls."""
 
 import os
+import stat
 import subprocess
 import sys
 from pathlib import Path
@@ -41,7 +42,7 @@ def package(tmp_path) -> Path:
     return folder
 
 
-def result(package: Path, cache: str = "cache") -> float:
+def result(package: Path, cache: str = "cache", umask: int = -1) -> float:
     env = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
     env |= {"MUSYNC_CACHE": str(package.parent / cache), "PYTHONPATH": str(package.parent)}
     done = subprocess.run(
@@ -51,6 +52,7 @@ def result(package: Path, cache: str = "cache") -> float:
         capture_output=True,
         text=True,
         check=True,
+        umask=umask,
     )
     return float(done.stdout)
 
@@ -58,11 +60,15 @@ def result(package: Path, cache: str = "cache") -> float:
 def test_a_change_in_a_called_file_or_a_constant_reaches_the_caller_and_the_oldest_state_is_forgotten(
     package,
 ):
+    """Whatever the umask, nobody else writes where compiled kernels lie."""
     kernels = package.parent / "cache" / "kernels"
     old = {f"{number:016x}" for number in range(KEPT + 2)}
     for name in old:
         (kernels / name).mkdir(parents=True)
-    assert result(package) == 8.0
+    kernels.chmod(0o777)
+    assert result(package, umask=0) == 8.0
+    (state,) = (path for path in kernels.iterdir() if path.name not in old)
+    assert [stat.S_IMODE(path.stat().st_mode) for path in (kernels, state)] == [0o700, 0o700]
     left = {path.name for path in kernels.iterdir()}
     assert len(left) == KEPT and len(left - old) == 1
     (package / "called.py").write_text(CALLED.format("2 * LEVEL"))

@@ -54,12 +54,15 @@ class CopiedClips:
             with ProcessPoolExecutor(1, get_context("spawn")) as worker:
                 self.receipt = worker.submit(make_clip, layout, index, scene).result()
             del self.receipt["cost"]
-            self.tables = {name: read_table(layout.staged(clip.clip_id, name)) for name in STAGED_TABLES}
+            rows = read_plan(layout.root).settings.rows_per_clip
+            self.tables = {
+                name: read_table(layout.staged(clip.clip_id, name), most=rows[name]) for name in STAGED_TABLES
+            }
         receipt = self.receipt | clip.as_json()
         write_json(layout.receipt(clip.clip_id), receipt)
         return receipt | {"cost": COST}
 
-    def gather_part(self, layout: Layout, table: str, path: str, clip_ids: Sequence[str]) -> str:
+    def gather_part(self, layout: Layout, table: str, path: str, clip_ids: Sequence[str], rows: int) -> str:
         """Write a file of the first clip's rows once for each clip."""
         if not self.clips:
             self.clips = {clip.clip_id: clip for clip in read_plan(layout.root).clips}

@@ -13,6 +13,7 @@ from catalogs.physical_limits import find_limit_problem, load_physical_limits
 from catalogs.variants import Variant
 
 LIMITS = load_physical_limits()
+TICK_RATE_HZ = 1000
 MOST_CLIPS = 100_000
 """Clips of one grid [1]: a manifest takes 2 kB a clip and every command reads it whole, 200 MB of JSON here."""
 Reference = Annotated[str, Field(min_length=1, max_length=4096)]
@@ -107,6 +108,11 @@ class GridFile(Blocks):
             return self.duration_s
         shown_ms = 1000.0 * (self.frames - 1) / self.frame_rate_hz
         return ceil(shown_ms - 1e-6) / 1000.0
+
+    @property
+    def rows_per_clip(self) -> dict[str, int]:
+        """Rows of every clip in each table of telemetry, the first frame's tick among them [1]."""
+        return {"ticks": round(self.telemetry_s * TICK_RATE_HZ) + 1, "frames": self.frames}
 
     @property
     def keeps_stops_steady(self) -> bool:

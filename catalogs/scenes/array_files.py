@@ -68,8 +68,7 @@ def open_regular(path: Path) -> BufferedReader:
         number = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
     except OSError as error:
         raise InputError(f"{path}: must be a regular file, and no link; {error.strerror}") from None
-    stream = os.fdopen(number, "rb")
     if not stat.S_ISREG(os.fstat(number).st_mode):
-        stream.close()
+        os.close(number)
         raise InputError(f"{path}: must be a regular file; it is none")
-    return stream
+    return os.fdopen(number, "rb")

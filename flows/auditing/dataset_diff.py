@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from flows.making.plan import read_plan
 from flows.store.address import open_for_reading
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
@@ -158,7 +159,8 @@ def _clip_row(
 
 def _read_ticks(layout: Layout, clip: Mapping[str, Any]) -> dict[str, np.ndarray]:
     folder = layout.telemetry / "ticks" / f"family={clip['scenario']['weather']}"
-    return read_columns(folder, clip["clip_id"], [channel.name for channel in TICK_CHANNELS])
+    names = [channel.name for channel in TICK_CHANNELS]
+    return read_columns(folder, clip["clip_id"], names, most=read_plan(layout.root).ticks_per_clip)
 
 
 def _compare_pictures(old: Layout, new: Layout, a: int, b: int) -> dict[str, float] | None:

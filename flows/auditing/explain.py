@@ -74,7 +74,7 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
     scenario, variant = planned.scenario, plan.settings.variant
     folder = layout.telemetry / "frames" / f"family={scenario.weather}"
     names = [channel.name for channel in VIEWS["frames"]]
-    columns = read_columns(folder, planned.clip_id, names, plan.settings.frames)
+    columns = read_columns(folder, planned.clip_id, names, most=plan.settings.frames)
     row, first = ({name: column[i] for name, column in columns.items()} for i in (frame, 0))
     empty = [c.name for c in TICK_CHANNELS for at in (row, first) if not np.isfinite(at[c.name]).all()]
     if empty:

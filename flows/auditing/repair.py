@@ -4,8 +4,6 @@ from collections.abc import Iterable, Mapping
 from pathlib import PurePosixPath
 from typing import Any
 
-import pyarrow.parquet as pq
-
 from flows.auditing.verify import compare_files
 from flows.making.gathering import table_parts, write_part
 from flows.making.generate import create_frame_arrays, fan_out, open_workers
@@ -22,7 +20,7 @@ from flows.store.lock import sole_writer
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
 from flows.store.staging import left_overs, remove_staged, remove_staging, scratch_dataset
-from flows.store.telemetry import write_parquet, write_tables
+from flows.store.telemetry import read_table, write_parquet, write_tables
 from manifests.canonical import sha256_of_file
 from manifests.explain import as_sentences, find_tool_differences, tools_here
 from manifests.manifest import recorded_files
@@ -149,7 +147,7 @@ def restore_files(
                 fan_out(scratch, plan, indices, executor)
         move_in(scratch, [path for clip in manifest["clips"] for path in clip["artifacts"]])
         for table, path, ids in broken:
-            write_part(scratch, table, path, ids)
+            write_part(scratch, table, path, ids, plan.settings.rows_per_clip[table])
         move_in(scratch, [path for _, path, _ in broken])
         _remake_summaries(layout, scratch, plan, manifest, wanted)
         move_in(scratch, [*SUMMARIES, "previews/contact_sheet.png"])
@@ -201,7 +199,7 @@ def _remake_summaries(
     if "previews/contact_sheet.png" in wanted:
         for path, ids in table_parts(plan, "frames").items():
             for clip_id in ids:
-                rows = pq.read_table(layout.root / path, filters=[("clip_id", "==", clip_id)])
+                rows = read_table(layout.root / path, clip_id, most=plan.settings.frames)
                 write_parquet(rows, scratch.staged(clip_id, "frames"))
         write_atomically(
             scratch.previews / "contact_sheet.png", preview_sheet(scratch, layout.frames, plan, receipts)

@@ -108,7 +108,7 @@ class ExportedClip:
         return {name: to_json_value(self.frames[name][frame]) for name in ("frame", "tick", *TICK_COLUMNS)}
 
     def _read(self, file: str, required: Sequence[str], rows: int) -> Columns:
-        return read_columns(self.layout.root / file, self.clip_id, required, rows)
+        return read_columns(self.layout.root / file, self.clip_id, required, most=rows)
 
 
 @dataclass(frozen=True, kw_only=True)

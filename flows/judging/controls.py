@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from catalogs.gates import load_gates
+from catalogs.grids.form import TICK_RATE_HZ
 from catalogs.studies.ablation import cut_coupling
 from catalogs.variants import VARIANTS, Variant
 from flows.drawing import as_svg
@@ -17,7 +18,7 @@ from flows.judging.physics import clip_facts
 from flows.making.catalogue import Catalogue, catalogue_of
 from flows.making.driving import simulate_drive
 from flows.making.places import refuse_changed_scene
-from flows.making.plan import TICK_RATE_HZ, Plan, read_plan
+from flows.making.plan import Plan, read_plan
 from flows.making.traced import refuse_traced
 from flows.running.orchestration import run_as_stage
 from flows.store.address import open_for_reading

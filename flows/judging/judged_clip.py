@@ -108,7 +108,7 @@ def judge_clip(
     cv2.setNumThreads(1)
     catalogue = catalogue_of(view.root)
     rgb, depth, kind = view.arrays(facts["index"], "rgb", "depth", "class")
-    frames = clip_columns(view.root, "frames", facts, len(rgb))
+    frames = clip_columns(view.root, "frames", facts)
     times = np.asarray(frames["t_ns"] * 1e-9, np.float64)
     clip = prepare_for_checks(
         {"rgb": rgb, "depth": depth, "class": kind}, frames, facts["film_depth_mm"], catalogue

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from catalogs.documents import read_yaml
+from catalogs.grids.form import TICK_RATE_HZ
 from catalogs.low_speed import load_kept_low_speed
 from catalogs.studies.ablation import cut_coupling, load_kept_families
 from catalogs.surfaces import load_surface
@@ -13,7 +14,7 @@ from catalogs.variants import warn_of_variant
 from catalogs.vehicles import load_vehicle
 from flows.making.driving import collect_surface_depths, surface_of
 from flows.making.input_changes import refuse_changed_records
-from flows.making.plan import TICK_RATE_HZ, Plan
+from flows.making.plan import Plan, read_plan
 from flows.making.traced import refuse_traced
 from flows.running.orchestration import run_as_stage
 from flows.store.address import open_for_reading, want_telemetry
@@ -97,7 +98,7 @@ def clip_facts(root: Path) -> list[dict[str, Any]]:
     path = layout.telemetry / "clips.parquet"
     known = [channel.name for channel in (*IDENTITY_CHANNELS, *CLIP_CHANNELS)]
     required = [name for name in known if name not in LATER_CLIP_CHANNELS]
-    rows: list[dict[str, Any]] = read_table(path, required=required).to_pylist()
+    rows: list[dict[str, Any]] = read_table(path, required=required, most=len(manifest["clips"])).to_pylist()
     if [row["clip_id"] for row in rows] != [clip["clip_id"] for clip in manifest["clips"]]:
         raise InputError(
             f"{path}: must have a row of each of the manifest's {len(manifest['clips'])} clips, in order; its"
@@ -126,9 +127,7 @@ def drive_facts(root: Path, plan: Plan) -> dict[str, dict[str, Any]]:
     }
 
 
-def clip_columns(
-    root: Path, table: str, facts: dict[str, Any], rows: int | None = None
-) -> dict[str, np.ndarray]:
+def clip_columns(root: Path, table: str, facts: dict[str, Any]) -> dict[str, np.ndarray]:
     """One clip's columns of the tick or the frame table.
 
     Parameters
@@ -136,19 +135,16 @@ def clip_columns(
     root : of the dataset
     table : ``ticks`` or ``frames``
     facts : the clip's row
-    rows : how many there must be; None takes two or more [1]
 
     Raises
     ------
     InputError
-        If the clip or one of the table's columns is not there, or it has another number of rows.
+        If the clip or one of the table's columns is not there, or it has another number of rows than the plan.
     """
     folder = Layout(root).telemetry / table
     channels = TICK_CHANNELS if table == "ticks" else (*FRAME_CHANNELS, *TICK_CHANNELS)
-    columns = read_columns(folder, facts["clip_id"], [channel.name for channel in channels], rows)
-    if len(columns["t_ns"]) < 2:
-        raise InputError(f"{folder}: a clip must have two rows or more; {facts['clip_id']} has one")
-    return columns
+    rows = read_plan(root).settings.rows_per_clip[table]
+    return read_columns(folder, facts["clip_id"], [channel.name for channel in channels], most=rows)
 
 
 def read_constants(root: Path) -> Constants:

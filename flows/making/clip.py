@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from catalogs.grids.form import TICK_RATE_HZ
 from catalogs.scenario import Scenario
 from catalogs.studies.ablation import cut_coupling
 from flows.making.catalogue import Catalogue, catalogue_of
@@ -26,7 +27,7 @@ from flows.making.driving import (
 )
 from flows.making.edited_scene import edit_scene
 from flows.making.places import remember_place
-from flows.making.plan import TICK_RATE_HZ, Plan, frame_ticks, read_plan
+from flows.making.plan import Plan, frame_ticks, read_plan
 from flows.making.traced import replay_drive, unknown_ranges
 from flows.running.processors import measure_peak_memory
 from flows.store.address import find_local, send_files

@@ -91,7 +91,10 @@ def generate_dataset(
             with sole_writer(layout):
                 run_as_stage(prepare_dataset)(layout, plan, inputs)
                 if not layout.manifest.is_file():  # or another run has ended just now
-                    missing = [clip.index for clip in plan.clips if not is_committed(layout, clip.as_json())]
+                    rows = plan.settings.rows_per_clip
+                    missing = [
+                        clip.index for clip in plan.clips if not is_committed(layout, clip.as_json(), rows)
+                    ]
                     with open_workers(layout, plan, runner, workers, scheduler) as executor:
                         cost = run_as_stage(fan_out)(layout, plan, missing, executor)
                         quarantined = run_as_stage(seal_dataset)(layout, plan, executor)

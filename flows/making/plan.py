@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catalogs.grids import FaultyGrid, Grid, GridFile, load_grid
+from catalogs.grids.form import TICK_RATE_HZ
 from catalogs.scenario import Scenario
 from catalogs.vehicles import vehicle_provenance
 from flows.making.grid_inputs import input_sources, read_grid_inputs, recorded_settings
@@ -25,7 +26,6 @@ from manifests.provenance import code_version, library_versions
 from manifests.records import Manifest, PlanRecord
 from tasks.errors import InputError
 
-TICK_RATE_HZ = 1000
 _AS_WRITTEN: dict[str, Any] = {"indent": 1, "sort_keys": True, "allow_nan": False, "ensure_ascii": False}
 _HELD: dict[Path, "Plan"] = {}
 """Plans of the runs of this process, which it need not read again."""
@@ -80,7 +80,7 @@ class Plan:
     @property
     def ticks_per_clip(self) -> int:
         """Rows of every clip in the tick table, the first frame's among them [1]."""
-        return round(self.duration_s * TICK_RATE_HZ) + 1
+        return self.settings.rows_per_clip["ticks"]
 
     def as_json(self) -> dict[str, Any]:
         return self.head_as_json() | {"clips": [clip.as_json() for clip in self.clips]}

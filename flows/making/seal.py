@@ -109,7 +109,7 @@ def preview_sheet(layout: Layout, pictures_at: Path, plan: Plan, receipts: Seque
     rows = []
     for receipt in pick_evenly(receipts, PREVIEW_CLIPS):
         pictures = list(read_clip(pictures_at, receipt["index"], "rgb", frames))
-        columns = read_columns(layout.staged(receipt["clip_id"], "frames"))
+        columns = read_columns(layout.staged(receipt["clip_id"], "frames"), most=plan.settings.frames)
         label = receipt["label"] + (" (quarantined)" if is_quarantined(receipt) else "")
         rows.append((label, pictures, {"speed": columns["speed"], "pitch": columns["pitch"]}))
     return encode_png(draw_contact_sheet(rows, frames, plan.settings.frame_rate_hz))

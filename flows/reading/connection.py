@@ -9,16 +9,15 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from catalogs.sentences import shorten
-from flows.reading.table_files import SCHEME, TableFiles, table_files
+from flows.reading.table_files import SCHEME, TableFiles, bound_rows, table_files
 from flows.store.address import open_for_reading, want_telemetry
 from flows.store.layout import Layout
+from flows.store.parquet_files import refuse_footer
 from flows.store.sealed import read_manifest_head
 from manifests.manifest import is_traced
 from tasks.conventions import CHECK_CHANNELS, LATER_CHECK_CHANNELS
 from tasks.errors import InputError
 
-MOST_COLUMNS = 500
-"""Of a table [1]: ten times what muSync writes; DuckDB takes minutes for some thousands."""
 _SETTINGS: dict[str, str | bool | int | float | list[str]] = {
     "autoinstall_known_extensions": False,
     "autoload_known_extensions": False,
@@ -58,9 +57,12 @@ def connect_sealed(
     half of the machine's memory, and none of its disk: a query that needs more ends with an error.
     """
     tables, traced = table_files(layout, manifest), is_traced(manifest["inputs"])
+    most = bound_rows(manifest, layout)
+    for table, names in tables.items():
+        refuse_footer(next(iter(names.values())), most[table])
     connection = duckdb.connect(config=_SETTINGS if allow_files else _SETTINGS | _CLOSED)
     paths = {name: path for names in tables.values() for name, path in names.items()}
-    connection.register_filesystem(TableFiles(paths))
+    connection.register_filesystem(TableFiles(paths, most))
     if not allow_files:
         connection.execute(f"SET allowed_paths = {_format_list(map(_make_address, paths))}")
         connection.execute("SET enable_external_access = false")
@@ -92,8 +94,6 @@ def _select_columns(table: str, first: Path, traced: bool) -> str:
     Of a car that was driven every tick has every number, and the largest table is read as it is.
     """
     schema = pq.read_schema(first)
-    if len(schema) > MOST_COLUMNS:
-        raise pa.ArrowInvalid(f"{table} must have at most {MOST_COLUMNS} columns; it has {len(schema)}")
     if table == "ticks" and not traced:
         return "*"
     floats = [field.name for field in schema if str(field.type) == "double"]

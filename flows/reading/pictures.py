@@ -70,7 +70,8 @@ def open_labelled_frames(layout: Layout, manifest: Mapping[str, Any]) -> Any:
     except ImportError:
         raise InputError("xarray is not installed: pip install 'musync-gs[analysts]'") from None
     # it imports what makes clips, which a query need not wait for
-    from flows.making.plan import TICK_RATE_HZ, frame_ticks
+    from catalogs.grids.form import TICK_RATE_HZ
+    from flows.making.plan import frame_ticks
 
     try:
         pixels = xarray.open_zarr(

@@ -113,5 +113,5 @@ def _draw_pictures(layout: Layout, row: Mapping[str, Any], traces: bool) -> list
     if not traces:
         return pictures
     names = [trace.column for trace in TRACES]
-    columns = read_columns(layout.telemetry / "frames", row["clip_id"], names, len(pictures))
+    columns = read_columns(layout.telemetry / "frames", row["clip_id"], names, most=len(pictures))
     return [add_traces(picture, columns, frame) for frame, picture in enumerate(pictures)]

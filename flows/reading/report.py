@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catalogs.cameras import load_camera
+from catalogs.grids.form import TICK_RATE_HZ
 from catalogs.variants import warn_of_variant
 from flows.making.input_changes import refuse_changed_records
-from flows.making.plan import TICK_RATE_HZ, Plan
+from flows.making.plan import Plan
 from flows.making.seal import pick_evenly
 from flows.pages import DATASET_PAGE, read_plotly
 from flows.reading.film import write_film
@@ -197,7 +198,7 @@ def _make_clip_files(
     """Return the content of a clip's files by name: its telemetry, and its film where it has a frame rate."""
     clip_id, names = row["clip_id"], [channel.name for channel in TICK_CHANNELS]
     folder = layout.telemetry / "ticks" / f"family={row['scenario']['weather']}"
-    ticks = read_columns(folder, clip_id, names, rows)
+    ticks = read_columns(folder, clip_id, names, most=rows)
     packed = _format_script(pack_columns(ticks, names))
     files: dict[str, str | bytes | memoryview] = {
         _traces_name(row): f"clipArrived({_format_script(clip_id)}, {packed});\n"

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flows.making.plan import read_plan
 from flows.making.seal import PREVIEW_CLIPS, pick_evenly
 from flows.store.address import open_for_reading
 from flows.store.frames import read_clip
@@ -107,10 +108,7 @@ def _choose_station(asked: float | None, drives: Sequence[tuple[Layout, Mapping[
     InputError
         If no clip comes to the one that is asked for.
     """
-    ways = [
-        read_columns(layout.telemetry / "frames", clip["clip_id"], ["station"])["station"]
-        for layout, clip in drives
-    ]
+    ways = [_read_frames(layout, clip, ["station"])["station"] for layout, clip in drives]
     if asked is None:
         return float(min([STATION_M, *(way[-1] for way in ways)]))
     if ways and not any(way[0] <= asked <= way[-1] for way in ways):
@@ -119,6 +117,11 @@ def _choose_station(asked: float | None, drives: Sequence[tuple[Layout, Mapping[
             f"--station must lie in {first:.1f} to {last:.1f} m, where a clip of the sheet has frames; it is {asked:g}"
         )
     return asked
+
+
+def _read_frames(layout: Layout, clip: Mapping[str, Any], names: list[str]) -> dict[str, NDArray[Any]]:
+    frames = read_plan(layout.root).settings.frames
+    return read_columns(layout.telemetry / "frames", clip["clip_id"], names, most=frames)
 
 
 def _draw_contact(layout: Layout, clip: Mapping[str, Any], *twin: Mapping[str, Any]) -> list[Picture]:
@@ -147,7 +150,7 @@ def is_flat_twin(other: Mapping[str, Any], clip: Mapping[str, Any]) -> bool:
 
 def _draw_still(layout: Layout, clip: Mapping[str, Any], station: float, caption: str) -> Picture:
     """The frame nearest to a station, and a caption with the body's pitch in it, and whether the car comes so far."""
-    columns = read_columns(layout.telemetry / "frames", clip["clip_id"], ["station", "pitch"])
+    columns = _read_frames(layout, clip, ["station", "pitch"])
     frame = int(np.argmin(np.abs(columns["station"] - station)))
     pitch = np.rad2deg(columns["pitch"][frame])
     if columns["station"][-1] < station:

@@ -20,7 +20,8 @@ from fsspec import AbstractFileSystem  # type: ignore[import-untyped]
 
 from catalogs.sentences import shorten, shorten_value
 from flows.store.layout import Layout
-from flows.store.telemetry import CHECKED
+from flows.store.parquet_files import CHECKED, CLIPS_PER_FILE, refuse_footer
+from flows.store.sealed import recorded_grid
 from tasks.errors import InputError
 
 if TYPE_CHECKING:
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 
 SCHEME = "musync"
 STORED = ("clips", "ticks", "frames", "pairs")
+MOST_ROWS = {"clips": 100_000, "pairs": 10_000_000}
+"""Rows of the tables that hold a dataset's clips, and the pairs of them, in one file [1]."""
 _WHOLE = re.compile(r"telemetry/(?P<table>clips|pairs)\.parquet")
 _PART = re.compile(r"telemetry/(?P<table>ticks|frames)/family=[a-z0-9_-]{1,64}/part-[0-9]{4,9}\.parquet")
 
@@ -60,6 +63,18 @@ def table_files(layout: Layout, manifest: Mapping[str, Any]) -> dict[str, dict[s
     return tables
 
 
+def bound_rows(manifest: Mapping[str, Any], place: object) -> dict[str, int]:
+    """Return how many rows a file of each table may have by the grid of its dataset.
+
+    Parameters
+    ----------
+    manifest : of the dataset
+    place : what messages call it
+    """
+    clip_rows = recorded_grid(manifest["grid"], place).rows_per_clip
+    return {table: rows * CLIPS_PER_FILE for table, rows in clip_rows.items()} | MOST_ROWS
+
+
 def open_stored_table(layout: Layout, manifest: Mapping[str, Any], table: str) -> "pyarrow.dataset.Dataset":
     """Return a stored table, clips, ticks, frames or pairs, as a lazy pyarrow dataset; its schema has the units.
 
@@ -71,6 +86,8 @@ def open_stored_table(layout: Layout, manifest: Mapping[str, Any], table: str) -
     from pyarrow import dataset  # it imports pandas, which takes a third of a second
 
     paths = list(table_files(layout, manifest)[table].values())
+    for path in paths:
+        refuse_footer(path, bound_rows(manifest, layout)[table])
     try:
         # without the metadata of the whole: libraries read settings for other libraries there
         schema = pq.read_schema(paths[0]).remove_metadata()
@@ -100,18 +117,21 @@ class TableFiles(AbstractFileSystem):
     Parameters
     ----------
     files : name to path
+    most : rows that a file of each table may have [1]
     """
 
     protocol = SCHEME
     cachable = False
 
-    def __init__(self, files: Mapping[str, Path]):
+    def __init__(self, files: Mapping[str, Path], most: Mapping[str, int]):
         super().__init__()
-        self.files = dict(files)
+        self.files, self.most = dict(files), dict(most)
 
     def _open(self, path: str, mode: str = "rb", **_: Any) -> "_TableFile":
         if mode != "rb":
             raise PermissionError(f"{path}: a query does not write to a dataset")
+        table = re.split(r"[/.]", self._strip_protocol(path))[0]
+        refuse_footer(self._path(path), self.most[table])
         return _TableFile(self._path(path))
 
     def info(self, path: str, **_: Any) -> dict[str, Any]:

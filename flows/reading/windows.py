@@ -19,7 +19,7 @@ from flows.store.arrays import arrays_of
 from flows.store.frame_metadata import check_array, check_frames, read_local_metadata
 from flows.store.frames import read_frames
 from flows.store.layout import Layout
-from flows.store.telemetry import CHECKED
+from flows.store.parquet_files import CHECKED, CLIPS_PER_FILE, refuse_footer
 from manifests.manifest import is_quarantined
 from tasks.errors import InputError
 
@@ -227,6 +227,7 @@ def _clip_values(file: Path, columns: Sequence[str], frames: int) -> dict[str, n
     InputError
         If it does not hold ``frames`` rows of each of its clips, one after the other, with these columns as numbers.
     """
+    refuse_footer(file, frames * CLIPS_PER_FILE)
     try:
         table = pq.read_table(file, columns=["clip_id", *columns], partitioning=None, **CHECKED)
         numbers = [table[name].to_numpy().astype(np.float32) for name in columns]

@@ -2,6 +2,7 @@
 
 import errno
 import os
+import re
 import stat
 import sys
 import tempfile
@@ -23,6 +24,14 @@ LONGEST, MOST = 2000, 200
 """Characters of a sentence, and sentences, that are printed."""
 MOST_BYTES = 2**20
 """Of a traceback that is kept [B]."""
+_MEMORY = re.compile(
+    r"(?i)cannot allocate memory|can't allocate memory|failed to map segment|can't start new thread|out of memory"
+)
+"""What the loader of libraries, threads and allocators say."""
+OUT_OF_MEMORY = (
+    "memory ran out; what is committed is kept: raise the limit (ulimit -v), give fewer --workers, or fewer or"
+    " smaller frames, and run the same command again"
+)
 AGAIN = "what is committed is kept: {} and run the same command again"
 FULL = {
     errno.ENOSPC: "the disk is full; " + AGAIN.format("free space"),
@@ -71,10 +80,10 @@ def explain_end(error: BaseException, given: Sequence[str]) -> tuple[int, list[s
     sentence = input_sentence(error, given)
     if sentence is not None:
         return INPUT_WRONG, [sentence]
+    if is_out_of_memory(error):
+        return INPUT_WRONG, [OUT_OF_MEMORY]
     if isinstance(error, ClipsFailed):
         sentence = str(error)
-    elif isinstance(error, MemoryError):
-        sentence = "memory ran out; give fewer --workers, or fewer or smaller frames"
     else:
         said = cut_middle(" ".join(f"{type(error).__name__}: {error}".split()), 300)
         sentence = f"a defect of muSync, not of your input, ended the command ({said})"
@@ -85,6 +94,19 @@ def explain_end(error: BaseException, given: Sequence[str]) -> tuple[int, list[s
         else f"lies in {file}: please report it with that file"
     )
     return BROKEN, [f"{cut_middle(sentence, LONGEST)}; the traceback {where}"]
+
+
+def is_out_of_memory(error: BaseException) -> bool:
+    """Whether an error, or what it came from, says that memory ran out: each library has its own way."""
+    while True:
+        if isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno == errno.ENOMEM):
+            return True
+        if isinstance(error, ImportError | RuntimeError) and _MEMORY.search(str(error)):
+            return True
+        before = error.__cause__ or error.__context__
+        if before is None:
+            return False
+        error = before
 
 
 def input_sentence(error: BaseException, given: Sequence[str]) -> str | None:

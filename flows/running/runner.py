@@ -122,7 +122,7 @@ def end_with_parent() -> None:
 @contextmanager
 def _dask_client(workers: int, scheduler: str | None, warm: Callable[[], Any] | None) -> Iterator[Any]:
     import dask
-    from distributed import Client, LocalCluster
+    from distributed import Client, LocalCluster, Security
 
     from flows.running.cluster import check_cluster, check_joining, share_gpus, warm_cluster
 
@@ -139,6 +139,8 @@ def _dask_client(workers: int, scheduler: str | None, warm: Callable[[], Any] | 
                 processes=True,
                 dashboard_address="127.0.0.1:0",
                 silence_logs=40,
+                # certificates of this run alone: without them any user of this machine has its workers run code
+                security=Security.temporary(),
             ) as cluster,
             Client(cluster) as client,
         ):

@@ -29,13 +29,12 @@ from prefect.tasks import exponential_backoff
 from catalogs.grids import load_grid
 from flows.running.prefect_progress import RunProgress
 from flows.running.progress import watch_progress
-from flows.running.runner import RunnerName
+from flows.running.runner import RunnerName, end_with_parent
 from flows.scheduled.failure_report import is_told_of, report_failure, report_run
 from flows.scheduled.lateness import watch_lateness
-from flows.scheduled.notification import WHEN_NONE_IS_NAMED
 from flows.scheduled.retention import remove_oldest
 from flows.scheduled.scheduling import recorded_run
-from flows.scheduled.serving import serve_flow
+from flows.scheduled.serving import read_options, serve_flow
 from flows.store.objects import is_address
 from tasks.errors import InputError
 
@@ -62,7 +61,7 @@ make_dataset = task(
 
 def _name_run() -> str:
     """Grid, clips and time of a run; a faulty grid has no number of clips, and fails later with its faults."""
-    asked = flow_run.parameters["grid"]
+    asked = read_options(flow_run.parameters)["grid"]
     try:
         grid = load_grid(asked)
         what = f"{grid.settings.name}, {len(grid.scenarios)} clips"
@@ -74,12 +73,10 @@ def _name_run() -> str:
 
 def _report_crash(flow: Any, flow_run: Any, state: Any) -> None:
     """A run whose process was killed cannot report by itself: whoever started it does."""
-    asked = flow_run.parameters
+    options = read_options(flow_run.parameters)
     at = flow_run.expected_start_time or datetime.now(UTC)
-    notify = (
-        asked.get("notify") if is_told_of("failed", asked.get("notify_on") or WHEN_NONE_IS_NAMED) else None
-    )
-    report_failure(asked["grid"], asked["root"], at, RuntimeError(state.message), notify)
+    notify = options["notify"] if is_told_of("failed", options["notify_on"]) else None
+    report_failure(options["grid"], options["root"], at, RuntimeError(state.message), notify)
 
 
 @flow(name="musync-scheduled", flow_run_name=_name_run, persist_result=False, on_crashed=[_report_crash])
@@ -89,12 +86,23 @@ def scheduled(
     runner: RunnerName = "dask",
     workers: int | None = None,
     scheduler: str | None = None,
-    notify: str | None = None,
-    notify_on: str = WHEN_NONE_IS_NAMED,
     keep: int | None = None,
 ) -> str:
-    """Make one dated dataset of a grid, or finish an unfinished one; returns where it lies."""
-    at = flow_run.scheduled_start_time or datetime.now(UTC)
+    """Make one dated dataset of a grid, or finish an unfinished one; returns where it lies.
+
+    The parameters count on a work pool alone (see `flows.scheduled.serving.read_options`).
+    """
+    end_with_parent()
+    given = {"runner": runner, "workers": workers, "scheduler": scheduler}
+    return _make_dataset_at(
+        flow_run.scheduled_start_time or datetime.now(UTC),
+        **read_options({"grid": grid, "root": root, "keep": keep, **given}),
+    )
+
+
+def _make_dataset_at(
+    at: datetime, grid: str, root: str, keep: int | None, notify: str | None, notify_on: str, **execution: Any
+) -> str:
     log = get_run_logger()
 
     def tell(event: str, facts: dict[str, str]) -> None:
@@ -106,7 +114,7 @@ def scheduled(
             watch_progress(RunProgress()),
             watch_lateness(at, _next_time(), lambda sentence: tell("late", {"why": sentence})),
         ):
-            result = make_dataset(grid, root, at=at, runner=runner, workers=workers, scheduler=scheduler)
+            result = make_dataset(grid, root, at=at, **execution)
     except Exception as error:
         report_failure(grid, root, at, error, notify if is_told_of("failed", notify_on) else None)
         raise
@@ -168,6 +176,6 @@ def _next_time() -> datetime | None:
     return runs[0].expected_start_time if runs else None
 
 
-def serve_schedule(every: str, parameters: dict[str, Any]) -> None:
+def serve_schedule(every: str, options: dict[str, Any]) -> None:
     """Serve `scheduled` (see `flows.scheduled.serving.serve_flow`)."""
-    serve_flow(scheduled, every, parameters)
+    serve_flow(scheduled, every, options)

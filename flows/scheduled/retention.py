@@ -53,8 +53,9 @@ def remove_oldest(grid: str, root: str, keep: int) -> tuple[list[str], list[str]
 
 def _made_in_folder(root: str, grid: str) -> Iterator[str]:
     for left in Path(root).glob(f"{REMOVED}*"):  # of a run that was killed while it removed them
-        if dated(grid).fullmatch(left.name.removeprefix(REMOVED)) and left.is_dir() and not left.is_symlink():
-            shutil.rmtree(left, ignore_errors=True)
+        name = left.name.removeprefix(REMOVED)
+        if dated(grid).fullmatch(name) and left.is_dir() and not left.is_symlink():
+            _end_removal(root, name)
     for folder in Path(root).iterdir():
         if not dated(grid).fullmatch(folder.name) or folder.is_symlink() or not folder.is_dir():
             continue
@@ -90,9 +91,14 @@ def _remove_folder(root: str, name: str) -> bool:
             folder.rename(gone)  # at once, so that nobody meets a half of it
     except (InputError, OSError):
         return False
-    shutil.rmtree(gone, ignore_errors=True)
-    (Path(root) / record_name(name)).unlink(missing_ok=True)
+    _end_removal(root, name)
     return True
+
+
+def _end_removal(root: str, name: str) -> None:
+    """Remove what is left of a dataset that has its other name; the folder last, from which the next run goes on."""
+    (Path(root) / record_name(name)).unlink(missing_ok=True)
+    shutil.rmtree(Path(root) / f"{REMOVED}{name}", ignore_errors=True)
 
 
 def _remove_objects(root: str, name: str) -> bool:

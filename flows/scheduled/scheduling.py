@@ -2,6 +2,8 @@
 
 import os
 import re
+import signal
+import sys
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
@@ -10,10 +12,10 @@ from typing import Any
 
 from flows.making.generate import generate_dataset
 from flows.making.plan import make_plan
+from flows.running.prefect_server import prefect_api
 from flows.running.runner import RunnerName, list_runner_problems
 from flows.scheduled.failure_report import format_stamp
 from flows.scheduled.notification import EVENTS, WHEN_NONE_IS_NAMED, notify_problem
-from flows.scheduled.prefect_server import prefect_api
 from flows.scheduled.retention import dated
 from flows.scheduled.run_record import find_run_id, keep_record
 from flows.store.address import PREPARED, stored_bytes
@@ -231,10 +233,12 @@ def serve_grid(
     InputError
         Listing every parameter that is wrong.
     """
-    parameters = checked_parameters(grid, every, out, notify=notify, notify_on=notify_on, **execution)
+    options = checked_parameters(grid, every, out, notify=notify, notify_on=notify_on, **execution)
     if not is_address(out):
         Path(out).mkdir(parents=True, exist_ok=True)
-    with prefect_api():
+    # until the runner takes over, and after it
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    with prefect_api(pages=True):
         from flows.scheduled.prefect_schedule import serve_schedule
 
-        serve_schedule(every, parameters | {"keep": keep})
+        serve_schedule(every, options | {"keep": keep})

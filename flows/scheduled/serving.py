@@ -1,7 +1,11 @@
 """Serve a schedule's flow from this process until it is stopped, and leave no run behind that only seems to go on."""
 
 import asyncio
+import json
 import logging
+import os
+from collections.abc import Mapping
+from inspect import signature
 from multiprocessing import active_children
 from pathlib import Path
 from time import monotonic
@@ -23,11 +27,17 @@ from prefect.exceptions import PrefectException
 from prefect.runner import Runner
 from prefect.states import Cancelled
 
+from flows.scheduled.notification import WHEN_NONE_IS_NAMED
+
 AT_ONCE = 1
 """Of two runs that fall due together the second waits: both would want the same processors."""
 STOP_S = 30.0
 """For a run to close its workers."""
 LOOK_S = 0.5
+OPTIONS = "MUSYNC_SCHEDULE"
+"""Variable with the options of a schedule's runs as JSON, which the serving process sets for them."""
+NOT_A_RUNS = {"notify": None, "notify_on": WHEN_NONE_IS_NAMED}
+"""Options that no run's parameter sets: they name commands."""
 UNDER_WAY = [StateType.PENDING, StateType.RUNNING, StateType.PAUSED, StateType.CANCELLING]
 
 
@@ -62,23 +72,25 @@ class StoppableRunner(Runner):
         loop.call_later(LOOK_S, self._end_runs, loop)
 
 
-def serve_flow(flow: Flow[..., Any], every: str, parameters: dict[str, Any]) -> None:
+def serve_flow(flow: Flow[..., Any], every: str, options: dict[str, Any]) -> None:
     """Register the flow with its schedule and run what falls due, one run at a time, until stopped.
 
     Parameters
     ----------
     flow : with ``grid`` among its parameters
     every : cron expression, UTC
-    parameters : of the flow
+    options : of every run, as of `read_options`; those that are parameters of the flow are shown by the server
     """
+    os.environ[OPTIONS] = json.dumps(options)
+    shown = {name: value for name, value in options.items() if name in signature(flow.fn).parameters}
     # Prefect cancels a connection of its own when it is stopped, and asyncio writes forty lines about that
     logging.getLogger("asyncio").setLevel(logging.CRITICAL)
-    runner = StoppableRunner(name=f"musync-{Path(parameters['grid']).stem}", limit=AT_ONCE)
+    runner = StoppableRunner(name=f"musync-{Path(options['grid']).stem}", limit=AT_ONCE)
     deployment = runner.add_flow(
         flow,
         name=runner.name,
         cron=every,
-        parameters=parameters,
+        parameters=shown,
         concurrency_limit=AT_ONCE,
         entrypoint_type=EntrypointType.MODULE_PATH,
     )
@@ -89,6 +101,18 @@ def serve_flow(flow: Flow[..., Any], every: str, parameters: dict[str, Any]) -> 
     finally:
         _stop_runs()
         cancel_runs(cast(UUID, deployment))  # Prefect's type is that of both its ways to call it
+
+
+def read_options(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """The options of a run: those of the process that serves its schedule, whatever the run's parameters say.
+
+    A run's parameters come from the server, and may be as old as its database or anybody's who may talk to it.
+
+    Parameters
+    ----------
+    parameters : of the run, which count on a work pool, where no process serves; ``notify`` and ``notify_on`` never do
+    """
+    return {**parameters, **NOT_A_RUNS, **json.loads(os.environ.get(OPTIONS, "{}"))}
 
 
 def _stop_runs() -> None:

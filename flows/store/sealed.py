@@ -4,8 +4,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import pyarrow as pa
-import pyarrow.parquet as pq
 from pydantic import ValidationError
 
 from catalogs.documents import LARGEST_JSON, parse_json, read_content
@@ -14,6 +12,7 @@ from catalogs.grids.form import BEFORE
 from catalogs.sentences import cap_problems, describe_rules, shorten_value
 from flows.store.arrays import arrays_of
 from flows.store.layout import RECORD, STAGED_TABLES, Layout, read_json
+from flows.store.parquet_files import refuse_rows
 from manifests.canonical import sha256_of_file
 from manifests.manifest import MANIFEST_FORMAT, head_of_sealed, is_sealed
 from manifests.records import Manifest, ManifestHead, PlanRecord, Receipt, check_record
@@ -225,15 +224,17 @@ def read_receipt(layout: Layout, clip_id: str) -> Receipt:
     return receipt
 
 
-def is_committed(layout: Layout, planned: Mapping[str, Any]) -> bool:
-    """Whether a clip need not be made again: its receipt is sound and of the plan, and in a folder its files are there.
+def is_committed(layout: Layout, planned: Mapping[str, Any], rows: Mapping[str, int]) -> bool:
+    """Whether a clip need not be made again: its receipt is sound and of the plan, and its files are of the receipt.
 
-    In an object store the receipt is sent last and stands for the rest.
+    Held against it are the hashes of its pictures, and the rows and the clip of its tables. In an object store
+    the receipt is sent last and stands for the rest. That the values follow from the inputs is seen by an audit alone.
 
     Parameters
     ----------
     layout : the dataset
     planned : the clip as the plan records it
+    rows : of a clip by table [1]
     """
     clip_id = planned["clip_id"]
     if not layout.receipt(clip_id).is_file():
@@ -242,13 +243,13 @@ def is_committed(layout: Layout, planned: Mapping[str, Any]) -> bool:
         receipt = read_receipt(layout, clip_id)
         if {**receipt, **planned} != receipt:
             return False
-        tables = [layout.staged(clip_id, table) for table in STAGED_TABLES]
         if layout.origin is None:
-            for table in tables:
-                pq.read_schema(table)
-    except (InputError, pa.ArrowException, OSError):
+            for table in STAGED_TABLES:
+                refuse_rows(layout.staged(clip_id, table), clip_id, rows[table])
+            refuse_changed_files(layout, receipt["artifacts"])
+    except (InputError, OSError):
         return False
-    return layout.origin is not None or all((layout.root / path).is_file() for path in receipt["artifacts"])
+    return True
 
 
 def recorded_grid(content: Mapping[str, Any], place: object) -> GridFile:

@@ -1,6 +1,6 @@
 """Telemetry as Arrow tables and Parquet files, labelled from the one table of conventions."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -9,18 +9,14 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from catalogs.sentences import shorten
 from flows.store.layout import write_pieces
+from flows.store.parquet_files import CHECKED, CLIPS_PER_FILE, STAGED, call_reader, refuse_footer
 from manifests.canonical import sha256_of
 from tasks.conventions import CHANNELS_BY_NAME, Channel
 from tasks.errors import InputError
 
 ROW_GROUP_ROWS = 100_000
 SHOWN_COLUMNS = 8
-SEALED = "musync repair makes it again"
-STAGED = "remove it, and the same musync generate command makes its clip again"
-CHECKED: Mapping[str, Any] = {"page_checksum_verification": True}
-"""How pyarrow is to read Parquet: each page is held against the checksum that it was written with."""
 
 
 def labelled_table(columns: Mapping[str, Any], constants: Mapping[str, Any] | None = None) -> pa.Table:
@@ -131,28 +127,32 @@ def _parquet_pieces(tables: Iterable[pa.Table]) -> Iterator[bytes]:
     pa.default_memory_pool().release_unused()  # what encoding took, which it would keep for the next time
 
 
-def read_parts(paths: Iterable[Path]) -> Iterator[pa.Table]:
+def read_parts(paths: Iterable[Path], most: int) -> Iterator[pa.Table]:
     """Yield the tables of files one at a time, with common dictionaries: together they are one table.
 
     Parameters
     ----------
     paths : Parquet files of one schema, fewer than a process may have open
+    most : rows that each may have [1]
 
     Raises
     ------
     InputError
         If one is missing, or is no table as muSync writes it.
     """
+    paths = list(paths)
+    for path in paths:
+        refuse_footer(path, most, STAGED)
     # without buffers ahead, which a file would hold until it is closed
     options = {"pre_buffer": False, **CHECKED}
-    files = [(path, _read_file(path, pq.ParquetFile, path, remedy=STAGED, **options)) for path in paths]
+    files = [(path, call_reader(path, pq.ParquetFile, path, remedy=STAGED, **options)) for path in paths]
     encoded = [field.name for field in files[0][1].schema_arrow if pa.types.is_dictionary(field.type)]
     constants = pa.concat_tables(
-        _read_file(path, file.read, encoded, remedy=STAGED, use_threads=False) for path, file in files
+        call_reader(path, file.read, encoded, remedy=STAGED, use_threads=False) for path, file in files
     ).unify_dictionaries()
     common = {name: constants[name].chunk(0).slice(0, 0) for name in encoded}
     for path, file in files:
-        table = _read_file(path, file.read, remedy=STAGED, use_threads=False)
+        table = call_reader(path, file.read, remedy=STAGED, use_threads=False)
         file.close()
         _refuse_columns(table, path)
         for name, empty in common.items():
@@ -162,7 +162,9 @@ def read_parts(paths: Iterable[Path]) -> Iterator[pa.Table]:
         yield table
 
 
-def read_table(path: Path, clip_id: str | None = None, required: Iterable[str] = ()) -> pa.Table:
+def read_table(
+    path: Path, clip_id: str | None = None, required: Iterable[str] = (), *, most: int
+) -> pa.Table:
     """A Parquet file, or a folder of them.
 
     Parameters
@@ -170,30 +172,20 @@ def read_table(path: Path, clip_id: str | None = None, required: Iterable[str] =
     path : file or folder
     clip_id : clip whose rows are read; None takes all
     required : names of columns that must be there
+    most : rows of the clip, or without one of the table, by the plan: no file has more than those of `CLIPS_PER_FILE`
+        clips [1]
 
     Raises
     ------
     InputError
         If there is no such file, it is no table as muSync writes it, lacks a column, or has no row of the clip.
     """
+    for file in sorted(path.rglob("*.parquet")) if path.is_dir() else [path]:
+        refuse_footer(file, most if clip_id is None else most * CLIPS_PER_FILE)
     filters = None if clip_id is None else [("clip_id", "==", clip_id)]
-    table = _read_file(path, pq.read_table, path, filters=filters, **CHECKED)
+    table = call_reader(path, pq.read_table, path, filters=filters, **CHECKED)
     _refuse_columns(table, path, required, clip_id)
     return table
-
-
-def _read_file(
-    path: Path, read: Callable[..., Any], *arguments: Any, remedy: str = SEALED, **options: Any
-) -> Any:
-    """Call a reader of Parquet, whose errors become sentences about the file."""
-    try:
-        return read(*arguments, **options)
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file; is this a finished muSync dataset?") from None
-    except (pa.ArrowException, OSError, ValueError, TypeError) as error:
-        raise InputError(
-            f"{path}: must be a Parquet table as muSync writes it; {shorten(error)}: {remedy}"
-        ) from None
 
 
 def _refuse_columns(
@@ -222,24 +214,24 @@ def _refuse_columns(
 
 
 def read_columns(
-    path: Path, clip_id: str | None = None, required: Iterable[str] = (), rows: int | None = None
+    path: Path, clip_id: str | None = None, required: Iterable[str] = (), *, most: int, exact: bool = True
 ) -> dict[str, np.ndarray]:
     """The columns of `read_table` as NumPy arrays.
 
     Parameters
     ----------
-    path, clip_id, required : as of `read_table`
-    rows : how many there must be; None takes any number [1]
+    path, clip_id, required, most : as of `read_table`
+    exact : whether the clip must have just as many rows
 
     Raises
     ------
     InputError
         As `read_table` raises it, or for another number of rows.
     """
-    table = read_table(path, clip_id, required)
-    if rows is not None and len(table) != rows:
+    table = read_table(path, clip_id, required, most=most)
+    if exact and len(table) != most:
         raise InputError(
-            f"{path}: must hold {rows} rows of clip {clip_id}; it holds {len(table)}: musync repair makes the table"
+            f"{path}: must hold {most} rows of clip {clip_id}; it holds {len(table)}: musync repair makes the table"
             " again"
         )
     return table_columns(table)

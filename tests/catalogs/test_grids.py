@@ -52,6 +52,12 @@ def test_how_frames_are_compressed_stands_in_the_record_only_where_it_was_asked_
         load_grid(str(grid_file(tmp_path, body + "compression: zip\n")))
 
 
+def test_a_name_that_commands_take_for_an_option_is_refused(tmp_path):
+    """It names folders: `rm *` beside one called -rf removes what lies in the others."""
+    with pytest.raises(InputError, match="begin with another character than -"):
+        load_grid(str(grid_file(tmp_path, "name: -rf\naxes: {weather: {dry: {weather: dry}}}\n")))
+
+
 def test_all_faults_of_a_file_are_listed_at_once_each_with_its_place(tmp_path):
     path = grid_file(
         tmp_path,

@@ -129,6 +129,25 @@ def test_tables_with(stage, attack):
         assert refused(outcomes["audit-physics"])
 
 
+@pytest.mark.parametrize(
+    ("attack", "alter"),
+    [
+        ("rows", lambda table: pa.concat_tables([table] * 120)),
+        ("characters in a column's name", lambda table: typed(table, "x" * 2_000_000, pa.bool_(), True)),
+    ],
+    ids=["rows beyond the plan", "a name of two megabytes"],
+)
+def test_what_the_footer_tells_beyond_the_plan_is_refused_before_a_row_is_read(stage, attack, alter):
+    """Ten megabytes hold a hundred million rows."""
+    for path in tables(stage):
+        if path.parent.name.startswith("family="):
+            pq.write_table(alter(pq.read_table(path, partitioning=None)), path)
+    reseal(stage.dataset)
+    outcomes = endure(stage, "sql", "open tables", "explain", "audit-physics", "sheets")
+    assert {name for name, said in outcomes.items() if attack not in str(said)} == set()
+    assert "must have at most" in str(outcomes["audit-physics"])
+
+
 def test_folders_and_files_that_the_manifest_does_not_name_are_no_tables(stage):
     part = stage.dataset.telemetry / "ticks" / "family=dry" / "part-0000.parquet"
     for family in ("family=../../victim", "family='; ATTACH 'x", "family=dry", "family=a=b"):

@@ -5,6 +5,7 @@ import shutil
 from collections.abc import Callable
 from typing import Any
 
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -64,6 +65,11 @@ def staged_link(stage: Stage) -> None:
     path.symlink_to(stage.victim / "clips.parquet")
 
 
+def change_rows(stage: Stage, change: Callable[[pa.Table], pa.Table]) -> None:
+    path = stage.dataset.staged(clip_of(stage, 0), "frames")
+    write_parquet(change(pq.read_table(path)), path)
+
+
 def lock_link(stage: Stage) -> None:
     lock = stage.dataset.staging / "lock"
     lock.unlink(missing_ok=True)
@@ -89,6 +95,14 @@ RECEIPTS: dict[str, Callable[[Stage], object]] = {
     "of a clip that is not there": lambda s: shutil.rmtree(s.dataset.frames / "rgb" / "c" / "0"),
     "whose rows are a link": staged_link,
     "whose rows are no Parquet": lambda s: s.dataset.staged(clip_of(s, 0), "frames").write_bytes(b"PAR1PAR1"),
+    "whose pictures are another clip's": lambda s: shutil.copyfile(
+        s.dataset.frame_shard("rgb", 1), s.dataset.frame_shard("rgb", 0)
+    ),
+    "whose rows are another clip's": lambda s: shutil.copyfile(
+        s.dataset.staged(clip_of(s, 1), "ticks"), s.dataset.staged(clip_of(s, 0), "ticks")
+    ),
+    "whose rows are too many": lambda s: change_rows(s, lambda table: pa.concat_tables([table, table])),
+    "whose rows are too few": lambda s: change_rows(s, lambda table: table.slice(1)),
     "whose rows are missing": lambda s: s.dataset.staged(clip_of(s, 0), "frames").unlink(),
     "beside a lock that is a link": lock_link,
     "beside inputs that are a link": lambda s: (

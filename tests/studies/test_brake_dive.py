@@ -115,6 +115,8 @@ def test_each_fold_learns_nothing_from_the_drive_it_leaves_out(events: tuple[Eve
     )
     for before, after in zip(clean, dirty, strict=True):
         assert (before.model == after.model) == (before.drive == "d1")
+        if before.drive == "d1":  # the prediction stays, and what was measured is three times as much
+            assert after.peak_ratio == pytest.approx(before.peak_ratio / 3, rel=1e-6)
 
 
 def test_a_prediction_uses_pressure_and_start_speed_alone(events: tuple[Event, ...]) -> None:

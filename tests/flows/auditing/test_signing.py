@@ -11,7 +11,7 @@ from flows.auditing.repair import repair_dataset
 from flows.auditing.signing import sign_dataset, signature_findings
 from flows.auditing.verify import verify_dataset
 from flows.cli import app
-from flows.store.layout import Layout
+from flows.store.layout import PARTIAL, Layout
 from flows.store.lock import sole_writer
 from manifests.canonical import canonical_bytes
 from manifests.manifest import seal_of
@@ -51,6 +51,13 @@ def test_a_second_key_adds_a_signature_and_the_same_key_writes_nothing(copy, key
     assert sign_dataset(str(copy.root), key=keys["owner"])["written"] is False
     assert (copy.root / ENVELOPE).stat().st_mtime_ns == written
     assert all(signature_findings(copy, keys[name])["signed"] for name in ("owner.pub", "other.pub"))
+
+
+def test_half_an_envelope_of_a_call_that_was_killed_goes_with_the_next(copy, keys):
+    (copy.root / f"{ENVELOPE}.77-78{PARTIAL}").write_bytes(b"half")
+    before = names(copy)
+    sign_dataset(str(copy.root), key=keys["owner"])
+    assert names(copy) == before - {f"{ENVELOPE}.77-78{PARTIAL}"} | {ENVELOPE}
 
 
 def test_without_a_key_it_is_said_that_the_seal_shows_damage_and_not_forgery(copy, keys):

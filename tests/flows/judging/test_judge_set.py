@@ -222,6 +222,13 @@ def test_files_of_unknown_names_are_refused_all_at_once(tmp_path: Path) -> None:
         assert words in told
 
 
+def test_a_set_that_is_not_there_is_told_and_its_parts_are_not(tmp_path: Path) -> None:
+    with pytest.raises(InputError) as caught:
+        find_set(tmp_path / "nowhere", load_video_protocol("paper"))
+    (problem,) = caught.value.problems
+    assert "nowhere: no such folder" in problem
+
+
 def test_a_window_that_no_figure_has_is_refused_before_a_clip_is_judged(tmp_path: Path) -> None:
     clip = tmp_path / "set" / "models" / "one" / "seed-1" / "weather" / "sunny.mp4"
     clip.parent.mkdir(parents=True)

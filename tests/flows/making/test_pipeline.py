@@ -67,8 +67,8 @@ def test_every_file_of_the_dataset_is_in_the_manifest(dataset):
 def test_frame_rows_are_the_ticks_they_name(dataset):
     clip = manifest_of(dataset)["clips"][0]
     family = f"family={clip['scenario']['weather']}"
-    ticks = read_columns(dataset.telemetry / "ticks" / family, clip["clip_id"])
-    frames = read_columns(dataset.telemetry / "frames" / family, clip["clip_id"])
+    ticks = read_columns(dataset.telemetry / "ticks" / family, clip["clip_id"], most=10_000, exact=False)
+    frames = read_columns(dataset.telemetry / "frames" / family, clip["clip_id"], most=10_000, exact=False)
     for channel in TICK_CHANNELS:
         np.testing.assert_array_equal(frames[channel.name], ticks[channel.name][frames["tick"]])
     np.testing.assert_array_equal(frames["t_ns"], np.arange(11) * 100_000_000)

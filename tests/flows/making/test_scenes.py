@@ -6,7 +6,7 @@ import pytest
 
 from catalogs.cameras import load_camera
 from catalogs.scenes import write_scene
-from flows.making.scenes import render_pose
+from flows.making.scenes import import_scene, render_pose
 from tasks.errors import InputError
 from tasks.render.camera import world_to_camera
 from tests.toy_street import toy_street
@@ -44,6 +44,17 @@ def test_depth_of_the_road_is_that_of_the_plane_below_the_camera(pose):
     assert label[row, 48] == 1
     # discs 0.15 m wide seen at a grazing angle: the nearer half of each blends in
     assert depth[row, 48] == pytest.approx(expected, rel=0.05)
+
+
+def test_a_sun_below_the_horizon_is_refused_before_the_files_are_read(tmp_path):
+    with pytest.raises(InputError, match="sun"):
+        import_scene(
+            str(tmp_path / "no.ply"),
+            str(tmp_path / "no.csv"),
+            str(tmp_path / "out"),
+            sun_direction_deg=(0, -5),
+        )
+    assert not (tmp_path / "out").exists()
 
 
 def test_every_fault_of_a_pose_file_is_listed(pose):

@@ -57,6 +57,18 @@ def test_what_a_second_campaign_finds_comes_on_top_of_what_the_first_found(tmp_p
     assert "spring" in twice.read_text() and "autumn" in twice.read_text()
 
 
+@pytest.mark.parametrize("number", ["slope", "no_such_number"])
+def test_what_no_vehicle_can_carry_is_missing_from_it_and_the_rest_is_there(number: str) -> None:
+    foreign = replace(
+        drag(0.3), name="of the road", parameters=(replace(drag(0.3).parameters[0], name=number),)
+    )
+    verdict = replace(verdict_of(drag(0.5), "spring"), effects=(foreign, drag(0.5)))
+    text, missing = grown_vehicle("paper-reference", verdict, {})
+    assert missing == [f"of the road: {number}"]
+    assert text is not None and "drag_area" in text
+    assert grown_vehicle("paper-reference", replace(verdict, effects=(foreign,)), {}) == (None, missing)
+
+
 def test_what_the_runs_could_not_tell_from_it_stands_in_its_provenance(tmp_path: Path) -> None:
     rivals = (("aerodynamic_drag", drag(0.1, "headwind")),)
     path = grown("paper-reference", verdict_of(drag(0.5), "spring", rivals), tmp_path / "set.yaml")

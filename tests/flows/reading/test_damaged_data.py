@@ -59,7 +59,7 @@ def flip_a_number(path: Path) -> None:
 
 
 READ_TABLES = {
-    "of muSync": lambda root, path: read_table(path),
+    "of muSync": lambda root, path: read_table(path, most=100),
     "of pyarrow": lambda root, path: musync.open(root).telemetry("frames").to_table(),
     "of torch": lambda root, path: musync.open(root).torch(
         window=4, columns="speed", arrays=[], quarantined=True

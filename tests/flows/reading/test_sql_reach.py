@@ -17,7 +17,7 @@ import flows.reading.query
 import musync
 from flows.reading.connection import connect_views
 from flows.reading.query import query_dataset
-from flows.reading.table_files import TableFiles
+from flows.reading.table_files import _TableFile
 from flows.store.layout import Layout
 from manifests.provenance import SOURCE_ROOT
 from tasks.errors import InputError
@@ -212,7 +212,7 @@ def test_a_query_without_end_is_ended_by_ctrl_c(toy_dataset, query):
 
 def test_two_threads_read_one_open_file_each_at_its_own_place(tmp_path):
     (tmp_path / "bytes").write_bytes(bytes(range(100)))
-    file = TableFiles({"bytes": tmp_path / "bytes"}).open("musync://bytes")
+    file = _TableFile(tmp_path / "bytes")
     file.seek(10)
     other = threading.Thread(target=lambda: (file.seek(90), file.read(5)))
     other.start()

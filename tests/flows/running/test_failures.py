@@ -41,6 +41,11 @@ def oserror(number: int, path: str | None = "data/x.json") -> OSError:
     return OSError(number, os.strerror(number), path)
 
 
+def caused(error: BaseException, cause: BaseException) -> BaseException:
+    error.__cause__ = cause
+    return error
+
+
 @pytest.mark.parametrize(
     ("error", "sentence"),
     [
@@ -62,6 +67,11 @@ def oserror(number: int, path: str | None = "data/x.json") -> OSError:
         (oserror(errno.EEXIST), "something else lies there"),
         (oserror(errno.EEXIST, str(Path.cwd())), "something else lies there"),
         (ValueError("embedded null byte"), "zero byte"),
+        (MemoryError(), "memory ran out; what is committed is kept: raise the limit (ulimit -v)"),
+        (oserror(errno.ENOMEM, None), "memory ran out"),
+        (ImportError("libarrow.so.2600: failed to map segment from shared object"), "memory ran out"),
+        (RuntimeError("can't start new thread"), "memory ran out"),
+        (caused(ClipsFailed("1 of 2 clips failed"), MemoryError()), "memory ran out"),
         (RuntimeError("cannot cache function 'f': no locator available for file 'g'"), "set MUSYNC_CACHE"),
     ],
 )  # fmt: skip
@@ -82,7 +92,6 @@ def test_what_the_user_gave_ends_in_a_sentence_and_code_2(monkeypatch, capsys, c
         (oserror(errno.EIO), "OSError"),
         (EOFError("no more"), "EOFError"),
         (BrokenPipeError(errno.EPIPE, "a worker has gone"), "BrokenPipeError"),
-        (MemoryError(), "memory ran out; give fewer --workers"),
         (ClipsFailed("data: 1 of 2 clips failed (a); the first said: KeyError"), "1 of 2 clips failed"),
         (ValueError("x\n\x1b[31mred" * 9999), r"\x1b[31mred"),
     ],

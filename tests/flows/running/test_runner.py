@@ -103,17 +103,34 @@ def test_processes_are_other_processes(executors):
     assert executors["processes"].submit(tell_process_id, 0).result() != os.getpid()
 
 
-def test_a_running_dask_cluster_is_used_by_its_address(executors):
-    address = executors["dask"]._client.scheduler.address
+def certificates(client) -> dict[str, str]:
+    """Dask's settings with which another client of a local cluster is let in."""
+    own = client.security.get_tls_config_for_role("client")
+    names = {"ca-file": "ca_file", "client.cert": "cert", "client.key": "key"}
+    return {f"distributed.comm.tls.{name}": own[field] for name, field in names.items()}
+
+
+def test_a_running_dask_cluster_is_used_by_its_address_and_its_certificates(executors):
+    client = executors["dask"]._client
+    address = client.scheduler.address
+    assert address.startswith("tls://127.0.0.1:")
     with (
         pytest.raises(InputError, match="belongs to --runner dask"),
         open_executor("threads", 1, address),
     ):
         pass
-    with open_executor("dask", None, address) as executor:
-        assert (
-            executor.submit(tell_process_id, 0).result() in executors["dask"]._client.run(os.getpid).values()
-        )
+    with dask.config.set(certificates(client)), open_executor("dask", None, address) as executor:
+        assert executor.submit(tell_process_id, 0).result() in client.run(os.getpid).values()
+
+
+@pytest.mark.parametrize(
+    ("scheme", "said"), [("tls", "tls needs certificates"), ("tcp", "no Dask scheduler answers there")]
+)
+def test_nobody_without_the_certificates_of_a_run_reaches_its_scheduler(executors, monkeypatch, scheme, said):
+    monkeypatch.setattr("flows.running.runner.CONNECT_TIMEOUT", "1s")
+    address = executors["dask"]._client.scheduler.address.replace("tls", scheme)
+    with pytest.raises(InputError, match=said), open_executor("dask", None, address):
+        pass
 
 
 @pytest.mark.parametrize("runner", ["process", "Dask", ""])

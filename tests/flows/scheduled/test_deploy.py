@@ -35,7 +35,17 @@ def test_every_setting_of_the_compose_file_is_in_the_example_and_no_password_is(
     named = set(re.findall(r"(?<!\$)\$\{(\w+)", (DEPLOY / "compose.yaml").read_text()))
     example = dict(re.findall(r"^(\w+)=(.*)$", (DEPLOY / "example.env").read_text(), flags=re.M))
     assert named == set(example)
-    assert not [name for name in example if name.startswith(("POSTGRES", "STORE")) and example[name]]
+    assert not [
+        name for name in example if name.startswith(("POSTGRES", "STORE", "PREFECT")) and example[name]
+    ]
+
+
+def test_the_server_of_the_compose_file_asks_for_the_password_that_the_worker_gives():
+    services = yaml.safe_load((DEPLOY / "compose.yaml").read_text())["services"]
+    asked, given = (services[name]["environment"] for name in ("prefect", "worker"))
+    assert asked["PREFECT_SERVER_API_AUTH_STRING"].startswith("${PREFECT_PASSWORD:?")
+    assert given["PREFECT_API_AUTH_STRING"] == "${PREFECT_PASSWORD}"
+    assert asked["PREFECT_SERVER_CORS_ALLOWED_ORIGINS"] == "http://127.0.0.1:4200"
 
 
 def test_services_that_wait_for_another_wait_for_one_that_can_be_healthy():

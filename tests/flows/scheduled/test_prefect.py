@@ -61,12 +61,18 @@ def plain_flows():
 def scheduled_flows():
     delays = list(prefect_schedule.make_dataset.retry_delay_seconds)
     prefect_schedule.make_dataset.retry_delay_seconds = [0.1, 0.1, 0.1]
-    options = {"grid": "grid.yaml", "root": "root", "runner": "threads", "workers": 1, "notify": "./hook.sh"}
+    asked = {"grid": "grid.yaml", "root": "elsewhere", "scheduler": "tcp://127.0.0.1:9"}
+    def serve(root, **more):
+        options = {"grid": "grid.yaml", "root": root, "runner": "threads", "workers": 1, "scheduler": None}
+        os.environ[serving.OPTIONS] = json.dumps(options | {"notify": "./hook.sh", "keep": None} | more)
+    serve("root", keep=1)
     scheduling.generate_dataset = unlucky_twice
-    dataset = prefect_schedule.scheduled(**options, keep=1)
+    dataset = prefect_schedule.scheduled(**asked)
+    serve("bad")
     scheduling.generate_dataset = wrong
-    state = prefect_schedule.scheduled(**options | {"root": "bad"}, return_state=True)
-    run = SimpleNamespace(parameters=options | {"root": "killed"}, expected_start_time=datetime.now(UTC))
+    state = prefect_schedule.scheduled(**asked, return_state=True)
+    serve("killed")
+    run = SimpleNamespace(parameters=asked | {"notify": "touch pwned"}, expected_start_time=datetime.now(UTC))
     (hook,) = prefect_schedule.scheduled.on_crashed_hooks
     hook(None, run, SimpleNamespace(message="status code -9"))
     with get_client(sync_client=True) as client:
@@ -74,6 +80,15 @@ def scheduled_flows():
         names = [run.name for run in client.read_flow_runs()]
     return {"delays": delays, "tries": tries, "dataset": dataset, "failed": state.is_failed(), "names": names,
             "artifacts": found, "parameters": list(signature(prefect_schedule.scheduled.fn).parameters)}
+
+def failed_removal():
+    said = []
+    log = SimpleNamespace(warning=lambda text, *words: said.append(text % words), info=None)
+    def full(*_):
+        raise OSError("the disk does not answer")
+    prefect_schedule.get_run_logger, prefect_schedule.remove_oldest = (lambda: log), full
+    prefect_schedule._remove_oldest("toy", "root", 1)
+    return said
 
 def rows_of_log():
     APILogWorker.instance().drain()
@@ -87,7 +102,7 @@ async def wait_for_ever(self):
 
 def stopped_schedule():
     serving.Runner.start = wait_for_ever
-    parameters = {"grid": "grid.yaml", "root": "stopped"}
+    parameters = {"grid": "grid.yaml", "root": "stopped", "notify": "./hook.sh"}
     with get_client(sync_client=True) as client:
         add = serving.Runner.add_flow
         def add_and_submit(self, flow, **options):
@@ -101,7 +116,11 @@ def stopped_schedule():
 
 if __name__ == "__main__":  # a worker of Dask needs none of this
     import asyncio
+    import os
     import signal
+    from flows.running.prefect_server import prefect_api
+    server = prefect_api(pages=False)
+    server.__enter__()
     from datetime import UTC, datetime
     from inspect import signature
     from types import SimpleNamespace
@@ -118,7 +137,9 @@ if __name__ == "__main__":  # a worker of Dask needs none of this
     plain = plain_flows()
     print("scheduled:", file=sys.stderr, flush=True)
     made = scheduled_flows()
-    print(json.dumps({"plain": plain, "scheduled": made, "rows": rows_of_log(), "stopped": stopped_schedule()}))
+    print(json.dumps({"plain": plain, "scheduled": made, "rows": rows_of_log(), "stopped": stopped_schedule(),
+                      "unremoved": failed_removal()}))
+    server.__exit__(None, None, None)
 """
 
 
@@ -230,6 +251,16 @@ def test_a_stopped_schedule_says_nothing_and_leaves_no_run_that_seems_to_go_on(r
     assert "never awaited" not in runs["said_late"]
 
 
+def test_datasets_that_cannot_be_removed_are_told_and_do_not_fail_the_run(runs):
+    assert runs["unremoved"] == ["the oldest datasets could not be removed: the disk does not answer"]
+
+
+def test_a_run_takes_the_options_of_the_schedule_that_is_served_and_not_its_own_parameters(scheduled):
+    """They may be as old as the server's database, or a stranger's."""
+    assert scheduled["dataset"].startswith("root/")
+    assert not {"elsewhere", "pwned"} & {path.name for path in scheduled["folder"].iterdir()}
+
+
 def test_a_run_that_fails_for_good_is_reported_and_the_hook_told_once(scheduled):
     (report,) = (scheduled["folder"] / "bad" / "reports").iterdir()
     assert scheduled["failed"] and "InputError: no such street" in report.read_text()
@@ -254,10 +285,10 @@ def test_the_deployment_for_a_work_pool_names_a_flow_and_parameters_that_exist_a
         given["root"],
         given["runner"],
         given.get("workers"),
-        given.get("notify"),
     )
     assert f"def {flow}(" in (SOURCE_ROOT / module).read_text()
-    assert set(given) <= set(scheduled["parameters"]) == set(checked) | {"keep"}
+    commands = {"notify", "notify_on"}
+    assert set(given) <= set(scheduled["parameters"]) == (set(checked) | {"keep"}) - commands
     assert deployment["concurrency_limit"] == 1
 
 

@@ -67,6 +67,20 @@ def test_what_a_killed_removal_has_left_goes_the_next_time(root):
     (root / ".removed-letters").mkdir()
     remove_oldest("toy", str(root), 5)
     assert left(root) == [".removed-letters", *NAMES[1:]]
+    assert not (root / record_name(NAMES[0])).exists()
+
+
+def test_a_removal_that_is_killed_leaves_no_record_without_its_dataset(root, monkeypatch):
+    def be_killed(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("flows.scheduled.retention.shutil.rmtree", be_killed)
+    with pytest.raises(KeyboardInterrupt):
+        remove_oldest("toy", str(root), 4)
+    monkeypatch.undo()
+    assert not (root / record_name(NAMES[0])).exists()
+    remove_oldest("toy", str(root), 4)
+    assert left(root) == NAMES[1:]
 
 
 def test_in_a_store_objects_go_and_the_manifest_last(root, tmp_path, monkeypatch):

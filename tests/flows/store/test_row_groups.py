@@ -40,7 +40,7 @@ def test_files_are_gathered_into_the_bytes_of_one_table(tmp_path, few_rows):
     # a list's item has another name in a file than in a table that was never in one
     read = [pq.read_table(path) for path in paths]
     write_parquet(pa.concat_tables(read).unify_dictionaries().combine_chunks(), tmp_path / "whole.parquet")
-    write_tables(read_parts(paths), tmp_path / "parts.parquet")
+    write_tables(read_parts(paths, 12), tmp_path / "parts.parquet")
     assert (tmp_path / "parts.parquet").read_bytes() == (tmp_path / "whole.parquet").read_bytes()
 
 
@@ -61,6 +61,6 @@ def test_a_damaged_file_among_those_to_gather_is_named(tmp_path):
     write_parquet(make_table(3, "a"), tmp_path / "a.parquet")
     (tmp_path / "b.parquet").write_bytes(b"PAR1 and nothing else")
     with pytest.raises(InputError, match=r"b\.parquet: must be a Parquet table"):
-        list(read_parts([tmp_path / "a.parquet", tmp_path / "b.parquet"]))
+        list(read_parts([tmp_path / "a.parquet", tmp_path / "b.parquet"], 12))
     with pytest.raises(InputError, match=r"c\.parquet: no such file"):
-        list(read_parts([tmp_path / "a.parquet", tmp_path / "c.parquet"]))
+        list(read_parts([tmp_path / "a.parquet", tmp_path / "c.parquet"], 12))

@@ -1,0 +1,86 @@
+"""Parquet files that may be a stranger's: what their footers tell is bounded before a row of them is read."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from catalogs.sentences import shorten
+from tasks.errors import InputError
+
+CLIPS_PER_FILE = 100
+MOST_COLUMNS, LONGEST_NAME = 500, 200
+"""Columns of a table that is read, and characters of a column's name [1]. muSync writes a tenth of the columns; DuckDB
+takes minutes for some thousands."""
+SEALED = "musync repair makes it again"
+STAGED = "remove it, and the same musync generate command makes its clip again"
+CHECKED: Mapping[str, Any] = {"page_checksum_verification": True}
+"""How pyarrow is to read Parquet: each page is held against the checksum that it was written with."""
+
+
+def call_reader(
+    path: Path, read: Callable[..., Any], *arguments: Any, remedy: str = SEALED, **options: Any
+) -> Any:
+    """Call a reader of Parquet, whose errors become sentences about the file.
+
+    Parameters
+    ----------
+    path : of the file
+    read : the reader
+    arguments, options : what it gets
+    remedy : what the sentence tells to do
+    """
+    try:
+        return read(*arguments, **options)
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file; is this a finished muSync dataset?") from None
+    except (pa.ArrowException, OSError, ValueError, TypeError) as error:
+        raise InputError(
+            f"{path}: must be a Parquet table as muSync writes it; {shorten(error)}: {remedy}"
+        ) from None
+
+
+def refuse_footer(path: Path, most: int, remedy: str = SEALED) -> None:
+    """Refuse a table by its footer: a few kilobytes hold rows and names that no memory does.
+
+    Parameters
+    ----------
+    path : of a Parquet file
+    most : rows that it may have by its dataset's plan [1]
+    remedy : what the sentence tells to do
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or has more rows, more columns or longer names.
+    """
+    footer = call_reader(path, pq.read_metadata, path, remedy=remedy)
+    counts = {
+        "rows": (footer.num_rows, most),
+        "columns": (footer.num_columns, MOST_COLUMNS),
+        "characters in a column's name": (max(map(len, footer.schema.names), default=0), LONGEST_NAME),
+    }
+    problems = [
+        f"{path}: must have at most {bound:,} {what}; it has {count:,}: {remedy}"
+        for what, (count, bound) in counts.items()
+        if not 0 <= count <= bound
+    ]
+    if problems:
+        raise InputError(problems)
+
+
+def refuse_rows(path: Path, clip_id: str, rows: int) -> None:
+    """Raise `InputError` for a staged table that does not hold just the rows of one clip.
+
+    Parameters
+    ----------
+    path : of the table
+    clip_id : whose rows
+    rows : how many [1]
+    """
+    refuse_footer(path, rows, STAGED)
+    names = call_reader(path, pq.read_table, path, remedy=STAGED, columns=["clip_id"], **CHECKED)["clip_id"]
+    if len(names) != rows or names.unique().to_pylist() != [clip_id]:
+        raise InputError(f"{path}: must hold {rows} rows of clip {clip_id} and no others: {STAGED}")
