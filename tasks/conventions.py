@@ -27,6 +27,17 @@ class SemanticClass(IntEnum):
 
 ROAD_CLASSES = (SemanticClass.ROAD, SemanticClass.MARKING)
 """Classes that hold the water film and the snow cover, and that follow the road profile."""
+ANY_HEADING = "any-heading"
+POSE_FORMS = {
+    "opencv": "the camera's axes may be x right, y down, z forward (OpenCV)",
+    "scalar-first": "the quaternions may begin with their scalar, qw qx qy qz",
+    "world-to-camera": "the matrices may lead from the world to the camera",
+    "opengl": "the camera's axes may be x right, y up, z back (OpenGL)",
+    "flu": "the poses may be a vehicle's, x forward, y left, z up",
+    "frd": "the poses may be a vehicle's, x forward, y right, z down",
+    ANY_HEADING: "the camera may look {side}",
+}
+"""Forms in which camera poses are written, and what is likely of a file that fits one."""
 
 
 @dataclass(frozen=True, kw_only=True)

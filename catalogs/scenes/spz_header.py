@@ -10,6 +10,8 @@ GZIP, NGSP = b"\x1f\x8b", b"NGSP"
 HEADER = struct.Struct("<4sIIBBBB")
 """Magic, version, Gaussians, degree of the spherical harmonics, fractional bits, flags, reserved."""
 VERSIONS = (1, 2, 3, 4)
+ANTIALIASED, EXTENDED = 1, 2
+"""Flags: the cloud is drawn antialiased; extensions follow the Gaussians."""
 HARMONICS = (0, 3, 8, 15)
 """Number of coefficients of each colour after the first, by degree."""
 LARGEST_FREE, LARGEST_RATIO = 2**26, 64
@@ -20,8 +22,8 @@ EXTENSION_ROOM = 2**20
 PIECE = 2**20
 
 
-def check_spz(path: Path) -> None:
-    """See that a .spz holds what its header announces, and no more.
+def check_spz(path: Path) -> bool:
+    """Whether the cloud of a .spz is drawn antialiased; the file holds what its header announces, and no more.
 
     Parameters
     ----------
@@ -41,11 +43,16 @@ def check_spz(path: Path) -> None:
         head = b""
     if len(head) < HEADER.size:
         raise InputError(f"{path}: must be a whole .spz file; it cannot be unpacked: is it truncated?")
-    magic, version, count, degree, *_ = HEADER.unpack(head[: HEADER.size])
+    magic, version, count, degree, _, flags, _ = HEADER.unpack(head[: HEADER.size])
     if magic != NGSP or version not in VERSIONS or degree >= len(HARMONICS):
         raise InputError(
             f"{path}: must be a .spz of version {VERSIONS[0]} to {VERSIONS[-1]} and degree 0 to {len(HARMONICS) - 1};"
             f" it begins with {magic!r}, version {version}, degree {degree}"
+        )
+    if flags & ~(ANTIALIASED | EXTENDED):
+        raise InputError(
+            f"{path}: the flags of a .spz must be {ANTIALIASED} (antialiased) and {EXTENDED} (extensions); they are"
+            f" {flags:#x}"
         )
     announced = count * (16 + (4 if version >= 3 else 3) + 3 * HARMONICS[degree])
     most = max(LARGEST_FREE, LARGEST_RATIO * len(content))
@@ -56,6 +63,7 @@ def check_spz(path: Path) -> None:
         )
     if content.startswith(GZIP):
         _check_size(path, unpacked, announced)
+    return bool(flags & ANTIALIASED)
 
 
 def _check_size(path: Path, unpacked: "zlib._Decompress", announced: int) -> None:

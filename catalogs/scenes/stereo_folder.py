@@ -12,6 +12,7 @@ from catalogs.documents import read_content
 from catalogs.sentences import cap_problems, name_some, shorten
 from tasks.errors import InputError
 from tasks.reconstruction.sequence import StereoSequence
+from tasks.scene.pose_forms import ANY_HEADING, find_way_problems
 
 SMALLEST_SEQUENCE = 3
 """Two neighbours check a picture's depth; with fewer pictures nothing can be checked."""
@@ -151,7 +152,10 @@ def _find_pose_problems(path: Path, poses: NDArray[np.float64]) -> list[str]:
     off = np.abs(R @ R.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
     wrong = np.flatnonzero((off > ROTATION_TOLERANCE) | (np.linalg.det(R) < 0))
     if not len(wrong):
-        return []
+        T = np.tile(np.eye(4), (len(poses), 1, 1))
+        T[:, :3] = poses
+        forms = ("opengl", "world-to-camera", ANY_HEADING)
+        return [f"{path}: {problem}" for problem in find_way_problems(T, "opencv", "opencv", forms)]
     return [
         f"{path}: every pose must be a rotation and a translation; {len(wrong)} are not,"
         f" the first is row {wrong[0] + 1}"

@@ -11,6 +11,7 @@ from filelock import FileLock
 
 import tasks.scene
 from catalogs.scenes.folder import ARRAY_FILES, OPTIONAL_FILES, array_damage, read_facts, write_scene
+from catalogs.scenes.street import STREET_FILE, load_street_layout
 from tasks.errors import InputError
 from tasks.kernel_cache import cache_root
 from tasks.scene.scene import Scene
@@ -72,7 +73,7 @@ def _make_street(folder: Path, seed: int) -> None:
 def _build_street(seed: int) -> Scene:
     from tasks.scene.street.build import build_street
 
-    return build_street(seed)
+    return build_street(load_street_layout(STREET_FILE), seed)
 
 
 def _is_whole(folder: Path) -> bool:
@@ -112,8 +113,8 @@ def _only_maker(root: Path) -> FileLock:
 
 
 def _recipe_hash() -> str:
-    """Over the code that makes the street and the libraries that it computes with."""
-    digest = hashlib.sha256(f"{np.__version__} {scipy.__version__}".encode())
+    """Over the street's entry, the code that makes it and the libraries that it computes with."""
+    digest = hashlib.sha256(f"{np.__version__} {scipy.__version__}".encode() + STREET_FILE.read_bytes())
     package = Path(tasks.scene.__file__).parent
     for path in sorted(package.rglob("*.py")):
         if "stereo" not in path.parts:

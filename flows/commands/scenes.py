@@ -1,6 +1,7 @@
 """Commands that build scenes from recordings and other tools, and render single frames of them."""
 
-from flows.commands.command import BACKEND, Command, define_argument, define_option
+from flows.commands.command import BACKEND, Command, define_argument, define_option, require_key
+from tasks.conventions import POSE_FORMS
 
 GROUP = "Scenes"
 SUN = define_option(
@@ -31,13 +32,32 @@ COMMANDS = (
         function="flows.making.scenes:scene_import",
         options=(
             define_argument("gaussians", str, ".ply, compressed .ply, .splat or .spz file."),
-            define_option("route", str, "Route: CSV, KITTI poses, TUM or nerfstudio transforms.json."),
+            define_option(
+                "route",
+                str,
+                "Route: CSV of points, poses of KITTI, KITTI-360 or TUM, 4x4 matrices a line, COLMAP's images.txt or"
+                " images.bin, or nerfstudio's transforms.json.",
+            ),
             SCENE_OUT,
             define_option("camera_height", float, "Height of the route's cameras above the road [m].", 1.5),
             define_option("half_width", float, "Half the carriageway's width [m].", 3.5),
             define_option("metres_per_unit", float, "Length of one unit of the files [m].", 1.0),
+            define_option(
+                "poses",
+                str | None,
+                f"Form of the route's poses: {', '.join(POSE_FORMS)}; by default that of the kind of file.",
+                None,
+                known=tuple(POSE_FORMS),
+            ),
+            define_option(
+                "dataparser",
+                str | None,
+                "dataparser_transforms.json of a cloud that nerfstudio exported: leads from the route's frame to it.",
+                None,
+            ),
             SUN,
         ),
+        passed=require_key("road_found"),
     ),
     Command(
         name="render",

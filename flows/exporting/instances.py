@@ -5,9 +5,9 @@ from math import isnan
 from typing import Any
 
 from catalogs.scenes import load_scene, scene_identity
+from catalogs.scenes.street import load_street_layout
 from flows.exporting.dataset import ExportedDataset
 from tasks.render.instances import InstanceFinder
-from tasks.scene.street.layout import StreetLayout
 from tasks.scene.street.objects import StreetObject, list_objects, own_gaussians
 
 STREET = "street"
@@ -42,7 +42,7 @@ def find_scene_objects(dataset: ExportedDataset) -> SceneObjects | None:
         return None
     if scene["sha256"] != scene_identity(STREET):
         return None
-    objects, owners, classes = list_objects(StreetLayout())
+    objects, owners, classes = list_objects(load_street_layout())
     cloud = load_scene(STREET).gaussians
     return SceneObjects(objects=objects, finder=InstanceFinder(cloud, own_gaussians(cloud, owners, classes)))
 

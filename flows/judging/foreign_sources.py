@@ -8,9 +8,11 @@ from typing import Any
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from catalogs.documents import read_yaml
-from catalogs.sentences import shorten_value
+from catalogs.sentences import cap_problems, shorten, shorten_value
+from flows.judging.film_length import READ_ONLY, measure_missing_end
 from flows.judging.trajectories import SUFFIXES, read_trajectory
 from tasks.errors import InputError
 from tasks.eval.poses.essential import recover_motion_essential
@@ -23,11 +25,21 @@ MOST_PIXELS = 960 * 540
 """Size that frames are judged at; larger ones are reduced by area, so that the longest video fills 5 GB."""
 LARGEST_CAMERA = 1e6
 """Greatest number of a camera's file [px, m or 1]."""
-NO_PLAYLISTS = (
-    "protocol_whitelist;file|format_whitelist;"
-    "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpeg,mpegts,mpegvideo,h264,hevc,ivf,asf,flv,ogg,yuv4mpegpipe,gif,apng"
+MISSING_FRAMES = 3
+"""Frames that may be missing at an end [1]: containers round their length."""
+MOUNT = ("behind_front_axle", "left_of_centre", "height_above_road", "pitch_down")
+UNITS = (
+    dict.fromkeys(("width", "height", "focal_length", "fx", "fy", "cx", "cy"), "px")
+    | dict.fromkeys(COEFFICIENTS, "1")
+    | dict.fromkeys(MOUNT[:3], "m")
+    | {"pitch_down": "deg", "name": "", "exposure": "s", "exposure_compensation": "EV", "full_well": "e-"}
+    | {"read_noise": "e-", "line_delay": "s", "motion_blur": ""}
 )
-"""Options that let FFmpeg open containers of frames only: a playlist would send it to other files or the network."""
+"""Keys of a camera's file and their units: those that a film is judged by, and those that only making one takes."""
+MODEL_KEYS = ("camera_model", "distortion_model", "model")
+MODELS = ("pinhole", "simple_pinhole", "opencv", "radtan", "plumb_bob")
+"""Models of a lens that have the coefficients of Brown and Conrady, or none."""
+REMEDY = "give a camera in these keys, and undistort a video of any other lens to a pinhole first"
 CHUNK = 64
 """Frames that are undistorted at once."""
 LEVEL = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
@@ -140,10 +152,11 @@ def read_video(path: Path) -> tuple[NDArray[np.uint8], NDArray[np.float64], tupl
         raise InputError(f"{path}: no such file; give a video.")
     if path.stat().st_size == 0:
         raise InputError(f"{path}: the file is empty; give a video.")
-    os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = NO_PLAYLISTS
+    os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = "|".join(";".join(pair) for pair in READ_ONLY.items())
     stream = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
     rate = stream.get(cv2.CAP_PROP_FPS)
-    announced = int(stream.get(cv2.CAP_PROP_FRAME_COUNT))
+    # an estimate where the container holds no number of frames, so that it only says how much room to take first
+    expected = int(stream.get(cv2.CAP_PROP_FRAME_COUNT))
     frames, size = np.empty((0, 0, 0, 3), np.uint8), (0, 0)
     stamps: list[float] = []
     while len(stamps) <= MOST_FRAMES:
@@ -153,7 +166,7 @@ def read_video(path: Path) -> tuple[NDArray[np.uint8], NDArray[np.float64], tupl
         count = len(stamps)
         if count == 0:
             size = picture.shape[1], picture.shape[0]
-            room = announced + 1 if 0 < announced < MOST_FRAMES else MOST_FRAMES + 1
+            room = expected + 1 if 0 < expected < MOST_FRAMES else MOST_FRAMES + 1
             frames = np.empty((room, *_judged_size(*size)[::-1], 3), np.uint8)
         elif count == len(frames):
             frames = np.concatenate((frames, np.empty_like(frames)))
@@ -167,19 +180,32 @@ def read_video(path: Path) -> tuple[NDArray[np.uint8], NDArray[np.float64], tupl
         raise InputError(f"{path}: no frame can be read; the file is damaged or no video.")
     if len(stamps) > MOST_FRAMES:
         raise InputError(f"{path}: at most {MOST_FRAMES} frames are judged at once; cut the video.")
-    if announced > len(stamps) + 1:
-        raise InputError(
-            f"{path}: only {len(stamps)} of {announced} frames can be read; the file breaks off."
-        )
     if len(stamps) < LEAST_FRAMES:
         raise InputError(f"{path}: at least {LEAST_FRAMES} frames are needed; there are {len(stamps)}.")
-    times = np.asarray(stamps) / 1000
-    if not (np.diff(times) > 0).all():
-        # a container without time stamps: the rate is all there is
+    times = _read_times(path, np.asarray(stamps) / 1000, rate)
+    missing = measure_missing_end(path)
+    steps = np.diff(times)
+    if missing > max(MISSING_FRAMES * np.median(steps), steps.max()):
+        raise InputError(
+            f"{path}: only {len(stamps)} frames can be read, and {missing:.2f} s of what the file announces cannot;"
+            " the file breaks off."
+        )
+    return frames[: len(stamps)], times, size
+
+
+def _read_times(path: Path, times: NDArray[np.float64], rate: float) -> NDArray[np.float64]:
+    """Times of frames from 0 [s]: their stamps, or, where a container has none, by the rate [Hz]."""
+    if times.min() == times.max():
         if not rate > 0:
             raise InputError(f"{path}: the video has neither time stamps nor a frame rate.")
-        times = np.arange(len(stamps)) / rate
-    return frames[: len(stamps)], times - times[0], size
+        return np.arange(len(times)) / rate
+    if not (np.diff(times) > 0).all():
+        late = int((np.diff(times) <= 0).argmax()) + 1
+        raise InputError(
+            f"{path}: the time must rise from frame to frame; frame {late} is at {times[late]:.3f} s and the one before"
+            f" at {times[late - 1]:.3f} s: was the file joined of several? Write it anew."
+        )
+    return times - times[0]
 
 
 def _judged_size(width: int, height: int) -> tuple[int, int]:
@@ -194,40 +220,65 @@ def read_camera(path: Path) -> ForeignCamera:
     Raises
     ------
     InputError
-        If the file cannot be read or lacks a number.
+        If the file cannot be read, lacks a number, or states what no film is judged by.
     """
     content = read_yaml(path, "camera")
+    wrong = [f"{path}: {problem}." for problem in _find_unknown(content)]
     numbers: dict[str, Any] = {k: v.get("value") if isinstance(v, dict) else v for k, v in content.items()}
     if "focal_length" in numbers and _is_number(numbers.get("width")) and _is_number(numbers.get("height")):
         f = numbers["focal_length"]
         centre = {"cx": numbers["width"] / 2 - 0.5, "cy": numbers["height"] / 2 - 0.5}
         numbers = {"fx": f, "fy": f} | centre | numbers
-    wrong = [
+    wrong += [
         f"{path}: the camera's {key} must be a number of {least} to {LARGEST_CAMERA:g};"
         f" it is {shorten_value(numbers.get(key))}."
         for key, least in (("width", 1), ("height", 1), ("fx", 1e-3), ("fy", 1e-3), ("cx", 0.0), ("cy", 0.0))
         if not _is_number(numbers.get(key), least)
     ]
-    bends = {key: numbers.get(key) or 0.0 for key in COEFFICIENTS}
-    places = {
-        key: numbers.get(key) or 0.0 for key in ("behind_front_axle", "left_of_centre", "height_above_road")
-    }
+    rest = {key: 0.0 if numbers.get(key) is None else numbers[key] for key in (*COEFFICIENTS, *MOUNT)}
     wrong += [
         f"{path}: the camera's {key} must be a number within +-{LARGEST_CAMERA:g}; it is {shorten_value(value)}."
-        for key, value in (bends | places).items()
+        for key, value in rest.items()
         if not _is_number(value, -LARGEST_CAMERA)
     ]
     if wrong:
-        raise InputError(wrong)
+        raise InputError(cap_problems(wrong))
     K = np.array(
         [[numbers["fx"], 0, numbers["cx"]], [0, numbers["fy"], numbers["cy"]], [0, 0, 1]], np.float64
     )
     mount = LEVEL.copy()
-    mount[:3, 3] = -places["behind_front_axle"], places["left_of_centre"], places["height_above_road"]
-    distortion = np.array(list(bends.values()), np.float64) if any(bends.values()) else None
+    mount[:3, :3] = Rotation.from_euler("y", rest["pitch_down"], degrees=True).as_matrix() @ mount[:3, :3]
+    mount[:3, 3] = -rest["behind_front_axle"], rest["left_of_centre"], rest["height_above_road"]
+    bends = [rest[key] for key in COEFFICIENTS]
     return ForeignCamera(
-        K=K, width=int(numbers["width"]), height=int(numbers["height"]), mount=mount, distortion=distortion
+        K=K,
+        width=int(numbers["width"]),
+        height=int(numbers["height"]),
+        mount=mount,
+        distortion=np.array(bends, np.float64) if any(bends) else None,
     )
+
+
+def _find_unknown(content: dict[str, Any]) -> list[str]:
+    """What a camera's file states that no film is judged by here, or in another unit than it has here."""
+    problems = []
+    for key, value in content.items():
+        number = value.get("value") if isinstance(value, dict) else value
+        if key in MODEL_KEYS and str(value).lower() not in MODELS:
+            problems.append(f"{key} {value} is not known; known are {', '.join(MODELS)}: {REMEDY}")
+        elif key not in (*UNITS, *MODEL_KEYS):
+            problems.append(f"{key}: no such key; a lens has {', '.join(COEFFICIENTS)}: {REMEDY}")
+        elif key == "line_delay" and number:
+            problems.append(
+                "line_delay must be 0: the rows of a rolling shutter are not put right in a video; leave it out to"
+                " judge them as one"
+            )
+        elif isinstance(value, dict):
+            if unknown := sorted(map(str, value.keys() - {"value", "unit", "source"})):
+                problems.append(f"{key} has value, unit and source; {', '.join(unknown)} is not known")
+            if (unit := value.get("unit", UNITS[key])) != UNITS[key]:
+                problems.append(f"{key} must have the unit {UNITS[key]}; it has {shorten_value(unit)}")
+    return [shorten(problem, 300) for problem in problems]
 
 
 def _is_number(value: Any, least: float = 0.0) -> bool:

@@ -18,7 +18,13 @@ from tasks.render.composition import compose_over_sky, encode_8bit
 from tasks.render.contact_sheet import encode_png
 from tasks.render.environment import environment_view, plain_sky
 from tasks.render.rasterise.backend import select_backend
-from tasks.scene.classify import classify_road
+from tasks.scene.classify import (
+    ENOUGH,
+    HEIGHT_TOLERANCE,
+    classify_road,
+    find_level_surface,
+    measure_coverage,
+)
 from tasks.scene.scene import Scene, find_sun_problems
 from tasks.scene.transform import transform_gaussians
 
@@ -30,8 +36,8 @@ def scene_import(
     *,
     camera_height: float = 1.5,
     half_width: float = 3.5,
-    metres_per_unit: float = 1.0,
     sun_direction_deg: tuple[float, float] | None = None,
+    **frame: Any,
 ) -> dict[str, Any]:
     """Make a scene folder of Gaussians trained elsewhere and a route.
 
@@ -39,8 +45,8 @@ def scene_import(
     ----------
     camera_height : of the route's camera poses above the road [m]
     half_width : of the carriageway, to either side of the route [m]
-    metres_per_unit : scale of the files, for reconstructions without one [m]
     sun_direction_deg : azimuth and elevation of the sun, as in `Scene` [deg]
+    frame : ``metres_per_unit``, ``poses`` and ``dataparser`` of `catalogs.scenes.route_files.read_route`
 
     Raises
     ------
@@ -50,8 +56,9 @@ def scene_import(
     must_be_new(Path(out))
     if problems := find_sun_problems(sun_direction_deg):
         raise InputError(problems)
-    course, T_world_source = read_route(Path(route), camera_height, metres_per_unit)
-    cloud = transform_gaussians(read_gaussians(Path(gaussians)), T_world_source)
+    course, T_world_cloud = read_route(Path(route), camera_height, **frame)
+    warnings: list[str] = []
+    cloud = transform_gaussians(read_gaussians(Path(gaussians), warnings), T_world_cloud)
     scene = Scene(
         name=Path(out).name,
         gaussians=classify_road(cloud, course, half_width, -half_width),
@@ -63,12 +70,43 @@ def scene_import(
     )
     write_scene(scene, Path(out), {"source": Path(gaussians).name})
     road = np.isin(scene.gaussians.class_id, ROAD_CLASSES).mean()
+    coverage = measure_coverage(scene.gaussians, course)
+    if coverage < ENOUGH:
+        warnings.append(
+            _explain_missing_road(scene, coverage, camera_height, frame.get("metres_per_unit", 1.0))
+        )
     return {
         "scene": out,
         "gaussians": len(scene.gaussians),
         "route_length_m": scene.route.length,
         "road_share": float(road),
+        "road_coverage": coverage,
+        "road_found": coverage >= ENOUGH,
+        "warnings": warnings,
     }
+
+
+def _explain_missing_road(scene: Scene, coverage: float, camera_height: float, metres_per_unit: float) -> str:
+    found = (
+        f"Gaussians of a road must lie within {HEIGHT_TOLERANCE:g} m of the route's road along at least"
+        f" {ENOUGH:.0%} of its length; they do along {coverage:.0%}"
+    )
+    surface = find_level_surface(
+        scene.gaussians, scene.route, scene.carriageway_left, scene.carriageway_right
+    )
+    if surface is not None and surface < camera_height:
+        height = camera_height - surface
+        return (
+            f"{found}: a level surface lies {abs(surface):.2f} m {'above' if surface > 0 else 'below'} it; give"
+            f" --camera-height {height:.2f} or, where the files are not in metres, --metres-per-unit"
+            f" {metres_per_unit * camera_height / height:.4g}"
+        )
+    spans = " x ".join(f"{span:.3g}" for span in np.ptp(scene.gaussians.means, axis=0))
+    return (
+        f"{found}: is the route in the cloud's frame (of a cloud that nerfstudio exported, give --dataparser"
+        " dataparser_transforms.json), in its unit (--metres-per-unit), with its axes (--poses) and with this camera"
+        f" height (--camera-height)? The cloud spans {spans} m, the route {scene.route.length:.3g} m"
+    )
 
 
 def render_pose(scene: str, pose: str, out: str, *, backend: str = "auto") -> dict[str, Any]:

@@ -11,6 +11,7 @@ import pytest
 
 from catalogs.scenes import street_cache
 from catalogs.scenes.folder import read_scene
+from catalogs.scenes.street import STREET_FILE
 from catalogs.scenes.street_cache import HALF_MADE, MARKER, cached_street
 from tasks.errors import InputError
 from tests.toy_street import toy_street
@@ -152,3 +153,15 @@ def test_a_cache_that_cannot_be_written_is_one_sentence(tmp_path, monkeypatch, p
 
 def test_the_facts_of_a_cached_street_name_its_source(cache):
     assert json.loads((cached_street() / "scene.json").read_text())["source"] == "generated"
+
+
+def test_the_street_is_built_from_its_entry_and_anew_where_that_changes(tmp_path, monkeypatch):
+    monkeypatch.setattr("tasks.scene.street.build.build_street", lambda layout, seed: layout.lane_width)
+    recipe = street_cache._recipe_hash()
+    monkeypatch.setattr(street_cache, "STREET_FILE", tmp_path / "street.yaml")
+    entry = STREET_FILE.read_text()
+    (tmp_path / "street.yaml").write_text(
+        entry.replace("lane_width: {value: 3.5", "lane_width: {value: 3.25")
+    )
+    assert street_cache._build_street(1) == 3.25
+    assert street_cache._recipe_hash() != recipe

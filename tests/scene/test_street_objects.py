@@ -5,17 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from catalogs.scenes.street import load_street_layout
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
 from tasks.scene.street.bend import integrate_course
 from tasks.scene.street.cars.parked import build_cars
 from tasks.scene.street.furniture import build_furniture
-from tasks.scene.street.layout import StreetLayout
 from tasks.scene.street.objects import KINDS, list_objects, own_gaussians
 from tasks.scene.street.plan import plan_street
 from tests.toy_street import toy_street
 
-SHORT = StreetLayout(route_length=12.0, behind=5.0, beyond=20.0, crossing_station=4.0)
+SHORT = replace(load_street_layout(), route_length=12.0, behind=5.0, beyond=20.0, crossing_station=4.0)
 CLASS = {"car": SemanticClass.VEHICLE, "bin": SemanticClass.OTHER, "letter box": SemanticClass.OTHER}
 
 

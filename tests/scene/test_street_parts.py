@@ -5,17 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from catalogs.scenes.street import load_street_layout
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
 from tasks.scene.street.bend import integrate_course, lay_route
-from tasks.scene.street.layout import StreetLayout, nearest_depth
+from tasks.scene.street.layout import nearest_depth
 from tasks.scene.street.light import Casters, lit_radiance, sky_share, sun_direction
 from tasks.scene.street.noise import fractal_noise, named_generator
 from tasks.scene.street.plan import plan_street
 from tasks.scene.street.sky import draw_panorama
 from tasks.scene.street.surfels import Surfels, build_box, build_panel, build_tube, graded_cells
 
-LAYOUT = StreetLayout()
+LAYOUT = load_street_layout()
 OPEN = Casters(
     boxes=np.zeros((0, 2, 3)), balls=np.zeros((0, 1, 4)), footprints=np.zeros((0, 2, 2)), leaf_extinction=0.9
 )
@@ -132,7 +133,7 @@ def test_parked_car_darkens_the_ground_beside_it() -> None:
 
 def test_crossing_beyond_the_route_is_refused() -> None:
     with pytest.raises(InputError, match="crossing must lie on the route of 30 m"):
-        StreetLayout(route_length=30.0)
+        replace(LAYOUT, route_length=30.0)
 
 
 def test_nearest_depth_is_where_the_point_enters_the_picture() -> None:

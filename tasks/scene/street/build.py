@@ -23,15 +23,15 @@ from tasks.scene.surroundings import add_surroundings
 _SH_BAND_0 = 0.28209479177387814
 
 
-def build_street(seed: int = 2025, layout: StreetLayout | None = None) -> Scene:
+def build_street(layout: StreetLayout, seed: int) -> Scene:
     """A two-lane city street on a summer morning, with houses, trees and parked cars.
 
     The same seed and layout give the same bytes.
 
     Parameters
     ----------
+    layout : dimensions and light
     seed : draws everything that the layout leaves open [1]
-    layout : dimensions and light; None for the defaults
 
     Returns
     -------
@@ -39,7 +39,6 @@ def build_street(seed: int = 2025, layout: StreetLayout | None = None) -> Scene:
         200k to 500k Gaussians with true classes and normals, colours in linear light with the sun and
         its shadows baked in, the route in the right lane and a panorama of the sky.
     """
-    layout = layout or StreetLayout()
     line = integrate_course(layout)
     plan = plan_street(layout, seed)
     surfels = join_surfels(

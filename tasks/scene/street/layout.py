@@ -47,35 +47,35 @@ class StreetLayout:
     bounce_rgb : radiance of the sunlit surroundings, linear light [1]
     """
 
-    route_length: float = 180.0
-    behind: float = 40.0
-    beyond: float = 130.0
-    bend_start: float = 40.0
-    bend_transition: float = 60.0
-    bend_radius: float = 450.0
-    end_radius: float = 110.0
-    lane_width: float = 3.5
-    parking_width: float = 2.2
-    marking_width: float = 0.15
-    dash_length: float = 3.0
-    dash_gap: float = 6.0
-    crossing_station: float = 34.0
-    crossing_length: float = 4.0
-    crossing_bar: float = 0.5
-    kerb_height: float = 0.12
-    kerb_width: float = 0.15
-    pavement_width: float = 3.2
-    slab: float = 0.6
-    ground_storey_height: float = 3.9
-    storey_height: float = 3.1
-    lamp_spacing: float = 28.0
-    lamp_height: float = 7.0
-    tree_spacing: float = 14.0
-    sun_azimuth_deg: float = 150.0
-    sun_elevation_deg: float = 46.0
-    sun_rgb: tuple[float, float, float] = (1.95, 1.80, 1.56)
-    sky_rgb: tuple[float, float, float] = (0.38, 0.46, 0.57)
-    bounce_rgb: tuple[float, float, float] = (0.21, 0.19, 0.17)
+    route_length: float
+    behind: float
+    beyond: float
+    bend_start: float
+    bend_transition: float
+    bend_radius: float
+    end_radius: float
+    lane_width: float
+    parking_width: float
+    marking_width: float
+    dash_length: float
+    dash_gap: float
+    crossing_station: float
+    crossing_length: float
+    crossing_bar: float
+    kerb_height: float
+    kerb_width: float
+    pavement_width: float
+    slab: float
+    ground_storey_height: float
+    storey_height: float
+    lamp_spacing: float
+    lamp_height: float
+    tree_spacing: float
+    sun_azimuth_deg: float
+    sun_elevation_deg: float
+    sun_rgb: tuple[float, float, float]
+    sky_rgb: tuple[float, float, float]
+    bounce_rgb: tuple[float, float, float]
 
     def __post_init__(self) -> None:
         if not 0 < self.crossing_station < self.route_length - self.crossing_length:

@@ -2,9 +2,11 @@
 
 import tracemalloc
 from collections.abc import Iterator
+from fractions import Fraction
 from hashlib import sha256
 from pathlib import Path
 
+import av
 import cv2
 import numpy as np
 import pyarrow as pa
@@ -120,27 +122,66 @@ def test_large_frames_are_judged_reduced_and_held_once(street: Clip, tmp_path: P
     assert (result["judged_width"], result["judged_height"]) == (881, 587)
 
 
-def test_what_fits_is_read_as_it_is_and_more_frames_than_announced_too(
-    street: Clip, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_fits_is_read_as_it_is(street: Clip, tmp_path: Path) -> None:
     video = encode(tmp_path / "v.mp4", street.frames, 16.0, "mp4v")
     frames, _, _ = read_video(video)
     assert frames.shape == street.frames.shape
     assert np.abs(frames.astype(int) - street.frames).mean() < 4.0
 
-    class Short:
-        """A container that announces fewer frames than it holds."""
 
-        def __init__(self, *given: object) -> None:
-            self.stream = cv2_capture(*given)
-            self.read, self.release = self.stream.read, self.stream.release
+def stamped_film(path: Path, times: np.ndarray, form: str, codec: str = "libx264", **options: str) -> Path:
+    """A film whose frames have these times [s]."""
+    clock = Fraction(1, 90_000)
+    with av.open(str(path), "w", format=form, options=options) as container:
+        stream = container.add_stream(codec, rate=30)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        stream.time_base = stream.codec_context.time_base = clock
+        for number, time in enumerate(times):
+            noise = np.random.Generator(np.random.Philox(number)).integers(0, 255, (48, 64, 3), np.uint8)
+            frame = av.VideoFrame.from_ndarray(noise, format="rgb24")
+            frame.pts, frame.time_base = round(time / clock), clock
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+    return path
 
-        def get(self, key: int) -> float:
-            return 5.0 if key == cv2.CAP_PROP_FRAME_COUNT else float(self.stream.get(key))
 
-    cv2_capture = cv2.VideoCapture
-    monkeypatch.setattr(cv2, "VideoCapture", Short)
-    assert (read_video(video)[0] == frames).all()
+CHANGING = np.r_[np.arange(15) / 30, 0.5 + np.arange(10) * 0.1, 1.5 + np.arange(15) / 30]
+"""Times of 40 frames, 30 a second, then 10, then 30 [s]."""
+
+
+@pytest.mark.parametrize("start", [0.0, 0.5])
+@pytest.mark.parametrize(
+    ("name", "form", "codec"),
+    [("v.mp4", "mp4", "libx264"), ("v.mkv", "matroska", "libx264"), ("v.webm", "webm", "libvpx"),
+     ("v.ts", "mpegts", "libx264"), ("v.flv", "flv", "libx264")],
+)  # fmt: skip
+def test_a_whole_film_is_read_with_its_own_times(
+    tmp_path: Path, name: str, form: str, codec: str, start: float
+) -> None:
+    frames, times, _ = read_video(stamped_film(tmp_path / name, CHANGING + start, form, codec))
+    assert len(frames) == 40
+    np.testing.assert_allclose(times, CHANGING, atol=6e-4)
+
+
+@pytest.mark.parametrize(
+    ("form", "options"),
+    [("matroska", {}), ("mp4", {"movflags": "faststart"}), ("mp4", {"movflags": "frag_keyframe+empty_moov"})],
+)
+def test_a_film_that_breaks_off_is_told(tmp_path: Path, form: str, options: dict[str, str]) -> None:
+    whole = stamped_film(tmp_path / "v", CHANGING, form, **options)
+    (tmp_path / "cut").write_bytes(whole.read_bytes()[: whole.stat().st_size * 3 // 4])
+    with pytest.raises(InputError, match="the file breaks off"):
+        read_video(tmp_path / "cut")
+
+
+def test_times_that_fall_are_not_replaced_by_a_rate(tmp_path: Path) -> None:
+    first, second = (
+        stamped_film(tmp_path / f"{name}.ts", CHANGING + start, "mpegts").read_bytes()
+        for name, start in (("a", 5.0), ("b", 0.0))
+    )
+    (tmp_path / "joined.ts").write_bytes(first + second)
+    with pytest.raises(InputError, match="the time must rise from frame to frame"):
+        read_video(tmp_path / "joined.ts")
 
 
 def test_undistortion_in_parts_is_that_of_the_whole(street: Clip, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,6 +7,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from catalogs.cameras import load_camera
 from flows.judging.claims import read_claim
 from flows.judging.foreign_sources import ForeignCamera, read_camera, scale_intrinsics
 from tasks.errors import InputError
@@ -35,12 +36,33 @@ def test_intrinsics_follow_the_size_and_refuse_another_shape(tmp_path: Path) -> 
             "height_above_road must be a number",
         ),
         ("{width: 4, width: 5, height: 2, focal_length: 3}", "distinct keys"),
+        ("{width: 4, height: 2, focal_length: 3, k1: [1]}", "k1 must be a number"),
+        ("{width: 4, height: 2, focal_length: 3, k1: 0.1, k4: 1.5}", "k4: no such key"),
+        ("{width: 4, height: 2, focal_length: 3, D: [0.1, 0, 0, 0]}", "D: no such key"),
+        ("{width: 4, height: 2, K: [[3, 0, 2], [0, 3, 1], [0, 0, 1]]}", "K: no such key"),
+        (
+            "{width: 4, height: 2, focal_length: 3, camera_model: OPENCV_FISHEYE}",
+            "camera_model OPENCV_FISHEYE is not known; known are pinhole",
+        ),
+        ("{width: 4, height: 2, focal_length: 3, distortion_model: equidistant}", "equidistant is not known"),
+        (
+            "{width: 4, height: 2, focal_length: {value: 3, unit: mm}}",
+            "focal_length must have the unit px; it has 'mm'",
+        ),
+        ("{width: 4, height: 2, focal_length: 3, line_delay: 1.0e-5}", "line_delay must be 0"),
     ],
 )
 def test_a_camera_holds_what_a_camera_can_have(tmp_path: Path, content: str, words: str) -> None:
     (tmp_path / "K.yaml").write_text(content)
     with pytest.raises(InputError, match=words):
         read_camera(tmp_path / "K.yaml")
+
+
+def test_a_camera_of_the_catalogue_looks_where_its_mount_says(tmp_path: Path) -> None:
+    entry = Path("catalogs/cameras/dashcam-480x320.yaml").read_text()
+    (tmp_path / "K.yaml").write_text(entry + "pitch_down: {value: 5, unit: deg, source: tilted}\n")
+    ours, theirs = read_camera(tmp_path / "K.yaml"), load_camera(tmp_path / "K.yaml")
+    np.testing.assert_allclose(ours.mount, theirs.T_rig_camera)
 
 
 @pytest.mark.parametrize(
