@@ -182,6 +182,7 @@ CHANNELS_BY_NAME: dict[str, Channel] = {
 
 ESSENTIAL = frozenset({
     *(channel.name for channel in IDENTITY_CHANNELS),
+    *(channel.name for channel in PAIR_CHANNELS if not channel.unit),
     "t_ns", "station", "speed", "heave", "pitch", "frame", "tick", "T_world_rig",
 })  # fmt: skip
 """Columns that every dataset has: a table of theirs without one is damaged.
