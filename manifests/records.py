@@ -14,7 +14,7 @@ from typing_extensions import TypedDict
 from catalogs.scenario import SCENARIO_FIELDS, Scenario
 from catalogs.sentences import cap_problems, describe_rules, shorten_value
 from manifests.canonical import ID_LENGTH
-from tasks.conventions import CLIP_CHANNELS, LATER_CHECK_CHANNELS, LATER_CLIP_CHANNELS
+from tasks.conventions import CLIP_CHANNELS
 from tasks.errors import InputError
 from tasks.eval.motion_agreement import PoseVerdict
 
@@ -72,19 +72,15 @@ else:
     ScenarioRecord = with_config(STRICT)(
         TypedDict("ScenarioRecord", get_type_hints(Scenario, include_extras=True))
     )
-    _figures = {
-        c.name: NotRequired[float | None] if c.name in LATER_CLIP_CHANNELS else float | None
-        for c in CLIP_CHANNELS
-        if c.name not in SCENARIO_FIELDS
-    }
+    # a record decides what it has: a figure that came later is not represented
+    _figures = {c.name: NotRequired[float | None] for c in CLIP_CHANNELS if c.name not in SCENARIO_FIELDS}
     FiguresRecord = with_config(STRICT)(
         TypedDict("FiguresRecord", {**_figures, "calibration_extrapolated": bool})
     )
-    _optional = {
-        name: NotRequired[kind | None] if f"check_{name}" in LATER_CHECK_CHANNELS else kind | None
-        for name, kind in get_type_hints(PoseVerdict).items()
-    }
-    VerdictRecord = with_config(STRICT)(TypedDict("VerdictRecord", {**_optional, "reasons": list[str]}))
+    _checks = {name: NotRequired[kind | None] for name, kind in get_type_hints(PoseVerdict).items()}
+    VerdictRecord = with_config(STRICT)(
+        TypedDict("VerdictRecord", {**_checks, "passed": bool | None, "reasons": list[str]})
+    )
 
 
 @with_config(STRICT)

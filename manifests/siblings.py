@@ -80,7 +80,9 @@ def _make_pair(a: Mapping[str, Any], b: Mapping[str, Any], control: str) -> dict
         "control": control,
         "differs": ", ".join(_list_differing(a, b, control)),
     }
-    changes = {f"{name}_change": _compute_change(a["figures"][name], b["figures"][name]) for name in FIGURES}
+    changes = {
+        f"{name}_change": _compute_change(a["figures"].get(name), b["figures"].get(name)) for name in FIGURES
+    }
     return names | changes
 
 

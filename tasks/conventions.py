@@ -125,11 +125,12 @@ CLIP_CHANNELS: tuple[Channel, ...] = (
     Channel(name="peak_pitch_p95", unit="rad", symbol="", description="95th percentile, under the paper's bounds of the surface parameters (Appendix E), of: largest nose-down pitch of the clip"),
     Channel(name="wheel_lift_time_f", unit="s", symbol="", description="time for which the front axle is off the road; above 0 the unilateral contact acts, and the sum of road and brake response (paper mode) is an approximation"),
     Channel(name="wheel_lift_time_r", unit="s", symbol="", description="time for which the rear axle is off the road; above 0 the unilateral contact acts, and the sum of road and brake response (paper mode) is an approximation"),
+    Channel(name="peak_deceleration", unit="m s-2", symbol="", description="largest deceleration of the clip; 0 where the car never slows down"),
+    Channel(name="peak_pitch_rate", unit="rad s-1", symbol="", description="largest pitch rate of the clip, either way"),
+    Channel(name="abs_time", unit="s", symbol="", description="time for which ABS holds back torque of either axle"),
+    Channel(name="peak_slip", unit="1", symbol="", description="largest braking slip of either axle"),
     Channel(name="static_pitch", unit="rad", symbol="theta_0", description="pitch of the resting body, not contained in the pitch column"),
 )  # fmt: skip
-
-LATER_CLIP_CHANNELS = frozenset({"wheel_lift_time_f", "wheel_lift_time_r"})
-"""Columns of a clip that older datasets do not have; their tick table has what they follow from."""
 
 IDENTITY_CHANNELS: tuple[Channel, ...] = (
     Channel(name="clip_id", unit="", symbol="", description="content id of the clip, the join key of every table"),
@@ -162,12 +163,6 @@ CHECK_CHANNELS: tuple[Channel, ...] = (
     Channel(name="check_heave_gain_std", unit="1", symbol="", description="standard uncertainty of the heave gain; a large one leaves it unjudged"),
 )  # fmt: skip
 
-LATER_CHECK_CHANNELS = frozenset({
-    "check_judged_frames", "check_roll_rmse_deg", "check_yaw_rmse_deg", "check_lateral_rmse_m", "check_rise_rmse_m",
-    "check_heave_gain", "check_heave_gain_std",
-})  # fmt: skip
-"""Columns of the pose check that older datasets do not have."""
-
 PAIR_CHANNELS: tuple[Channel, ...] = (
     Channel(name="clip_id_a", unit="", symbol="", description="the sibling that comes first in the dataset"),
     Channel(name="clip_id_b", unit="", symbol="", description="the other sibling"),
@@ -195,3 +190,13 @@ CHANNELS_BY_NAME: dict[str, Channel] = {
         VARIANT_CHANNEL, *IDENTITY_CHANNELS, *TICK_CHANNELS, *FRAME_CHANNELS, *CLIP_CHANNELS, *CHECK_CHANNELS, *PAIR_CHANNELS
     )
 }  # fmt: skip
+
+ESSENTIAL = frozenset({
+    *(channel.name for channel in IDENTITY_CHANNELS),
+    *(channel.name for channel in PAIR_CHANNELS if not channel.unit),
+    "t_ns", "station", "speed", "heave", "pitch", "frame", "tick", "T_world_rig",
+})  # fmt: skip
+"""Columns that every dataset has: a table of theirs without one is damaged.
+
+A dataset's own tables decide what it has of the others: a column that came later is not represented.
+"""

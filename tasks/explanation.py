@@ -5,7 +5,7 @@ Equation numbers are the paper's; S counts the supplement's.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import copysign, isclose
+from math import copysign, isclose, isnan
 from typing import Any
 
 import numpy as np
@@ -57,7 +57,7 @@ class Step:
     @property
     def agrees(self) -> bool:
         """Whether the stored number is the recomputed one, or need not be."""
-        if self.stored is None or not self.exact:
+        if self.stored is None or isnan(self.stored) or not self.exact:
             return True
         return isclose(self.recomputed, self.stored, rel_tol=TOLERANCE, abs_tol=1e-12)
 

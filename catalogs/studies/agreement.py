@@ -1,5 +1,6 @@
 """The paper's printed agreement of its vehicle model with CarSim, by split and group of cases."""
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any
@@ -8,6 +9,9 @@ from pydantic import Field, TypeAdapter
 
 from catalogs.names import Name
 from catalogs.quantities import CatalogueEntry, Number, Text, read_entries
+from catalogs.reference_match import list_differences
+from catalogs.references import ReferenceCase
+from catalogs.studies import load_conditions
 
 SPLITS = {
     "development": "development",
@@ -40,21 +44,41 @@ def printed_agreement() -> dict[str, dict[str, PrintedGroup]]:
     }
 
 
+def find_printed_name(case: ReferenceCase) -> str:
+    """Return the name under which the paper prints a case: that of its conditions, whatever the folder calls it.
+
+    Parameters
+    ----------
+    case : of a folder of traces; one with other conditions than the paper's keeps its name
+    """
+    same = [
+        condition.name
+        for condition in load_conditions()
+        if condition.scenario.precipitation_mm_h == (case.precipitation_mm_h or 0.0)
+        and not list_differences(
+            case, replace(condition.scenario, hold_speed=case.braked), case.surface_coefficient
+        )
+    ]
+    return same[0] if same else case.case
+
+
 def put_beside_print(groups: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Return a row for each printed figure of the groups that an agreement has.
 
     Parameters
     ----------
-    groups : rows with split, group, count, mean and maximum of every figure, and whether the split's road cases brake
+    groups : rows with split, group, count, mean and maximum of every figure, and whether the split's road cases brake;
+        ``paper_group`` is the paper's name of a group where that is another
     """
     rows: list[dict[str, Any]] = []
     for group in groups:
-        printed = printed_agreement().get(SPLITS.get(group["split"], ""), {}).get(group["group"])
+        name = group.get("paper_group", group["group"])
+        printed = printed_agreement().get(SPLITS.get(group["split"], ""), {}).get(name)
         if printed is None:
             continue
         rows += [
             {
-                "split": group["split"], "group": group["group"], "figure": figure,
+                "split": group["split"], "group": group["group"], "paper_group": name, "figure": figure,
                 "cases": group["count"], "mean": group.get(figure),
                 "maximum": group["maximum"].get(figure), "paper_cases": printed.count,
                 "paper_mean": printed.mean[figure], "paper_maximum": printed.maximum.get(figure),

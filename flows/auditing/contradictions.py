@@ -12,7 +12,7 @@ from catalogs.sentences import shorten
 from flows.making.gathering import table_parts
 from flows.making.identity import identify_clip, identify_run, list_deciding
 from flows.making.plan import Plan
-from flows.making.summaries import SUMMARIES, summarise_clips
+from flows.making.summaries import PAIRS, SUMMARIES, summarise_clips
 from flows.store.arrays import arrays_of
 from flows.store.layout import STAGED_TABLES, Layout
 from flows.store.links import require_file
@@ -23,6 +23,7 @@ from manifests.compare import find_row_difference
 from manifests.explain import find_value_differences, format_value
 from manifests.manifest import recorded_files
 from manifests.records import ClipRecord, Manifest
+from tasks.conventions import ESSENTIAL
 from tasks.errors import InputError
 
 SHOWN = 8
@@ -151,6 +152,8 @@ def _compare_summaries(
         except InputError as error:
             yield from error.problems
             continue
+        if path == PAIRS:  # no record says which columns an older table of pairs has
+            wanted = {name: values for name, values in wanted.items() if name in found or name in ESSENTIAL}
         row = find_row_difference(found, wanted, list(dict.fromkeys([*wanted, *found])))
         if row is not None:
             yield (

@@ -148,7 +148,9 @@ def _clip_row(
     if "ticks" in changed:
         ours, theirs = _read_ticks(old, a), _read_ticks(new, b)
         moves |= compare_ticks(ours, theirs)
-        first = find_row_difference(ours, theirs, [channel.name for channel in TICK_CHANNELS])
+        names = [channel.name for channel in TICK_CHANNELS if channel.name in ours.keys() | theirs.keys()]
+        shared = [name for name in names if name in ours.keys() & theirs.keys()]
+        first = find_row_difference(ours, theirs, shared) or find_row_difference(ours, theirs, names)
         row["first"] = first and {
             "channel": first["channel"], "tick": first["tick"], "a": first["recorded"], "b": first["remade"]
         }  # fmt: skip
@@ -159,8 +161,7 @@ def _clip_row(
 
 def _read_ticks(layout: Layout, clip: Mapping[str, Any]) -> dict[str, np.ndarray]:
     folder = layout.telemetry / "ticks" / f"family={clip['scenario']['weather']}"
-    names = [channel.name for channel in TICK_CHANNELS]
-    return read_columns(folder, clip["clip_id"], names, most=read_plan(layout.root).ticks_per_clip)
+    return read_columns(folder, clip["clip_id"], most=read_plan(layout.root).ticks_per_clip)
 
 
 def _compare_pictures(old: Layout, new: Layout, a: int, b: int) -> dict[str, float] | None:

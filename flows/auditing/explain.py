@@ -20,12 +20,12 @@ from flows.making.input_changes import refuse_changed_records
 from flows.making.places import find_scene
 from flows.making.plan import ClipPlan, Plan, read_plan
 from flows.making.traced import refuse_traced
-from flows.reading.query import VIEWS
 from flows.reading.suggestions import suggest_clips
+from flows.reading.views import VIEWS
 from flows.store.address import open_for_reading, want_telemetry
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
-from flows.store.telemetry import read_columns
+from flows.store.telemetry import list_columns, read_columns
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.explanation import Step, force_steps, picture_steps, pitch_steps, surface_steps
@@ -76,7 +76,11 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
     names = [channel.name for channel in VIEWS["frames"]]
     columns = read_columns(folder, planned.clip_id, names, most=plan.settings.frames)
     row, first = ({name: column[i] for name, column in columns.items()} for i in (frame, 0))
-    empty = [c.name for c in TICK_CHANNELS for at in (row, first) if not np.isfinite(at[c.name]).all()]
+    stored = set(list_columns(folder))
+    empty = [
+        c.name for c in TICK_CHANNELS for at in (row, first)
+        if c.name in stored and not np.isfinite(at[c.name]).all()
+    ]  # fmt: skip
     if empty:
         raise InputError(
             f"{folder}: every tick must have every number; frame {frame} or 0 of clip {planned.label} has none in"

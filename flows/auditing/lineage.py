@@ -4,6 +4,8 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from numpy.typing import NDArray
+
 from catalogs.citations import HEADS, find_works, first_clause, join_works
 from flows.auditing.driven_lines import (
     ASKED,
@@ -19,6 +21,7 @@ from flows.auditing.driven_lines import (
 from flows.auditing.explain import find_planned_clip, find_route
 from flows.auditing.kept_lines import Line, describe_file, list_lines
 from flows.auditing.lineage_text import format_text
+from flows.making.gathering import table_parts
 from flows.making.input_changes import read_kept
 from flows.making.plan import Plan
 from flows.making.traced import refuse_traced
@@ -27,9 +30,9 @@ from flows.running.orchestration import run_as_stage
 from flows.store.address import open_for_reading
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
-from flows.store.telemetry import columns_hash
+from flows.store.telemetry import content_hash, list_columns
 from manifests.explain import JUDGING, REACHES, RENDER, kind_of_input, parse_input
-from tasks.conventions import CHANNELS_BY_NAME, TICK_CHANNELS
+from tasks.conventions import CHANNELS_BY_NAME
 from tasks.explanation import Step
 from tasks.surface.weather import WEATHERS
 
@@ -103,7 +106,7 @@ def trace_lineage(dataset: str, clip: str, *, out: str | None = None) -> dict[st
         "clip_id": planned.clip_id,
         "label": planned.label,
         "weather": planned.scenario.weather,
-        "follows": columns_hash(drive.ride.columns, [c.name for c in TICK_CHANNELS]) == content["ticks"],
+        "follows": _follows(dataset, plan, planned.clip_id, drive.ride.columns, content["ticks"]),
         "lines": resting,
         "still": [
             {"file": one.line.file, "key": one.line.key} for one in moved if one.columns == () == one.beyond
@@ -122,6 +125,18 @@ def trace_lineage(dataset: str, clip: str, *, out: str | None = None) -> dict[st
     results.write("lineage.csv", _write_table(resting))
     results.write("lineage.txt", format_text(result))
     return result
+
+
+def _follows(
+    dataset: str, plan: Plan, clip_id: str, columns: Mapping[str, NDArray[Any]], recorded: str
+) -> bool:
+    """Whether the ticks of a clip driven again have the recorded hash: over the columns that the dataset has."""
+    if content_hash("ticks", columns) == recorded:
+        return True
+    path = next(path for path, ids in table_parts(plan, "ticks").items() if clip_id in ids)
+    file = open_for_reading(dataset, lambda name: name == path).root / path
+    stored = set(list_columns(file)) if file.is_file() else set()
+    return content_hash("ticks", {name: columns[name] for name in stored & columns.keys()}) == recorded
 
 
 def _driven_row(one: Moved, pictures: bool) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
 from flows.making.gathering import table_parts
 from flows.making.generate import create_frame_arrays, fan_out, open_workers
@@ -16,13 +17,14 @@ from flows.store.layout import STAGED_TABLES, Layout, write_atomically
 from flows.store.links import require_file
 from flows.store.sealed import read_receipt
 from flows.store.staging import scratch_dataset
-from flows.store.telemetry import read_columns, table_columns
+from flows.store.telemetry import content_hash, read_columns, table_columns
 from manifests.compare import find_pixel_difference, find_row_difference
 from manifests.explain import find_value_differences
 from manifests.records import Manifest, Receipt
-from tasks.conventions import TICK_CHANNELS
+from tasks.conventions import CHANNELS_BY_NAME, ESSENTIAL, TICK_CHANNELS
 from tasks.errors import InputError
 
+Columns = dict[str, NDArray[Any]]
 RECORDED = ("label", "scenario", "seed", "split", "calibration", "figures", "verdict")
 """Entries of a clip's record beside the hashes of its content."""
 STAGES = {"ticks": "vehicle", "frames": "frames"} | dict.fromkeys(RECORDED, "record")
@@ -79,16 +81,16 @@ def _compare_clip(
     again = read_receipt(remade, clip_id)
     changed: dict[str, dict[str, Any]] = {}
     for name in (*STAGED_TABLES, *(arrays_of(plan.settings.labels) if plan.settings.pictures else ())):
+        digest = again["content"][name]
         try:
             if name in STAGED_TABLES:
-                stored = _compare_rows(
-                    layout.root / parts[name, clip_id], remade.staged(clip_id, name), clip_id
-                )
+                columns = _read_as_stored(name, layout.root / parts[name, clip_id], remade, clip_id)
+                digest, stored = content_hash(name, columns[1]), _compare_rows(*columns)
             else:
-                stored = _compare_pixels(layout, remade, index, name, again["content"][name])
+                stored = _compare_pixels(layout, remade, index, name, digest)
         except InputError as error:
             stored = {"channel": name, "problem": error.problems[0]}
-        if stored is not None or again["content"].get(name) != clip["content"].get(name):
+        if stored is not None or digest != clip["content"].get(name):
             # where the stored values are those made again, the recorded hash alone is another
             changed[name] = stored or {"channel": name, "tick": 0}
     for name in RECORDED:
@@ -106,11 +108,17 @@ def _compare_clip(
     }
 
 
-def _compare_rows(file: Path, again: Path, clip_id: str) -> dict[str, Any] | None:
-    """Compare all columns of a clip's rows, those of the motion first."""
-    remade = table_columns(pq.read_table(again))
-    rows = len(next(iter(remade.values())))
+def _read_as_stored(table: str, file: Path, remade: Layout, clip_id: str) -> tuple[Columns, Columns]:
+    """Return a clip's columns as they are stored and those made again, without such as an older table does not have."""
+    again = table_columns(pq.read_table(remade.staged(clip_id, table)))
+    rows = len(next(iter(again.values())))
     recorded = read_columns(require_file(file), clip_id, most=rows, exact=False)
+    later = CHANNELS_BY_NAME.keys() - recorded.keys() - ESSENTIAL
+    return recorded, {name: values for name, values in again.items() if name not in later}
+
+
+def _compare_rows(recorded: Columns, remade: Columns) -> dict[str, Any] | None:
+    """Compare all columns of a clip's rows, those of the motion first."""
     motion = [channel.name for channel in TICK_CHANNELS if channel.name in remade]
     return find_row_difference(recorded, remade, list(dict.fromkeys([*motion, *remade, *recorded])))
 
@@ -127,8 +135,8 @@ def _compare_pixels(
 
 
 def _compare_record(name: str, recorded: Any, again: Any) -> dict[str, dict[str, Any]]:
-    if name == "figures":
-        # older records lack figures that their ticks have
+    if name in {"figures", "verdict"}:
+        # older records lack figures that their ticks and frames have
         again = {figure: value for figure, value in again.items() if figure in recorded}
     for place, a, b in find_value_differences(recorded, again, name):
         return {name: {"channel": place, "recorded": a, "remade": b}}

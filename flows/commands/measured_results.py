@@ -76,8 +76,8 @@ def shorten_agreement(result: dict[str, Any]) -> dict[str, Any]:
     cases = [{key: value for key, value in row.items() if key not in hidden} for row in result["cases"]]
     figures = tuple(result["mean"])
     groups = [
-        {"split": row["split"], "group": row["group"], "cases": row["count"]}
-        | {name: _write_pair(row[name], row["maximum"][name]) for name in figures}
+        {"split": row["split"], "by": row["by"], "group": row["name"], "cases": row["cases"]}
+        | {name: _write_pair(row["mean"][name], row["maximum"][name]) for name in figures}
         for row in result["groups"]
     ]
     printed = [

@@ -107,8 +107,8 @@ class ExportedClip:
         """
         return {name: to_json_value(self.frames[name][frame]) for name in ("frame", "tick", *TICK_COLUMNS)}
 
-    def _read(self, file: str, required: Sequence[str], rows: int) -> Columns:
-        return read_columns(self.layout.root / file, self.clip_id, required, most=rows)
+    def _read(self, file: str, names: Sequence[str], rows: int) -> Columns:
+        return read_columns(self.layout.root / file, self.clip_id, names, most=rows)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,7 +164,7 @@ class ExportedDataset:
 
     @cached_property
     def known_columns(self) -> tuple[str, ...]:
-        """Columns of the tick table that have a number at every frame; a reference trace does not hold all."""
+        """Columns of the tick table that have a number at every frame: reference traces and older tables lack some."""
         known = set(TICK_COLUMNS)
         for clip in self._open_clips():
             known -= {name for name in known if not np.isfinite(clip.frames[name]).all()}

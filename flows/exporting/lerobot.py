@@ -26,6 +26,7 @@ from flows.exporting.dataset import ExportedClip, ExportedDataset
 from flows.exporting.running_statistics import RunningStatistics
 from flows.reading.film import write_film
 from flows.store.layout import write_json
+from flows.store.missing import null_missing
 from tasks.errors import InputError
 
 CAMERA, STATE, POSE, ACTION = "observation.images.front", "observation.state", "observation.pose", "action"
@@ -75,7 +76,7 @@ def write_lerobot(dataset: ExportedDataset, folder: Path) -> None:
         data, film = folder / DATA_PATH.format(**place), folder / VIDEO_PATH.format(video_key=CAMERA, **place)
         for file in (data, film):
             file.parent.mkdir(parents=True, exist_ok=True)
-        pq.write_table(_make_table(columns), data)
+        pq.write_table(null_missing(_make_table(columns)), data)
         write_film(film, list(pictures), rate)
         own = RunningStatistics()
         for name, values in columns.items():
@@ -210,7 +211,7 @@ def _write_meta(
     meta = folder / "meta"
     table = meta / "episodes" / f"{_PLACE.format(**place)}.parquet"
     table.parent.mkdir(parents=True)
-    pq.write_table(pa.Table.from_pylist(episodes), table)
+    pq.write_table(null_missing(pa.Table.from_pylist(episodes)), table)
     tasks = pd.Index([episode["tasks"][0] for episode in episodes], name="task")
     pd.DataFrame({"task_index": range(len(tasks))}, index=tasks).to_parquet(meta / "tasks.parquet")
     write_json(meta / "stats.json", _shape_statistics(total))

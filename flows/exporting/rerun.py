@@ -1,9 +1,9 @@
 """Rerun: one ``.rrd`` a clip, on the timeline ``t``, the time since the start of the clip in nanoseconds.
 
-``/telemetry/COLUMN`` has every tick (1 kHz) as a scalar in float64, with our names, units and signs: pitch positive
-nose-down. ``/world`` is ours (ISO 8855, z up), ``/world/rig`` the rig's pose at every frame, ``/world/rig/camera`` its
-mount and pinhole (x right, y down, z forward; pixel centres at +0.5), and below it ``rgb`` (PNG, as stored), ``depth``
-[m] and ``class``. Poses are in float32, which Rerun's archetypes hold.
+``/telemetry/COLUMN`` has every tick (1 kHz) at which it is represented, as a scalar in float64, with our names, units
+and signs: pitch positive nose-down. ``/world`` is ours (ISO 8855, z up), ``/world/rig`` the rig's pose at every frame,
+``/world/rig/camera`` its mount and pinhole (x right, y down, z forward; pixel centres at +0.5), and below it ``rgb``
+(PNG, as stored), ``depth`` [m] and ``class``. Poses are in float32, which Rerun's archetypes hold.
 
 Format: https://rerun.io/docs/concepts/logging-and-ingestion, written by rerun-sdk itself
 """
@@ -60,14 +60,16 @@ def _send_telemetry(rerun: Any, recording: Any, clip: ExportedClip) -> None:
     times = np.asarray(clip.ticks["t_ns"]).astype("timedelta64[ns]")
     words = describe_columns(TICK_COLUMNS)
     for name in TICK_COLUMNS:
-        if name != "t_ns":
+        values = np.asarray(clip.ticks[name], np.float64)
+        known = ~np.isnan(values)
+        if name != "t_ns" and known.any():
             place = f"telemetry/{name}"
             caption = f"{words[name]['description']} [{words[name]['unit'] or '1'}]"
             recording.log(place, rerun.SeriesLines(names=caption), static=True)
             recording.send_columns(
                 place,
-                indexes=[rerun.TimeColumn(TIMELINE, duration=times)],
-                columns=rerun.Scalars.columns(scalars=np.asarray(clip.ticks[name], np.float64)),
+                indexes=[rerun.TimeColumn(TIMELINE, duration=times[known])],
+                columns=rerun.Scalars.columns(scalars=values[known]),
             )
 
 

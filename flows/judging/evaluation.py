@@ -21,6 +21,7 @@ from flows.judging.trajectories import trajectory_files
 from flows.making.places import refuse_changed_scene
 from flows.running.orchestration import run_as_stage
 from flows.store.address import open_for_reading
+from flows.store.missing import null_missing
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest, refuse_changed_content, require_frames
 from flows.store.telemetry import write_parquet
@@ -108,7 +109,7 @@ def evaluate_dataset(
         "run_id": run_id, "codec": codec, "clips": len(clips), "rows": rows
     }  # fmt: skip
     results.write_json("evaluation.json", result)
-    write_parquet(pa.Table.from_pylist(rows, SCHEMA), results.path("evaluation.parquet"))
+    write_parquet(null_missing(pa.Table.from_pylist(rows, SCHEMA)), results.path("evaluation.parquet"))
     results.write("evaluation.html", render_page(clips, rows, curves, run_id, codec))
     return result
 

@@ -21,12 +21,11 @@ from flows.store.address import open_for_reading, want_telemetry
 from flows.store.layout import Layout
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest, read_plan_record, recorded_grid
-from flows.store.telemetry import read_columns, read_table
+from flows.store.telemetry import list_columns, read_columns, read_table
 from tasks.conventions import (
     CLIP_CHANNELS,
     FRAME_CHANNELS,
     IDENTITY_CHANNELS,
-    LATER_CLIP_CHANNELS,
     TICK_CHANNELS,
 )
 from tasks.errors import InputError
@@ -66,9 +65,10 @@ def audit_physics(dataset: str, *, out: str | None = None) -> dict[str, Any]:
             f"{dataset}: {len(held)} clips hold their speed until the brake ({held[0]} first), by a force that no"
             " column records: the physics audit knows coasting cars only"
         )
-    driven = drive_facts(root, plan)
+    driven, absent = drive_facts(root, plan), list_absent_columns(Layout(root))
     rows = [
-        run_as_stage(_clip_row)(root, facts, driven.get(facts["clip_id"], {}), constants) for facts in clips
+        run_as_stage(_clip_row)(root, facts, driven.get(facts["clip_id"], {}), constants, absent)
+        for facts in clips
     ]
     broken = [row for row in rows if not row["passed"]]
     result = {
@@ -96,9 +96,13 @@ def clip_facts(root: Path) -> list[dict[str, Any]]:
     manifest = read_manifest(layout)
     refuse_changed_records(layout, manifest)
     path = layout.telemetry / "clips.parquet"
-    known = [channel.name for channel in (*IDENTITY_CHANNELS, *CLIP_CHANNELS)]
-    required = [name for name in known if name not in LATER_CLIP_CHANNELS]
-    rows: list[dict[str, Any]] = read_table(path, required=required, most=len(manifest["clips"])).to_pylist()
+    required = [channel.name for channel in IDENTITY_CHANNELS]
+    table = read_table(path, required=required, most=len(manifest["clips"]))
+    unknown = {channel.name: np.nan for channel in CLIP_CHANNELS if channel.unit}
+    rows: list[dict[str, Any]] = [
+        unknown | {name: value for name, value in row.items() if value is not None or name not in unknown}
+        for row in table.to_pylist()
+    ]
     if [row["clip_id"] for row in rows] != [clip["clip_id"] for clip in manifest["clips"]]:
         raise InputError(
             f"{path}: must have a row of each of the manifest's {len(manifest['clips'])} clips, in order; its"
@@ -127,6 +131,27 @@ def drive_facts(root: Path, plan: Plan) -> dict[str, dict[str, Any]]:
     }
 
 
+def list_absent_columns(layout: Layout) -> frozenset[str]:
+    """Return the columns, as table.column, that the tables of an older dataset do not have.
+
+    Parameters
+    ----------
+    layout : of the dataset
+    """
+    tables = {
+        "ticks": TICK_CHANNELS,
+        "frames": (*FRAME_CHANNELS, *TICK_CHANNELS),
+        "clips.parquet": CLIP_CHANNELS,
+    }
+    return frozenset(
+        f"{table.removesuffix('.parquet')}.{channel.name}"
+        for table, channels in tables.items()
+        for names in [list_columns(layout.telemetry / table)]
+        for channel in channels
+        if channel.name not in names
+    )
+
+
 def clip_columns(root: Path, table: str, facts: dict[str, Any]) -> dict[str, np.ndarray]:
     """One clip's columns of the tick or the frame table.
 
@@ -139,7 +164,7 @@ def clip_columns(root: Path, table: str, facts: dict[str, Any]) -> dict[str, np.
     Raises
     ------
     InputError
-        If the clip or one of the table's columns is not there, or it has another number of rows than the plan.
+        If the clip or a column of every dataset is not there, or it has another number of rows than the plan.
     """
     folder = Layout(root).telemetry / table
     channels = TICK_CHANNELS if table == "ticks" else (*FRAME_CHANNELS, *TICK_CHANNELS)
@@ -201,14 +226,14 @@ def _convert_numbers(entry: dict[str, Any]) -> dict[str, float]:
 
 
 def _clip_row(
-    root: Path, seen: dict[str, Any], driven: dict[str, Any], constants: Constants
+    root: Path, seen: dict[str, Any], driven: dict[str, Any], constants: Constants, absent: frozenset[str]
 ) -> dict[str, Any]:
     ticks, frames = clip_columns(root, "ticks", seen), clip_columns(root, "frames", seen)
     facts = seen | driven
     frames |= {name: np.full(len(frames["t_ns"]), driven[name]) for name in DEPTHS if name in driven}
-    holes = [f"ticks.{c}" for c in finite_rows(ticks)]
+    holes = [name for c in finite_rows(ticks) if (name := f"ticks.{c}") not in absent]
     with np.errstate(all="ignore"):  # stored values may be infinite; a law that infinity enters is broken
-        verdict = audit_clip(ticks, frames, facts, constants)
+        verdict = audit_clip(ticks, frames, facts, constants, absent)
     lifted = {
         f"wheel_lift_time_{axle}": float(np.sum(~ticks[f"contact_{axle}"].astype(bool))) * DT for axle in "fr"
     }

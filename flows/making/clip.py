@@ -33,9 +33,8 @@ from flows.running.processors import measure_peak_memory
 from flows.store.address import find_local, send_files
 from flows.store.frames import buffer_hash, write_clip
 from flows.store.layout import STAGED_TABLES, Layout, write_json
-from flows.store.telemetry import columns_hash, labelled_table, write_parquet
+from flows.store.telemetry import content_hash, labelled_table, write_parquet
 from manifests.canonical import sha256_of_file
-from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.eval.body_agreement import BodyClaim, pose_body
 from tasks.eval.motion_agreement import PoseVerdict, judge_pose
@@ -47,6 +46,7 @@ from tasks.render.rasterise.backend import select_backend
 from tasks.render.weather.layers import ClipConditions
 from tasks.surface.anchors import adjacent_anchors
 from tasks.surface.state import SurfaceState
+from tasks.vehicle.peaks import compute_peaks
 from tasks.vehicle.rollout import Rollout, compute_lift_times
 
 
@@ -90,13 +90,13 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
         **clip.as_json(),
         "artifacts": {layout.relative(path): sha256_of_file(path) for path in shards.values()},
         "content": {name: buffer_hash(values) for name, values in buffers.items()}
-        | {"ticks": columns_hash(ride.columns, [channel.name for channel in TICK_CHANNELS]),
-           "frames": columns_hash(frames, sorted(frames))},
+        | {"ticks": content_hash("ticks", ride.columns), "frames": content_hash("frames", frames)},
         "figures": _json_numbers(facts | {
             "stop_time": ride.stop_time,
             "stopping_distance": ride.stopping_distance,
             "peak_pitch": float(ride.columns["pitch"].max()),
             **compute_lift_times(ride.columns),
+            **compute_peaks(ride.columns),
             "static_pitch": ride.static_pitch,
             "calibration_extrapolated": ride.calibration_extrapolated,
         } | ranges),

@@ -24,7 +24,7 @@ from flows.running.runner import RunnerChoice
 from flows.store.layout import write_atomically
 from flows.store.outputs import find_dataset_problems, refuse_link
 from flows.store.sealed import read_manifest, recorded_grid
-from flows.store.telemetry import columns_hash
+from flows.store.telemetry import content_hash
 from manifests.explain import as_sentences, find_tool_differences, parse_input, tools_here
 from manifests.frozen_run import (
     FOLDER,
@@ -37,7 +37,6 @@ from manifests.frozen_run import (
 )
 from manifests.provenance import describe_processor
 from manifests.records import FrozenRun
-from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 
 SHOWN_DIFFERENCES = 8
@@ -242,7 +241,6 @@ def ticks_of(plan: Plan, asked: GridFile) -> dict[str, str]:
     plan : the clips
     asked : settings with the vehicle and the surface as they were asked for; the plan may record their names alone
     """
-    names = [channel.name for channel in TICK_CHANNELS]
     vehicle, surface = load_vehicle(asked.vehicle), load_surface(asked.surface)
     mode, duration_s = plan.settings.vehicle_mode, plan.duration_s
     steady = (
@@ -255,7 +253,7 @@ def ticks_of(plan: Plan, asked: GridFile) -> dict[str, str]:
         for clip in plan.clips
     )
     return {
-        clip.label: columns_hash(ride.columns, names) for clip, ride in zip(plan.clips, rides, strict=True)
+        clip.label: content_hash("ticks", ride.columns) for clip, ride in zip(plan.clips, rides, strict=True)
     }
 
 

@@ -9,7 +9,6 @@ from typing import Any, TypeVar
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 
 from catalogs.variants import Variant
 from flows.making.plan import ClipPlan, Plan
@@ -49,11 +48,11 @@ def clips_table(receipts: Iterable[Receipt], variant: Variant) -> pa.Table:
     receipts : of the clips
     variant : of the dataset
     """
-    columns: dict[str, list[Any]] = {}
+    columns: dict[str, list[pa.Array]] = {}
     for batch in batched(receipts):
         rows = [_clip_row(receipt) for receipt in batch]
-        for name in rows[0]:
-            columns.setdefault(name, []).append(_pack([row[name] for row in rows]))
+        for name in columns or rows[0]:
+            columns.setdefault(name, []).append(_pack([row.get(name) for row in rows]))
     # each column's parts go when it is whole
     cut = {} if variant == "full" else {"variant": variant}
     return labelled_table({name: _join(columns.pop(name)) for name in list(columns)}, cut)
@@ -69,24 +68,16 @@ def _clip_row(r: Receipt) -> dict[str, Any]:
     )
 
 
-def _pack(values: list[Any]) -> Any:
-    """Values of some rows: floats, with NaN for None, where one is, an array where all are text, else as they are."""
-    if any(isinstance(value, float) for value in values):
-        return _as_floats(values)
-    return pa.array(values) if all(isinstance(value, str) for value in values) else values
+def _pack(values: list[Any]) -> pa.Array:
+    """Values of some rows, NULL for None; floats where one of them is a float."""
+    return pa.array(values, pa.float64() if any(isinstance(value, float) for value in values) else None)
 
 
-def _join(parts: list[Any]) -> Any:
+def _join(parts: list[pa.Array]) -> pa.Array:
     """The packed parts of one column: floats where any part is, or where nothing is represented."""
-    if any(isinstance(part, np.ndarray) for part in parts) or all(v is None for part in parts for v in part):
-        return np.concatenate([part if isinstance(part, np.ndarray) else _as_floats(part) for part in parts])
-    if all(isinstance(part, pa.Array) for part in parts):
-        return pa.concat_arrays(parts)
-    return [value for part in parts for value in (part.to_pylist() if isinstance(part, pa.Array) else part)]
-
-
-def _as_floats(values: list[Any]) -> NDArray[np.float64]:
-    return np.array([np.nan if value is None else value for value in values], float)
+    kinds = [part.type for part in parts if not pa.types.is_null(part.type)]
+    kind = pa.float64() if not kinds or pa.float64() in kinds else kinds[0]
+    return pa.concat_arrays([part.cast(kind, safe=False) for part in parts])
 
 
 class Outcomes(Sequence[Mapping[str, Any]]):
@@ -100,7 +91,7 @@ class Outcomes(Sequence[Mapping[str, Any]]):
 
     def __init__(self, clips: Sequence[ClipPlan], table: pa.Table):
         self.clips = clips
-        self.figures = {name: table[name].to_numpy() for name in FIGURES}
+        self.figures = {name: table[name].to_numpy() for name in FIGURES if name in table.column_names}
 
     def __len__(self) -> int:
         return len(self.clips)

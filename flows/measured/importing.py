@@ -19,6 +19,7 @@ from flows.measured.run_plan import PlannedRun, find_run_problems, plan_runs
 from flows.measured.shared_problems import PlacedProblem, join_shared_problems, place_in_file
 from flows.measured.signal_listing import list_recorded_signals
 from flows.store.layout import write_atomically, write_json
+from flows.store.missing import null_missing
 from flows.store.telemetry import write_parquet
 from manifests.canonical import sha256_of_file
 from tasks.campaign.assembly import Assembled, assemble_run
@@ -248,7 +249,7 @@ def run_table(columns: dict[str, np.ndarray], rate: float) -> pa.Table:
         pa.field(name, pa.float64(), metadata={"units": CHANNELS_BY_NAME[name].unit}) for name in columns
     ]
     arrays = [pa.array(np.arange(count) / rate)] + [pa.array(values) for values in columns.values()]
-    return pa.Table.from_arrays(arrays, schema=pa.schema(fields))
+    return null_missing(pa.Table.from_arrays(arrays, schema=pa.schema(fields)))
 
 
 def _find_signal_problems(source: Path, channel_map: ChannelMap | None) -> list[str]:

@@ -12,6 +12,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from flows.store.missing import null_missing
 from flows.store.outputs import Outputs
 from tasks.errors import InputError
 
@@ -66,9 +67,9 @@ def format_csv(names: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
 
 
 def format_parquet(table: pa.Table) -> memoryview:
-    """Return a table as the bytes of a Parquet file, with the types that DuckDB gave it."""
+    """Return a table as the bytes of a Parquet file, with the types that DuckDB gave it; NaN is NULL."""
     buffer = pa.BufferOutputStream()
-    pq.write_table(table, buffer, compression="zstd")
+    pq.write_table(null_missing(table), buffer, compression="zstd")
     return memoryview(buffer.getvalue())
 
 

@@ -9,15 +9,17 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from catalogs.sentences import shorten
-from flows.reading.table_files import SCHEME, TableFiles, bound_rows, table_files
+from flows.reading.table_files import SCHEME, TableFiles, bound_rows, open_stored_table, table_files
+from flows.reading.views import VIEWS, list_absent
 from flows.store.address import open_for_reading, want_telemetry
 from flows.store.layout import Layout
+from flows.store.missing import has_nulls
 from flows.store.parquet_files import refuse_footer
 from flows.store.sealed import read_manifest_head
 from manifests.manifest import is_traced
-from tasks.conventions import CHECK_CHANNELS, LATER_CHECK_CHANNELS
 from tasks.errors import InputError
 
+_SQL_TYPES = {pa.float64(): "DOUBLE", pa.string(): "VARCHAR"}
 _SETTINGS: dict[str, str | bool | int | float | list[str]] = {
     "autoinstall_known_extensions": False,
     "autoload_known_extensions": False,
@@ -32,7 +34,7 @@ _CLOSED: dict[str, str | bool | int | float | list[str]] = {
 
 
 def connect_views(dataset: str | Path, *, allow_files: bool = False) -> duckdb.DuckDBPyConnection:
-    """Return a DuckDB connection in memory with the views of a sealed dataset; values not represented are NULL.
+    """Return a DuckDB connection in memory with the views of a sealed dataset; what is not represented is NULL.
 
     Parameters
     ----------
@@ -69,16 +71,22 @@ def connect_sealed(
         connection.execute("SET lock_configuration = true")
     try:
         for table, names in tables.items():
-            connection.execute(
-                f"CREATE VIEW {table} AS SELECT {_select_columns(table, next(iter(names.values())), traced)} FROM"
-                f" read_parquet({_format_list(map(_make_address, names))},"
-                f" hive_partitioning = {table in {'ticks', 'frames'}})"
-            )
-        there = set(pq.read_schema(next(iter(tables["clips"].values()))).names)
-        checks = ", ".join(
-            c.name for c in CHECK_CHANNELS if c.name in there or c.name not in LATER_CHECK_CHANNELS
-        )
-        connection.execute(f"CREATE VIEW verdicts AS SELECT clip_id, label, weather, {checks} FROM clips")
+            schema = pq.read_schema(next(iter(names.values())))
+            # of a car that was driven every tick has every number: the largest table is read as it is
+            if has_nulls(schema) or (table == "ticks" and not traced):
+                absent = "".join(
+                    f", NULL::{_SQL_TYPES[x.type]} AS {quote_identifier(x.name)}"
+                    for x in list_absent(table, schema)
+                )
+                connection.execute(
+                    f"CREATE VIEW {table} AS SELECT *{absent} FROM"
+                    f" read_parquet({_format_list(map(_make_address, names))},"
+                    f" hive_partitioning = {table in {'ticks', 'frames'}})"
+                )
+            else:
+                connection.from_arrow(open_stored_table(layout, manifest, table)).create_view(table)
+        checks = ", ".join(channel.name for channel in VIEWS["verdicts"])
+        connection.execute(f"CREATE VIEW verdicts AS SELECT {checks} FROM clips")
     except (duckdb.Error, pa.ArrowException, OSError) as error:
         connection.close()
         raise InputError(
@@ -86,19 +94,6 @@ def connect_sealed(
             " musync verify says whether they are damaged"
         ) from None
     return connection
-
-
-def _select_columns(table: str, first: Path, traced: bool) -> str:
-    """All columns, with NaN as NULL: SQL's aggregates leave NULL out, and would return NaN for NaN.
-
-    Of a car that was driven every tick has every number, and the largest table is read as it is.
-    """
-    schema = pq.read_schema(first)
-    if table == "ticks" and not traced:
-        return "*"
-    floats = [field.name for field in schema if str(field.type) == "double"]
-    nulls = ", ".join(f"nullif({name}, 'nan'::DOUBLE) AS {name}" for name in map(quote_identifier, floats))
-    return f"* REPLACE ({nulls})" if nulls else "*"
 
 
 def quote_identifier(name: str) -> str:

@@ -45,7 +45,7 @@ def describe_dataset(dataset: str) -> dict[str, Any]:
         "clips": [
             {"clip_id": clip["clip_id"], "label": clip["label"]}
             | {
-                k: clip["figures"][k]
+                k: clip["figures"].get(k)
                 for k in ("surface_friction", "tyre_peak", "stopping_distance", "peak_pitch")
             }
             | {"passed": clip["verdict"]["passed"]}

@@ -37,7 +37,7 @@ def dataset_card(data: "Dataset") -> str:
     first: dict[str, Mapping[str, Any]] = {}
     for clip in clips:
         first.setdefault(clip["scenario"]["weather"], clip)
-    stops = [clip["figures"]["stopping_distance"] for clip in clips]
+    stops = [clip["figures"].get("stopping_distance") for clip in clips]
     stops = [stop for stop in stops if stop is not None]
     counts = {kind: sum(clip["scenario"]["weather"] == kind for clip in clips) for kind in first}
     failed = sum(clip["verdict"]["passed"] is False for clip in clips)
@@ -63,9 +63,9 @@ def clip_card(clip: "Clip") -> str:
     rows = [
         ("weather", f"{scenario['weather']}, {scenario['precipitation_mm_h']:g} mm/h"),
         ("initial speed", f"{scenario['initial_speed_km_h']:g} km/h"),
-        ("surface friction", _format_figure(figures["surface_friction"], "{:.3f}")),
-        ("stopping distance", _format_figure(figures["stopping_distance"], "{:.1f} m", none="no stop in the clip")),
-        ("largest nose-down pitch", _format_figure(figures["peak_pitch"], "{:.2f} deg", degrees(1))),
+        ("surface friction", _format_figure(figures.get("surface_friction"), "{:.3f}")),
+        ("stopping distance", _format_figure(figures.get("stopping_distance"), "{:.1f} m", none="no stop in the clip")),
+        ("largest nose-down pitch", _format_figure(figures.get("peak_pitch"), "{:.2f} deg", degrees(1))),
         ("pose check", {True: "passed", False: "failed: in quarantine"}.get(clip.record["verdict"]["passed"], "none")),
         ("clip id", clip.clip_id),
         *([("frames", fault)] if fault else []),

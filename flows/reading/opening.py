@@ -13,9 +13,10 @@ from flows.reading.arguments import list_names
 from flows.reading.clips import Clip, find_clip
 from flows.reading.connection import connect_sealed, quote_identifier
 from flows.reading.pictures import open_frames_store, open_labelled_frames
-from flows.reading.query import VIEWS, list_columns, refuse_several, refused_query
+from flows.reading.query import list_columns, refuse_several, refused_query
 from flows.reading.suggestions import suggest_names
 from flows.reading.table_files import STORED, explain_unreadable, open_stored_table
+from flows.reading.views import VIEWS
 from flows.store.address import open_for_reading, want_telemetry
 from flows.store.layout import Layout
 from flows.store.sealed import read_manifest, read_manifest_head

@@ -12,32 +12,11 @@ import pyarrow as pa
 from catalogs.sentences import shorten
 from flows.reading.answer_files import format_csv, format_parquet, make_plain, open_answer_file
 from flows.reading.connection import connect_views
+from flows.reading.suggestions import suggest_names
+from flows.reading.views import VIEWS
 from flows.store.arrays import arrays_of
-from tasks.conventions import (
-    CHECK_CHANNELS,
-    CLIP_CHANNELS,
-    FRAME_CHANNELS,
-    IDENTITY_CHANNELS,
-    PAIR_CHANNELS,
-    TICK_CHANNELS,
-    VARIANT_CHANNEL,
-    Channel,
-)
+from tasks.conventions import VARIANT_CHANNEL, Channel
 from tasks.errors import InputError
-
-_JOIN_KEYS = tuple(c for c in IDENTITY_CHANNELS if c.name in {"clip_id", "label", "weather"})
-_SURFACE = tuple(c for c in CLIP_CHANNELS if c.name in {
-    "film_depth_mm", "snow_depth_mm", "snow_coverage", "surface_friction", "tyre_peak",
-})  # fmt: skip
-VIEWS: dict[str, tuple[Channel, ...]] = {
-    "clips": (*IDENTITY_CHANNELS, *CLIP_CHANNELS, *CHECK_CHANNELS),
-    "ticks": (*_JOIN_KEYS, *TICK_CHANNELS),
-    "frames": (*_JOIN_KEYS, *_SURFACE, *FRAME_CHANNELS, *TICK_CHANNELS),
-    "verdicts": (*_JOIN_KEYS, *CHECK_CHANNELS),
-    "pairs": PAIR_CHANNELS,
-}
-"""The views and their columns; ``ticks`` and ``frames`` also have ``family``, by which their files lie."""
-
 
 MOST_VALUES = 20_000_000
 """Of one answer [1]: as Python objects they take some 2 GB."""
@@ -47,6 +26,13 @@ _REACHED = re.compile(
     r'Cannot access (?:file|directory) "(?P<place>.*)" - file system operations are disabled'
     r"|the configuration has been locked|Loading external extensions is disabled"
 )
+_NO_COLUMN = re.compile(
+    r'column (?:named |with name )?"+(?P<name>[^"\n]+)"[^\n]*(?:not found|does not exist|no matching entry)'
+    r'|does not have a column (?:named|with name) "(?P<of_table>[^"\n]+)"',
+    re.IGNORECASE,
+)
+_LISTED = f"views are {', '.join(VIEWS)}; musync schema lists their columns"
+_CANDIDATES = re.compile(r'"([^"\n]+)"')
 _Result = TypeVar("_Result")
 
 
@@ -187,17 +173,34 @@ def refused_query(query: str, error: Exception, option: str) -> InputError:
     """
     text = str(error).strip()
     reached = _REACHED.search(text)
+    if (wrong := _NO_COLUMN.search(text)) is not None:
+        return _suggest_columns(query, wrong["name"] or wrong["of_table"], text)
     if reached is None:
-        return InputError(
-            f"query {shorten(query)}: {_last_line(text)}\n"
-            f"views are {', '.join(VIEWS)}; musync schema lists their columns"
-        )
+        return InputError(f"query {shorten(query)}: {_last_line(text)}\n{_LISTED}")
     asked = (
         shorten(reached["place"]) if reached["place"] else "a change of DuckDB's settings, or an extension"
     )
     return InputError(
         f"query {shorten(query)}: this query asks for {asked}, and may read the dataset's views alone;"
         f" {option} lets SQL read and write files of this machine"
+    )
+
+
+def _suggest_columns(query: str, name: str, text: str) -> InputError:
+    """The sentence for a column that does not exist: near names of the views that the query reads, and who has it."""
+    read = [view for view in VIEWS if re.search(rf"\b{view}\b", query, re.IGNORECASE)] or list(VIEWS)
+    known = [channel.name for view in read for channel in VIEWS[view]]
+    known += _CANDIDATES.findall(text.partition("Candidate")[2])  # of the query's own tables too
+    error = suggest_names(
+        f"query {shorten(query)}: {' and '.join(read)}: column",
+        [name],
+        list(dict.fromkeys(known)),
+        "musync schema",
+    )
+    having = [view for view, channels in VIEWS.items() if name.casefold() in {c.name for c in channels}]
+    elsewhere = f"; {' and '.join(having)} have this column" if having else ""
+    return InputError(
+        f"{error.problems[0]}{elsewhere}\nviews are {', '.join(VIEWS)}; musync schema lists their columns"
     )
 
 

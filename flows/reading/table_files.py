@@ -19,7 +19,9 @@ import pyarrow.parquet as pq
 from fsspec import AbstractFileSystem  # type: ignore[import-untyped]
 
 from catalogs.sentences import shorten, shorten_value
+from flows.reading.views import list_absent
 from flows.store.layout import Layout
+from flows.store.missing import has_nulls
 from flows.store.parquet_files import CHECKED, CLIPS_PER_FILE, refuse_footer
 from flows.store.sealed import recorded_grid
 from tasks.errors import InputError
@@ -78,6 +80,8 @@ def bound_rows(manifest: Mapping[str, Any], place: object) -> dict[str, int]:
 def open_stored_table(layout: Layout, manifest: Mapping[str, Any], table: str) -> "pyarrow.dataset.Dataset":
     """Return a stored table, clips, ticks, frames or pairs, as a lazy pyarrow dataset; its schema has the units.
 
+    What is not represented is NULL, whichever version of muSync wrote the files.
+
     Raises
     ------
     InputError
@@ -90,15 +94,21 @@ def open_stored_table(layout: Layout, manifest: Mapping[str, Any], table: str) -
         refuse_footer(path, bound_rows(manifest, layout)[table])
     try:
         # without the metadata of the whole: libraries read settings for other libraries there
-        schema = pq.read_schema(paths[0]).remove_metadata()
+        stored = pq.read_schema(paths[0])
+        schema = pa.schema([*stored, *list_absent(table, stored)])
         checked = dataset.ParquetFileFormat(
             default_fragment_scan_options=dataset.ParquetFragmentScanOptions(**CHECKED)
         )
-        if table in {"clips", "pairs"}:
-            return dataset.dataset(paths, schema=schema, format=checked)
-        partitioning = dataset.partitioning(pa.schema([("family", pa.string())]), flavor="hive")
-        schema = schema.append(pa.field("family", pa.string()))
-        return dataset.dataset(paths, schema=schema, format=checked, partitioning=partitioning)
+        partitioning = None
+        if table in {"ticks", "frames"}:
+            partitioning = dataset.partitioning(pa.schema([("family", pa.string())]), flavor="hive")
+            schema = schema.append(pa.field("family", pa.string()))
+        opened = dataset.dataset(paths, schema=schema, format=checked, partitioning=partitioning)
+        if has_nulls(stored):
+            return opened
+        from flows.reading.older_tables import OlderTable
+
+        return OlderTable(list(opened.get_fragments()), schema, checked, opened.filesystem)
     except (pa.ArrowException, OSError) as error:
         raise explain_unreadable(layout, error) from None
 

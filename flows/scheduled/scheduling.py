@@ -126,8 +126,8 @@ def _make_at(place: str, grid: str, *, runner: RunnerName = "dask", **execution:
             {
                 "clip": clip["label"],
                 "passed": clip["verdict"]["passed"],
-                "pitch_rmse_deg": clip["verdict"]["pitch_rmse_deg"],
-                "stopping_distance_m": clip["figures"]["stopping_distance"],
+                "pitch_rmse_deg": clip["verdict"].get("pitch_rmse_deg"),
+                "stopping_distance_m": clip["figures"].get("stopping_distance"),
                 "reasons": "; ".join(clip["verdict"]["reasons"]),
             }
             for clip in clips

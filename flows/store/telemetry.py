@@ -10,9 +10,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from flows.store.layout import write_pieces
+from flows.store.missing import has_nulls, null_missing, read_values
 from flows.store.parquet_files import CHECKED, CLIPS_PER_FILE, STAGED, call_reader, refuse_footer
 from manifests.canonical import sha256_of
-from tasks.conventions import CHANNELS_BY_NAME, Channel
+from tasks.conventions import CHANNELS_BY_NAME, ESSENTIAL, FRAME_CHANNELS, TICK_CHANNELS, Channel
 from tasks.errors import InputError
 
 ROW_GROUP_ROWS = 100_000
@@ -20,7 +21,7 @@ SHOWN_COLUMNS = 8
 
 
 def labelled_table(columns: Mapping[str, Any], constants: Mapping[str, Any] | None = None) -> pa.Table:
-    """An Arrow table whose fields carry unit, symbol, CF name and description.
+    """An Arrow table whose fields carry unit, symbol, CF name and description; NaN becomes NULL.
 
     Parameters
     ----------
@@ -38,15 +39,14 @@ def labelled_table(columns: Mapping[str, Any], constants: Mapping[str, Any] | No
             arrays[name] = pa.FixedSizeListArray.from_arrays(pa.array(values.ravel()), values.shape[1])
         else:
             arrays[name] = pa.array(values)
-    fields = [
-        pa.field(
-            name,
-            array.type,
-            metadata=channel_labels(CHANNELS_BY_NAME[name]) if name in CHANNELS_BY_NAME else None,
-        )
-        for name, array in arrays.items()
-    ]
-    return pa.Table.from_arrays(list(arrays.values()), schema=pa.schema(fields))
+    fields = [labelled_field(name, array.type) for name, array in arrays.items()]
+    return null_missing(pa.Table.from_arrays(list(arrays.values()), schema=pa.schema(fields)))
+
+
+def labelled_field(name: str, kind: pa.DataType) -> pa.Field:
+    """Return a column's field with the unit, symbol, CF name and description of its channel, if it is one."""
+    channel = CHANNELS_BY_NAME.get(name)
+    return pa.field(name, kind, metadata=None if channel is None else channel_labels(channel))
 
 
 def write_parquet(table: pa.Table, path: Path) -> None:
@@ -165,7 +165,7 @@ def read_parts(paths: Iterable[Path], most: int) -> Iterator[pa.Table]:
 def read_table(
     path: Path, clip_id: str | None = None, required: Iterable[str] = (), *, most: int
 ) -> pa.Table:
-    """A Parquet file, or a folder of them.
+    """A Parquet file, or a folder of them, with NULL where a value is not represented.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def read_table(
     filters = None if clip_id is None else [("clip_id", "==", clip_id)]
     table = call_reader(path, pq.read_table, path, filters=filters, **CHECKED)
     _refuse_columns(table, path, required, clip_id)
-    return table
+    return table if has_nulls(table.schema) else null_missing(table)
 
 
 def _refuse_columns(
@@ -213,47 +213,75 @@ def _refuse_columns(
         raise InputError(problems)
 
 
+def list_columns(path: Path) -> list[str]:
+    """Return the names of the columns of a Parquet file, or of those of a folder.
+
+    Parameters
+    ----------
+    path : file or folder
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it is no table as muSync writes it.
+    """
+    names: list[str] = call_reader(path, pq.ParquetDataset, path).schema.names
+    return names
+
+
 def read_columns(
-    path: Path, clip_id: str | None = None, required: Iterable[str] = (), *, most: int, exact: bool = True
+    path: Path, clip_id: str | None = None, names: Iterable[str] = (), *, most: int, exact: bool = True
 ) -> dict[str, np.ndarray]:
     """The columns of `read_table` as NumPy arrays.
 
     Parameters
     ----------
-    path, clip_id, required, most : as of `read_table`
+    path, clip_id, most : as of `read_table`
+    names : columns that are returned whatever the table has: one that an older dataset does not have is NaN throughout
     exact : whether the clip must have just as many rows
 
     Raises
     ------
     InputError
-        As `read_table` raises it, or for another number of rows.
+        As `read_table` raises it, for another number of rows, or if one of the names is `ESSENTIAL` and not there.
     """
-    table = read_table(path, clip_id, required, most=most)
+    wanted = list(names)
+    table = read_table(path, clip_id, [name for name in wanted if name in ESSENTIAL], most=most)
     if exact and len(table) != most:
         raise InputError(
             f"{path}: must hold {most} rows of clip {clip_id}; it holds {len(table)}: musync repair makes the table"
             " again"
         )
-    return table_columns(table)
+    columns = table_columns(table)
+    return columns | {name: np.full(len(table), np.nan) for name in wanted if name not in columns}
 
 
 def table_columns(table: pa.Table) -> dict[str, np.ndarray]:
-    """Return NumPy arrays by column name; a fixed-size list column is 2-D."""
-    columns = {}
-    for name in table.column_names:
-        column = table[name].combine_chunks()
-        if pa.types.is_fixed_size_list(column.type):
-            columns[name] = column.flatten().to_numpy().reshape(len(column), column.type.list_size)
-        else:
-            columns[name] = column.to_numpy(zero_copy_only=False)
-    return columns
+    """Return NumPy arrays by column name: NULL is NaN again, and a fixed-size list column is 2-D."""
+    return {name: read_values(table[name].combine_chunks()) for name in table.column_names}
+
+
+def content_hash(table: str, columns: Mapping[str, np.ndarray]) -> str:
+    """Return what a clip's record holds of its ticks or frames: a table of an older dataset decides its columns.
+
+    Parameters
+    ----------
+    table : ticks or frames
+    columns : of one clip; those that repeat its id and figures in every row do not count
+    """
+    if table == "ticks":
+        return columns_hash(columns, [channel.name for channel in TICK_CHANNELS if channel.name in columns])
+    names = {channel.name for channel in (*FRAME_CHANNELS, *TICK_CHANNELS)}
+    return columns_hash(columns, sorted(names & columns.keys()))
 
 
 def columns_hash(columns: Mapping[str, np.ndarray], names: Iterable[str]) -> str:
-    """SHA-256 over the named columns' decoded bytes: the same on any Arrow version."""
+    """SHA-256 over the named columns' decoded bytes: the same on any Arrow version, and for every NaN."""
     parts: list[bytes | memoryview] = []
     for name in names:
         values = np.ascontiguousarray(columns[name])
+        if values.dtype.kind == "f":
+            values = np.where(np.isnan(values), np.nan, values)
         parts += [f"{name} {values.dtype.str} {values.shape}\n".encode(), values.data.cast("B")]
     return sha256_of(parts)
 
@@ -261,8 +289,6 @@ def columns_hash(columns: Mapping[str, np.ndarray], names: Iterable[str]) -> str
 def _holds_numbers(column: pa.ChunkedArray) -> bool:
     kind = column.type
     if pa.types.is_fixed_size_list(kind):
-        if column.null_count:
-            return False
         kind = kind.value_type
     return bool(pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_boolean(kind))
 

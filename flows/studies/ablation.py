@@ -16,6 +16,7 @@ from catalogs.variants import COUPLINGS, Variant
 from catalogs.vehicles import load_vehicle, vehicle_provenance
 from flows.drawing import as_svg
 from flows.making.driving import simulate_drive
+from flows.store.missing import null_missing
 from flows.store.outputs import Outputs
 from flows.store.telemetry import write_parquet
 from flows.studies.ablation_figure import ablation_figure
@@ -79,7 +80,7 @@ def run_ablation(
     }  # fmt: skip
     results.write_json("ablation.json", result)
     table = {"time": time} | {f"pitch_deg_{name.replace('-', '_')}": c for name, c in curves.items()}
-    write_parquet(pa.table(table), results.path("ablation.parquet"))
+    write_parquet(null_missing(pa.table(table)), results.path("ablation.parquet"))
     figure = ablation_figure(stops, time, curves, {row["variant"]: row for row in pitch})
     drawing = as_svg(figure)
     results.write("ablation.svg", drawing)

@@ -9,7 +9,7 @@ from typing import Any
 
 from catalogs.references import ReferenceCase, Traces, read_reference
 from catalogs.studies import load_sensitivity_study
-from catalogs.studies.agreement import put_beside_print
+from catalogs.studies.agreement import find_printed_name, put_beside_print
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_provenance
 from flows.drawing import as_svg
@@ -32,6 +32,8 @@ BENCHMARKS = (
     "rasteriser", "vehicle", "weather", "camera", "pose_checks", "pipeline", "queries", "store", "loading", "rollouts",
 )  # fmt: skip
 
+BY = dict.fromkeys(("flat", "hump", "depression"), "road")
+"""What a group's cases have in common, by its name; other names are those of what the cases vary."""
 STOP_FIGURES = ("braking_time_error_s", "slip_distance_error_m")
 
 
@@ -103,8 +105,9 @@ def measure_agreement(
 def agreement_of(model: Vehicle, reference: list[tuple[ReferenceCase, Traces]], mode: Mode) -> dict[str, Any]:
     """Agreement of a vehicle with reference cases: a row a case, the groups of each split, the mean over all.
 
-    Groups are those of the paper's tables: flat, hump, depression and all cases, and what a case varies: weather, brake
-    or road. ``beside_print`` has the paper's figure of the same split and group, or of the case itself.
+    Groups are those of the paper's tables: ``by`` road flat, hump and depression, ``by`` weather, brake or road the
+    cases that vary it, and all. ``group``, ``count`` and the figures beside them repeat what the other keys say.
+    ``beside_print`` has the paper's figure of the same split and group, or of the case with the same conditions.
 
     Parameters
     ----------
@@ -123,8 +126,9 @@ def agreement_of(model: Vehicle, reference: list[tuple[ReferenceCase, Traces]], 
         rows.append({"split": case.split} | asdict(scored) | {"window": list(scored.window)} | stops)
     controls = {case.case: case.control for case, _ in reference}
     groups = [
-        {"split": split, "group": name, "count": group.count, **_make_plain(group.mean),
-         "event_unit": group.event_unit, "maximum": _make_plain(group.maximum)}
+        {"split": split, "by": BY.get(name, name), "name": name, "cases": group.count, "mean": _make_plain(group.mean),
+         "maximum": _make_plain(group.maximum), "event_unit": group.event_unit,
+         "group": name, "count": group.count, **_make_plain(group.mean)}
         for split, cases in splits.items()
         for name, group in (summarise_groups(cases) | summarise_by_control(cases, controls)).items()
     ]  # fmt: skip
@@ -138,14 +142,22 @@ def agreement_of(model: Vehicle, reference: list[tuple[ReferenceCase, Traces]], 
         "cases": rows,
         "groups": groups,
         "mean": _make_plain(overall),
-        "beside_print": put_beside_print([*groups, *map(_stand_as_group, rows)]),
+        "beside_print": put_beside_print(
+            [
+                *groups,
+                *(
+                    _stand_as_group(row, find_printed_name(case))
+                    for row, (case, _) in zip(rows, reference, strict=True)
+                ),
+            ]
+        ),
     }
 
 
 def _write_agreement_page(result: Mapping[str, Any], drawings: Sequence[Drawing]) -> str:
     groups = [
-        {"split": group["split"], "group": group["group"], "cases": group["count"]}
-        | {name: group[name] for name in result["mean"]}
+        {"split": group["split"], "by": group["by"], "group": group["name"], "cases": group["cases"]}
+        | group["mean"]
         | {f"largest {name}": value for name, value in group["maximum"].items()}
         for group in result["groups"]
     ]
@@ -203,9 +215,10 @@ def run_benchmarks(name: str | None = None, *, out: str | None = None) -> dict[s
     return {"rows": rows}
 
 
-def _stand_as_group(row: dict[str, Any]) -> dict[str, Any]:
+def _stand_as_group(row: dict[str, Any], printed: str) -> dict[str, Any]:
     """A case as a group of one, for the cases that the paper prints one by one."""
-    return row | {"group": row["case"], "count": 1, "maximum": {}, "road_cases_brake": False}
+    one = {"group": row["case"], "paper_group": printed, "count": 1, "maximum": {}, "road_cases_brake": False}
+    return row | one
 
 
 def _average_stops(rows: list[dict[str, Any]]) -> dict[str, float]:

@@ -4,9 +4,10 @@ from decimal import Decimal
 
 import pytest
 
+from catalogs.references import ReferenceCase
 from catalogs.scenario import find_scenario_problems
 from catalogs.studies import load_conditions, load_sensitivity_study
-from catalogs.studies.agreement import printed_agreement, put_beside_print
+from catalogs.studies.agreement import find_printed_name, printed_agreement, put_beside_print
 
 
 def test_there_are_nineteen_development_and_twelve_held_out_conditions():
@@ -99,3 +100,14 @@ def test_a_group_stands_beside_the_figure_of_its_split_alone():
     assert not found["note"]
     (check, *_) = put_beside_print([group | {"split": "speed_check", "group": "all"}])
     assert check["note"] == "the cases here brake, the paper's coast by their slip"
+
+
+def test_a_case_stands_beside_the_printed_case_with_its_conditions_whatever_its_name():
+    braked = {"surface_coefficient": 0.82, "initial_speed_km_h": 60, "ramp_s": 0.5, "weather": "dry"}
+    for row, printed in (
+        ({"peak_pressure_mpa": 1.6, "brake_onset_s": 1.0}, "pressure-1.6mpa"),
+        ({"peak_pressure_mpa": 2.3, "brake_onset_m": 12.0}, "onset-12m"),
+        ({"peak_pressure_mpa": 1.7, "brake_onset_s": 1.0}, "brake-1.6MPa"),
+    ):
+        case = ReferenceCase.model_validate({"case": "brake-1.6MPa", "split": "held-out", **braked, **row})
+        assert find_printed_name(case) == printed

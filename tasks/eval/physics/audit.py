@@ -1,6 +1,6 @@
 """The physics verdict on one clip's telemetry: the laws that it breaks, and the column that explains them best."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -56,6 +56,7 @@ def audit_clip(
     frames: Mapping[str, NDArray[Any]],
     facts: Mapping[str, Any],
     constants: Constants,
+    absent: Set[str] = frozenset(),
 ) -> PhysicsVerdict:
     """Check one clip's stored columns by every law.
 
@@ -65,8 +66,9 @@ def audit_clip(
     frames : columns of the frame table
     facts : the clip's row: scenario, surface, outcome and check
     constants : frozen car and pavement
+    absent : columns, as table.column, that an older dataset does not have: no law that relates one is evaluated
     """
-    laws = evaluate_laws(ticks, frames, facts, constants)
+    laws = tuple(law for law in evaluate_laws(ticks, frames, facts, constants) if not law.columns & absent)
     suspects = rank_suspects(laws)
     if len(suspects) > 1:
         suspects = _rank_by_pattern(suspects, laws, ticks, frames, facts, constants)

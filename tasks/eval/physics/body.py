@@ -188,7 +188,7 @@ def surface_laws(facts: Mapping[str, Any], constants: Constants) -> list[Law | N
 def outcome_laws(
     ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants
 ) -> list[Law | None]:
-    """Return the laws of stop, distance, peak pitch and wheel lift, each computed again.
+    """Return the laws of stop, distance, peaks, ABS and wheel lift, each computed again.
 
     Parameters
     ----------
@@ -199,6 +199,15 @@ def outcome_laws(
     s, v, pitch = ticks["station"], ticks["speed"], ticks["pitch"]
     laws = [
         evaluate_law("peak pitch is the largest", "clips.peak_pitch pitch", pitch.max() - facts["peak_pitch"], 1e-12),
+        evaluate_law("peak deceleration is the largest", "clips.peak_deceleration longitudinal_acceleration",
+            max(0.0, -ticks["longitudinal_acceleration"].min()) - np.array([facts["peak_deceleration"]]), 1e-12),
+        evaluate_law("peak pitch rate is the largest", "clips.peak_pitch_rate pitch_rate",
+            np.abs(ticks["pitch_rate"]).max() - np.array([facts["peak_pitch_rate"]]), 1e-12),
+        evaluate_law("peak slip is the larger axle's", "clips.peak_slip braking_slip_f braking_slip_r",
+            max(ticks[f"braking_slip_{axle}"].max() for axle in "fr") - np.array([facts["peak_slip"]]), 1e-12),
+        evaluate_law("ABS time is time of a reduced torque", "clips.abs_time abs_scale_f abs_scale_r",
+            np.array([facts["abs_time"] - DT * np.sum((ticks["abs_scale_f"] < 1) | (ticks["abs_scale_r"] < 1))]),
+            0.5 * DT),
         evaluate_law("static pitch is the car's", "clips.static_pitch",
             np.array([facts["static_pitch"] - constants.car["static_pitch"]]), 1e-9),
     ]  # fmt: skip
@@ -206,7 +215,7 @@ def outcome_laws(
         evaluate_law(f"wheel lift is time without contact, {axle}", f"clips.wheel_lift_time_{axle} contact_{axle}",
             np.array([facts[f"wheel_lift_time_{axle}"] - DT * np.sum(np.asarray(ticks[f"contact_{axle}"]) < 0.5)]),
             0.5 * DT)
-        for axle in "fr" if f"wheel_lift_time_{axle}" in facts
+        for axle in "fr"
     ]  # fmt: skip
     standing = np.flatnonzero(v <= 0)
     if standing.size:

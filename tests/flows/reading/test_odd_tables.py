@@ -10,7 +10,6 @@ import pytest
 import musync
 from flows.reading.query import query_dataset
 from flows.store.layout import Layout
-from tasks.conventions import LATER_CHECK_CHANNELS
 from tasks.errors import InputError
 from tests.flows.reseal import reseal
 
@@ -123,17 +122,3 @@ def test_a_file_that_is_no_parquet_is_one_sentence(copy, content):
     ):
         with pytest.raises(InputError, match=r"musync (verify|repair)"):
             reader()
-
-
-def test_a_dataset_from_before_the_check_of_the_whole_rig_is_read_as_before(copy):
-    def forget_verdicts(manifest: dict) -> None:
-        for clip in manifest["clips"]:
-            for column in LATER_CHECK_CHANNELS:
-                del clip["verdict"][column.removeprefix("check_")]
-
-    change(copy.telemetry / "clips.parquet", lambda table: table.drop_columns(sorted(LATER_CHECK_CHANNELS)))
-    reseal(copy, forget_verdicts)
-    rows = query_dataset(str(copy.root), "SELECT * FROM verdicts")["rows"]
-    assert len(rows) == 4 and {"check_pitch_rmse_deg", "check_failed_frames"} <= rows[0].keys()
-    assert not LATER_CHECK_CHANNELS & rows[0].keys()
-    assert len(list(musync.open(copy.root))) == 4

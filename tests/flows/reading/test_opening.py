@@ -127,14 +127,14 @@ def test_the_python_of_the_analysts_page_runs_as_it_stands(data, toy_dataset, tm
 
 
 def test_what_is_not_represented_is_null_and_left_out_of_an_average(data, toy_dataset):
-    """Clips that coast over a hump have no stopping distance; in Parquet that is NaN."""
-    stored = pq.read_table(toy_dataset.telemetry / "clips.parquet")["stopping_distance"].to_numpy()
-    answer = query_dataset(
-        str(toy_dataset.root), "SELECT count(stopping_distance) n, avg(peak_pitch) p FROM clips"
+    """Two of the four clips never brake."""
+    stored = pq.read_table(toy_dataset.telemetry / "clips.parquet")["brake_onset_s"]
+    query = (
+        "SELECT count(brake_onset_s) n, avg(brake_onset_s) mean, count(*) FILTER (brake_onset_s > 0.1) late"
+        " FROM clips"
     )
-    assert np.isnan(stored).sum() >= 2
-    assert answer["rows"][0]["n"] == np.isfinite(stored).sum()
-    assert 0 < answer["rows"][0]["p"] < 0.2
+    assert sorted(stored.to_pylist(), key=str) == [0.2, 0.2, None, None]
+    assert query_dataset(str(toy_dataset.root), query)["rows"] == [{"n": 2, "mean": 0.2, "late": 2}]
 
 
 def test_pairs_are_those_of_the_grid_and_join_with_clips(data):
@@ -149,6 +149,22 @@ def test_pairs_are_those_of_the_grid_and_join_with_clips(data):
 def test_a_query_that_is_no_sql_is_one_sentence_with_the_views(toy_dataset):
     with pytest.raises(InputError, match="views are clips, ticks, frames, verdicts, pairs"):
         query_dataset(str(toy_dataset.root), "SELECT nothing FROM nowhere")
+
+
+@pytest.mark.parametrize(
+    ("query", "told"),
+    [
+        ("SELECT stoping_distance FROM clips", r"clips: column 'stoping_distance': .* near it: stopping_distance, "),
+        ("SELECT c.lable FROM clips c JOIN ticks USING (clip_id)", r"clips and ticks: column .* near it: label"),
+        ("SELECT * EXCLUDE (wether) FROM frames", r"frames: column 'wether': .* near it: weather"),
+        ("WITH t AS (SELECT 1 AS apple) SELECT appel FROM t", r"column 'appel': .* near it: apple"),
+        ("SELECT speed FROM clips", r"column 'speed': .*; ticks and frames have this column"),
+    ],
+)  # fmt: skip
+def test_a_wrong_column_in_sql_gets_the_names_that_come_near(data, toy_dataset, query, told):
+    for ask in (data.sql, lambda query: query_dataset(str(toy_dataset.root), query)):
+        with pytest.raises(InputError, match=told):
+            ask(query)
 
 
 def test_of_two_statements_none_is_answered_alone(data):

@@ -96,6 +96,10 @@ def test_a_case_that_the_paper_prints_stands_beside_its_own_row(frozen, tmp_path
     rows = {row["figure"]: row for row in result["beside_print"] if row["group"] == "flat-rain5"}
     assert rows["pitch_rmse_deg"]["paper_mean"] == 0.10208 and rows["event_error"]["paper_mean"] == 0.28361
     assert rows["pitch_rmse_deg"]["mean"] == result["cases"][0]["pitch_rmse_deg"]
+    groups = {(group["by"], group["name"]): group for group in result["groups"]}
+    assert groups.keys() == {("road", "flat"), ("weather", "weather"), ("all", "all")}
+    assert groups["weather", "weather"]["cases"] == 1
+    assert groups["weather", "weather"]["mean"] == groups["weather", "weather"]["maximum"] == result["mean"]
 
 
 def test_agreement_drives_a_frozen_vehicle_in_the_mode_it_was_fitted_in(frozen):
