@@ -68,7 +68,8 @@ TICK_CHANNELS: tuple[Channel, ...] = (
     Channel(name="unsprung_heave_r", unit="m", symbol="z_u,r", description="rear axle height about static equilibrium"),
     Channel(name="road_height_f", unit="m", symbol="z_r,f", description="road elevation under the front axle"),
     Channel(name="road_height_r", unit="m", symbol="z_r,r", description="road elevation under the rear axle"),
-    Channel(name="road_force", unit="N", symbol="F_x,road", description="longitudinal force of the road slope, forward positive"),
+    Channel(name="road_grade", unit="1", symbol="i", description="grade of the route under the front axle beside the road feature: rise per metre of way, uphill positive"),
+    Channel(name="road_force", unit="N", symbol="F_x,road", description="longitudinal force of the road feature's slope, forward positive"),
     Channel(name="contact_f", unit="1", symbol="", description="front axle touches the road"),
     Channel(name="contact_r", unit="1", symbol="", description="rear axle touches the road"),
 )  # fmt: skip
