@@ -115,10 +115,11 @@ CLIP_CHANNELS: tuple[Channel, ...] = (
     Channel(name="peak_pitch_p95", unit="rad", symbol="", description="95th percentile, under the paper's bounds of the surface parameters (Appendix E), of: largest nose-down pitch of the clip"),
     Channel(name="wheel_lift_time_f", unit="s", symbol="", description="time for which the front axle is off the road; above 0 the unilateral contact acts, and the sum of road and brake response (paper mode) is an approximation"),
     Channel(name="wheel_lift_time_r", unit="s", symbol="", description="time for which the rear axle is off the road; above 0 the unilateral contact acts, and the sum of road and brake response (paper mode) is an approximation"),
+    Channel(name="lateral_demand", unit="m s-2", symbol="", description="largest lateral acceleration that the route's bends ask, speed squared times curvature; the model brakes with all of the grip, surface friction times g, as on a straight road"),
     Channel(name="static_pitch", unit="rad", symbol="theta_0", description="pitch of the resting body, not contained in the pitch column"),
 )  # fmt: skip
 
-LATER_CLIP_CHANNELS = frozenset({"wheel_lift_time_f", "wheel_lift_time_r"})
+LATER_CLIP_CHANNELS = frozenset({"wheel_lift_time_f", "wheel_lift_time_r", "lateral_demand"})
 """Columns of a clip that older datasets do not have; their tick table has what they follow from."""
 
 IDENTITY_CHANNELS: tuple[Channel, ...] = (

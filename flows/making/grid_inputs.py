@@ -11,13 +11,16 @@ from catalogs.gates import GATES
 from catalogs.grids import Grid, GridFile
 from catalogs.hazard_markings import load_marking
 from catalogs.low_speed import LOW_SPEED, NO_LOW_SPEED_RULE, is_rule_applied, load_low_speed
+from catalogs.road_grade import ROAD_GRADE, write_road_grade
 from catalogs.scenario import find_range_problems, find_route_problems
 from catalogs.scenes import load_scene, scene_identity
+from catalogs.sentences import cap_problems
 from catalogs.studies import SENSITIVITY
 from catalogs.studies.ablation import ABLATION, cut_coupling, load_families
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_content, vehicle_tyre_source
 from catalogs.weather.grip import FOLDER as WEATHER_FOLDER
+from flows.making.bends import find_bend_problems
 from flows.making.driving import surface_of
 from flows.making.memory import find_memory_problems
 from flows.making.places import remember_place
@@ -25,6 +28,8 @@ from flows.making.traced import read_trace_inputs
 from tasks.errors import InputError
 from tasks.render.sensor import Sensor
 from tasks.render.weather.snow.layer import HIGHEST_LUMP
+from tasks.scene.route_shape import sample_grade
+from tasks.surface.road_profile import RoadGrade
 from tasks.surface.weather import WEATHERS, find_weather_problem
 
 LOADERS: Mapping[str, Callable[[Path], Any]] = {
@@ -127,8 +132,13 @@ def read_grid_inputs(grid: Grid, tick_rate_hz: int) -> tuple[dict[str, bytes], d
     if not problems:
         problems += _find_weather_problems(grid.settings, weathers)
         problems += _find_buried_cameras(grid)
+    sound = not problems
     if scene:
         problems += _find_route_problems(grid)
+        if grid.poses is None and not (grade := grade_of(grid.settings)).is_level:
+            inputs[ROAD_GRADE] = write_road_grade(grade, scene["name"])
+    if sound and grid.poses is None:
+        problems += cap_problems(find_bend_problems(grid))
     if grid.poses is not None:
         traces, found = read_trace_inputs(grid, grid.poses)
         inputs, problems = inputs | traces, problems + found
@@ -215,6 +225,11 @@ def _find_camera_problems(settings: GridFile, tick_rate_hz: int) -> list[str]:
         f"composition: paper is one of finished 8-bit pictures; {camera.name} has a lens, a shutter or a sensor that"
         " needs linear light: take a plain camera or composition: linear",
     ]
+
+
+def grade_of(settings: GridFile) -> RoadGrade:
+    """Return the grade of the road in a grid's scene."""
+    return sample_grade(load_scene(settings.scene).route)
 
 
 def _find_route_problems(grid: Grid) -> list[str]:

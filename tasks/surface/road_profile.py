@@ -42,7 +42,6 @@ class RoadHazard:
         if problems:
             raise InputError(problems)
 
-
     @property
     def steepest_slope(self) -> float:
         """Largest slope of its flanks, pi A_g / L_g [1]."""

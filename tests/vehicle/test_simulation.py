@@ -138,7 +138,9 @@ def test_what_two_axles_can_differ_in_is_what_a_table_says():
 
 def test_a_grade_takes_its_share_of_gravity_and_pitches_the_body_as_braking_does(vehicle, run):
     coast = make_trace_input(np.zeros(300), 0.01)
-    up, flat, down = (run(coast, conditions=Conditions(grade=RoadGrade(rise=(0.03,)), direction=d)) for d in (1, 0, -1))
+    up, flat, down = (
+        run(coast, conditions=Conditions(grade=RoadGrade(rise=(0.03,)), direction=d)) for d in (1, 0, -1)
+    )
     turning = (vehicle.wheel_inertia_f + vehicle.wheel_inertia_r) / vehicle.wheel_radius**2
     share = vehicle.mass / (vehicle.mass + turning)
     for hill, sign in ((up, 1.0), (down, -1.0)):
@@ -152,7 +154,8 @@ def test_a_car_that_stands_on_a_grade_rests_on_its_lower_axle(vehicle, run):
     """Statics: the weight along the grade, m g i, acts at the height of the centre of gravity on the wheelbase."""
     brake = make_trace_input(np.full(800, 2.0), 0.01)
     up, flat, down = (
-        run(brake, samples=800, conditions=Conditions(grade=RoadGrade(rise=(0.1,)), direction=d)) for d in (1, 0, -1)
+        run(brake, samples=800, conditions=Conditions(grade=RoadGrade(rise=(0.1,)), direction=d))
+        for d in (1, 0, -1)
     )
     weight = 0.1 * vehicle.mass * vehicle.gravity
     for hill, sign in ((up, 1.0), (down, -1.0)):

@@ -129,6 +129,7 @@ def compile_advance(vehicle: Vehicle) -> Any:
             RoadLine(state.motion.station, block[_FRONT_HEIGHT], block[_FRONT_SLOPE]),
             RoadLine(state.motion.station - fixed.wheels.wheelbase, block[_REAR_HEIGHT], block[_REAR_SLOPE]),
         )  # fmt: skip
+        level = Climb(1.0, block[:0])  # a hill comes by the slopes
         for _ in range(max(steps, 1)):
             samples = 1 if steps < 0 else 2
             if samples == 2:
@@ -137,7 +138,7 @@ def compile_advance(vehicle: Vehicle) -> Any:
             begin = (round(state.time / STEP) + 2 - held) * STEP
             drive = BrakeInput(NO_COMMAND, pressures, STEP, block[_HOLD] != 0.0, engines, begin)
             integrate_motion(
-                state, samples, _SUBSTEPS, STEP, drive, road, Climb(1.0, block[:0]), slots, chassis, tyre, history, states
+                state, samples, _SUBSTEPS, STEP, drive, road, level, slots, chassis, tyre, history, states
             )
             state = unpack_state(states[samples - 1])
         last = 0 if steps < 0 else 1

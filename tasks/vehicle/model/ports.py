@@ -160,7 +160,9 @@ def compute_ports(
     link_r = rear.tyre_force + slope_r + body.unsprung_r * (acceleration + instant.climb)
     braking = (link_f + link_r) * chassis.lever + front.brake_torque + rear.brake_torque
     braking += front.shaft_torque + rear.shaft_torque
-    if instant.held:  # what holds the speed drives at the ground, as the tyres of a standing car hold it there
+    if (
+        instant.held
+    ):  # what holds the speed drives at the ground, as the tyres of a standing car hold it there
         braking -= wheels.mass * instant.climb * (chassis.lever + wheels.radius)
     moment += braking * (1.0 + effects.pitch_gain)
     return Ports(

@@ -223,7 +223,9 @@ def integrate_motion(
         if len(drive.engine) > 0:
             engine = interpolate_trace(time - drive.begin, drive.engine, drive.interval)
             next_engine = interpolate_trace(time + step - drive.begin, drive.engine, drive.interval)
-        instant = Instant(time, line, rate, deceleration, standing, held, engine, compute_climb(motion.station, climb))
+        instant = Instant(
+            time, line, rate, deceleration, standing, held, engine, compute_climb(motion.station, climb)
+        )
         ports = compute_ports(motion, memory, x, instant, scale_f, scale_r, step, slots, chassis, tyre, road)
         if n % substeps == 0:
             f, r = ports.front, ports.rear
@@ -243,7 +245,14 @@ def integrate_motion(
         deceleration = -ports.acceleration
         ahead = motion.station if standing else motion.station + step * motion.speed
         next_instant = Instant(
-            time + step, next_line, rate, deceleration, standing, held, next_engine, compute_climb(ahead, climb)
+            time + step,
+            next_line,
+            rate,
+            deceleration,
+            standing,
+            held,
+            next_engine,
+            compute_climb(ahead, climb),
         )
         motion, memory, x = take_step(
             motion, memory, x, ports, instant, next_instant, step, slots, chassis, tyre, road

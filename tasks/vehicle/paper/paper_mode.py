@@ -120,7 +120,9 @@ def run_paper_mode(
 
     def move_body() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         braked = BrakedStop(onset=onset, sample=stop, time=stop_time) if pitch_rule else NO_STOP
-        return simulate_body(vehicle, response, hazard, log, braked, grid.step, held_share=held_share, grade=grade)
+        return simulate_body(
+            vehicle, response, hazard, log, braked, grid.step, held_share=held_share, grade=grade
+        )
 
     log, onset, stop, stop_time = drive(ANALYTIC_LOADS)
     if hazard.height_m == 0:
