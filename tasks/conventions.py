@@ -74,6 +74,9 @@ TICK_CHANNELS: tuple[Channel, ...] = (
     Channel(name="contact_r", unit="1", symbol="", description="rear axle touches the road"),
 )  # fmt: skip
 
+LATER_TICK_CHANNELS = frozenset({"road_grade"})
+"""Columns of a tick that older datasets do not have: their cars felt every road as level."""
+
 FRAME_CHANNELS: tuple[Channel, ...] = (
     Channel(name="frame", unit="1", symbol="", description="frame number in the clip"),
     Channel(name="tick", unit="1", symbol="", description="row of the tick table that the frame shows"),

@@ -27,7 +27,7 @@ from flows.store.address import open_for_reading, want_telemetry
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
 from flows.store.telemetry import read_columns
-from tasks.conventions import TICK_CHANNELS
+from tasks.conventions import LATER_TICK_CHANNELS, TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.explanation import Step, force_steps, picture_steps, pitch_steps, surface_steps
 from tasks.scene.route import Route
@@ -77,7 +77,8 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
     names = [channel.name for channel in VIEWS["frames"]]
     columns = read_columns(folder, planned.clip_id, names, plan.settings.frames)
     row, first = ({name: column[i] for name, column in columns.items()} for i in (frame, 0))
-    empty = [c.name for c in TICK_CHANNELS for at in (row, first) if not np.isfinite(at[c.name]).all()]
+    needed = [c.name for c in TICK_CHANNELS if c.name not in LATER_TICK_CHANNELS]
+    empty = [name for name in needed for at in (row, first) if not np.isfinite(at[name]).all()]
     if empty:
         raise InputError(
             f"{folder}: every tick must have every number; frame {frame} or 0 of clip {planned.label} has none in"
