@@ -13,7 +13,7 @@ from tasks.surface.road_profile import RoadGrade
 SPACING_M = 2.0
 """Distance of the samples [m]."""
 WINDOW_M = 10.0
-"""Length of road over which each is taken, cut at the ends of the route [m]."""
+"""Length of road over which each is taken; near an end of the route it is the first or last that long [m]."""
 DIGITS = 9
 """Decimals of a grade: a millionth of a millimetre per metre, below which processors may differ [1]."""
 
@@ -72,5 +72,5 @@ def _list_stations(route: Route) -> NDArray[np.float64]:
 
 def _window_ends(route: Route) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the stations between which each sample is taken, two arrays [N] [m]."""
-    station = _list_stations(route)
-    return np.maximum(station - WINDOW_M / 2, 0.0), np.minimum(station + WINDOW_M / 2, route.length)
+    before = np.clip(_list_stations(route) - WINDOW_M / 2, 0.0, max(route.length - WINDOW_M, 0.0))
+    return before, np.minimum(before + WINDOW_M, route.length)

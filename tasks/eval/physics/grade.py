@@ -1,5 +1,6 @@
 """The law that the grade of the road is that of the route's poses."""
 
+import itertools
 from collections.abc import Mapping
 from typing import Any
 
@@ -22,8 +23,9 @@ def grade_laws(
 ) -> list[Law | None]:
     """Return the law that the road rises between two frames by the integral of its grade over the way.
 
-    The route's height is that of the rig poses without heave and pitch. A grade is taken over some length, so where it
-    changes the height may lag: by the change of the grade times that length, over eight.
+    The route's height is that of the rig poses without heave and pitch. A grade is a mean over `SMOOTHING_M`, so its
+    integral is the mean height over that length: where the road bends it differs from the height by the second
+    derivative times the length squared, over 24.
 
     Parameters
     ----------
@@ -39,10 +41,13 @@ def grade_laws(
     station, grade = ticks["station"], read_grade(ticks)
     climbed = np.concatenate([[0.0], np.cumsum(np.diff(station) * (grade[1:] + grade[:-1]) / 2)])
     rows = np.clip(frames["tick"], 0, len(station) - 1)
-    lag = np.ptp(grade) * SMOOTHING_M / 8
+    gone = np.diff(station)
+    bend = np.where(gone > 1e-6, np.abs(np.diff(grade)) / np.maximum(gone, 1e-6), 0.0)
+    sharpest = [bend[a : b + 1].max(initial=0.0) for a, b in itertools.pairwise(rows)]
+    open_rise = 2 * SMOOTHING_M**2 / 24 * np.array(sharpest)
     return [
         evaluate_law(
             "road rises by its grade", "frames.T_world_rig ticks.road_grade ticks.station",
-            np.diff(height) - np.diff(climbed[rows]), RISE_M + lag + 1e-3 * np.abs(np.diff(station[rows])),
+            np.diff(height) - np.diff(climbed[rows]), RISE_M + open_rise + 1e-3 * np.abs(np.diff(station[rows])),
         )
     ]  # fmt: skip
