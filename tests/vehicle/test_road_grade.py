@@ -99,7 +99,8 @@ def test_a_coasting_car_climbs_without_pitching(vehicle, mode):
 @pytest.mark.parametrize("mode", MODES)
 def test_a_road_of_grade_zero_is_the_level_road_bit_for_bit(vehicle, mode):
     level, flat = (
-        drive(vehicle, mode, grade).columns for grade in (RoadGrade(), RoadGrade(rise=(0.0, 0.0), spacing_m=7.0))
+        drive(vehicle, mode, grade).columns
+        for grade in (RoadGrade(), RoadGrade(rise=(0.0, 0.0), spacing_m=7.0))
     )
     assert all(level[name].tobytes() == flat[name].tobytes() for name in level)
 

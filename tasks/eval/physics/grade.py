@@ -1,6 +1,5 @@
 """The law that the grade of the road is that of the route's poses."""
 
-import itertools
 from collections.abc import Mapping
 from typing import Any
 
@@ -23,9 +22,8 @@ def grade_laws(
 ) -> list[Law | None]:
     """Return the law that the road rises between two frames by the integral of its grade over the way.
 
-    The route's height is that of the rig poses without heave and pitch. A grade is a mean over `SMOOTHING_M`, so its
-    integral is the mean height over that length: where the road bends it differs from the height by the second
-    derivative times the length squared, over 24.
+    The route's height is that of the rig poses without heave and pitch. A grade is a mean over `SMOOTHING_M`, near an
+    end of the route one whose middle lies half that length away: where the road bends nearby, that much is left open.
 
     Parameters
     ----------
@@ -43,11 +41,13 @@ def grade_laws(
     rows = np.clip(frames["tick"], 0, len(station) - 1)
     gone = np.diff(station)
     bend = np.where(gone > 1e-6, np.abs(np.diff(grade)) / np.maximum(gone, 1e-6), 0.0)
-    sharpest = [bend[a : b + 1].max(initial=0.0) for a, b in itertools.pairwise(rows)]
-    open_rise = 2 * SMOOTHING_M**2 / 24 * np.array(sharpest)
+    at, way = station[rows], np.diff(station[rows])
+    near = np.searchsorted(station, at[:-1] - SMOOTHING_M), np.searchsorted(station, at[1:] + SMOOTHING_M)
+    sharpest = np.array([bend[a:b].max(initial=0.0) for a, b in zip(*near, strict=True)])
+    open_rise = sharpest * SMOOTHING_M * (SMOOTHING_M / 12 + way / 2)
     return [
         evaluate_law(
             "road rises by its grade", "frames.T_world_rig ticks.road_grade ticks.station",
-            np.diff(height) - np.diff(climbed[rows]), RISE_M + open_rise + 1e-3 * np.abs(np.diff(station[rows])),
+            np.diff(height) - np.diff(climbed[rows]), RISE_M + 1e-3 * way + open_rise,
         )
     ]  # fmt: skip
