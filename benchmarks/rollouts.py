@@ -57,7 +57,7 @@ def compute_rates(time: float, y: Array, chassis: Chassis, tyre: Tyre, road: Roa
     still = AxleMemory(0.0, 0.0, 0.0)
     motion = Motion(y[1], y[0], y[2], y[3])
     x = (y[4], y[5], y[6], y[7], y[8], y[9], y[10], y[11])
-    instant = Instant(time, pressure, 0.0, 0.0, False, False, 0.0)
+    instant = Instant(time, pressure, 0.0, 0.0, False, False, 0.0, 0.0)
     ports = compute_ports(motion, Memory(still, still), x, instant, 1.0, 1.0, 1.0, None, chassis, tyre, road)
     rates = compute_motion_rates(motion, ports, False, chassis)
     body = compute_body_rates(x, ports, chassis)

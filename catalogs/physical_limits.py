@@ -16,7 +16,8 @@ Rate = Annotated[Scalar, require_quantity("mm h-1", above=0)]
 
 class PhysicalLimits(CatalogueEntry):
     """The largest value of each quantity, and of a speed and a hazard's length also the smallest; ``position`` is along
-    the route, ``brake_time`` any time of a brake."""
+    the route, ``brake_time`` any time of a brake, ``hazard_slope`` of a feature's steepest flank, ``road_grade`` of a
+    scene's steepest road."""
 
     rain_rate: Rate
     snow_rate: Rate
@@ -31,6 +32,9 @@ class PhysicalLimits(CatalogueEntry):
     shortest_hazard: Metres
     hazard_height: Metres
     duration: Seconds
+    hazard_slope: Annotated[Scalar, require_quantity("1", above=0)]
+    strut_travel: Metres
+    road_grade: Annotated[Scalar, require_quantity("1", above=0)]
     frame_rate: Annotated[Scalar, require_quantity("Hz", above=0)]
     frames: Annotated[Scalar, require_quantity("1", minimum=2)]
 

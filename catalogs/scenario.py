@@ -2,7 +2,7 @@
 
 from collections.abc import Collection
 from dataclasses import dataclass, fields
-from math import isfinite
+from math import isfinite, pi
 from operator import attrgetter
 from typing import Any
 
@@ -95,8 +95,14 @@ def find_scenario_problems(scenario: Scenario, unknown: Collection[str] = ()) ->
     if abs(s.hazard_height_m) > 0 and s.hazard_length_m == 0:
         problems.append(f"a hazard of height {s.hazard_height_m:g} m needs hazard_length_m above 0; it is 0")
     if abs(s.hazard_height_m) > 0 and s.hazard_length_m > 0:
-        shortest = load_physical_limits().shortest_hazard
-        problems += filter(None, [find_least_problem("hazard_length_m", s.hazard_length_m, shortest)])
+        limits = load_physical_limits()
+        found = [find_least_problem("hazard_length_m", s.hazard_length_m, limits.shortest_hazard)]
+        steepest = pi * abs(s.hazard_height_m) / s.hazard_length_m
+        if found == [None] and find_limit_problem("", abs(s.hazard_height_m), limits.hazard_height) is None:
+            found = [
+                find_limit_problem("pi hazard_height_m / hazard_length_m", steepest, limits.hazard_slope)
+            ]
+        problems += filter(None, found)
     return problems
 
 

@@ -18,6 +18,7 @@ REACHES = {
     "camera.yaml": (RENDER,),
     "hazard_marking.yaml": (RENDER,),
     "low_speed.yaml": (VEHICLE, RENDER),
+    "road_grade.yaml": (VEHICLE, RENDER),
     "ablation.yaml": (VEHICLE, RENDER),
     "no_low_speed_rule.yaml": (VEHICLE, RENDER),
     "gates.yaml": (JUDGING,),

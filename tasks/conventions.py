@@ -79,7 +79,8 @@ TICK_CHANNELS: tuple[Channel, ...] = (
     Channel(name="unsprung_heave_r", unit="m", symbol="z_u,r", description="rear axle height about static equilibrium"),
     Channel(name="road_height_f", unit="m", symbol="z_r,f", description="road elevation under the front axle"),
     Channel(name="road_height_r", unit="m", symbol="z_r,r", description="road elevation under the rear axle"),
-    Channel(name="road_force", unit="N", symbol="F_x,road", description="longitudinal force of the road slope, forward positive"),
+    Channel(name="road_grade", unit="1", symbol="i", description="grade of the route under the front axle beside the road feature: rise per metre of way, uphill positive"),
+    Channel(name="road_force", unit="N", symbol="F_x,road", description="longitudinal force of the road feature's slope, forward positive"),
     Channel(name="contact_f", unit="1", symbol="", description="front axle touches the road"),
     Channel(name="contact_r", unit="1", symbol="", description="rear axle touches the road"),
 )  # fmt: skip
@@ -129,6 +130,7 @@ CLIP_CHANNELS: tuple[Channel, ...] = (
     Channel(name="peak_pitch_rate", unit="rad s-1", symbol="", description="largest pitch rate of the clip, either way"),
     Channel(name="abs_time", unit="s", symbol="", description="time for which ABS holds back torque of either axle"),
     Channel(name="peak_slip", unit="1", symbol="", description="largest braking slip of either axle"),
+    Channel(name="lateral_demand", unit="m s-2", symbol="", description="largest lateral acceleration that the route's bends ask, speed squared times curvature; the model brakes with all of the grip, surface friction times g, as on a straight road"),
     Channel(name="static_pitch", unit="rad", symbol="theta_0", description="pitch of the resting body, not contained in the pitch column"),
 )  # fmt: skip
 

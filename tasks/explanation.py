@@ -128,7 +128,12 @@ def force_steps(
     slope_f, slope_r = road_slope([station, station - vehicle.wheelbase], hazard).tolist()
     load_f, load_r = float(row["tyre_load_f"]), float(row["tyre_load_r"])
     road = 0.0 if standing else 0.0 - load_f * slope_f - load_r * slope_r
+    grade = float(row["road_grade"]) if np.isfinite(row["road_grade"]) else 0.0
     rate = 0.0 if standing else (road - sum(forces)) / vehicle.mass - vehicle.coast_deceleration
+    lost = f"{vehicle.coast_deceleration:g}"
+    if grade != 0.0 and not standing:
+        rate -= vehicle.gravity * grade
+        lost += f" - {vehicle.gravity:g} * {grade:.5g}"
     return [
         *steps,
         Step(quantity="road force", symbol="F_x,road", equation="9, S11", unit="N",
@@ -137,7 +142,7 @@ def force_steps(
              recomputed=road, stored=float(row["road_force"])),
         Step(quantity="rate of speed", symbol="dv/dt", equation="9, S11", unit="m s-2",
              formula="the vehicle stands" if standing else
-             f"({road:.5g} - {forces[0]:.6g} - {forces[1]:.6g}) / {vehicle.mass:g} - {vehicle.coast_deceleration:g}",
+             f"({road:.5g} - {forces[0]:.6g} - {forces[1]:.6g}) / {vehicle.mass:g} - {lost}",
              recomputed=rate, stored=float(row["longitudinal_acceleration"])),
     ]  # fmt: skip
 
@@ -159,7 +164,8 @@ def pitch_steps(
     steps = []
     if ride.mode == "paper":
         scale = response.pitch_scale * (1.0 if hazard.height_m == 0 else vehicle.coupled_pitch_scale)
-        d = max(-float(row["longitudinal_acceleration"]), 0.0)
+        climb = vehicle.gravity * grade if np.isfinite(grade := float(row["road_grade"])) else 0.0
+        d = max(-float(row["longitudinal_acceleration"]) - climb, min(-climb, 0.0))
         steps.append(Step(
             quantity=f"brake-pitch moment{_tell_rule(response, ride, steady, tick)}",
             symbol="M_b", equation="S16", unit="N m",

@@ -1,20 +1,21 @@
-"""Scenes by name or folder: the built-in street, and what was imported or reconstructed."""
+"""Scenes by name or folder: the built-in streets, and what was imported or reconstructed."""
 
 import os
 from functools import lru_cache
 from pathlib import Path
 
 from catalogs.scenes.folder import read_scene, scene_hash, write_scene
+from catalogs.scenes.street import CHANGES
 from catalogs.scenes.street_cache import cached_street
 from catalogs.sentences import shorten
 from tasks.errors import InputError
 from tasks.scene.scene import Scene
 
-BUILT_IN = ("street",)
+BUILT_IN = tuple(CHANGES)
 
 
 def scene_folder(name_or_folder: str | Path) -> Path:
-    """The folder of a scene; the built-in street is generated on first use and kept in the user's cache.
+    """The folder of a scene; a built-in street is generated on first use and kept in the user's cache.
 
     Raises
     ------
@@ -22,7 +23,7 @@ def scene_folder(name_or_folder: str | Path) -> Path:
         If there is no such scene; the sentence lists the built-in ones.
     """
     if str(name_or_folder) in BUILT_IN:
-        return cached_street()
+        return cached_street(*CHANGES[str(name_or_folder)])
     folder = Path(name_or_folder)
     # unlike Path.is_file this takes a name that no file can have for one that is not there
     if not os.path.isfile(folder / "scene.json"):

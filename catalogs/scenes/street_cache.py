@@ -25,11 +25,12 @@ WRITTEN = ("scene.json", *ARRAY_FILES, *OPTIONAL_FILES, MARKER)
 """Files of a cached street; nothing else is ever deleted."""
 
 
-def cached_street(seed: int = 2025) -> Path:
-    """The folder of the street with this seed; made on first use, when its code changes, and when it is damaged.
+def cached_street(*changes: Path, seed: int = 2025) -> Path:
+    """The folder of a street with this seed; made on first use, when its code changes, and when it is damaged.
 
     Parameters
     ----------
+    changes : files of what it has otherwise than the street's own entry
     seed : of every texture and object
 
     Raises
@@ -37,12 +38,12 @@ def cached_street(seed: int = 2025) -> Path:
     InputError
         If the cache cannot be written, or holds in the street's place what is no street.
     """
-    folder = cache_root() / f"street-{seed}-{_recipe_hash()}"
+    folder = cache_root() / f"street-{seed}-{_recipe_hash(*changes)}"
     try:
         if not _is_whole(folder):
             with _only_maker(folder.parent):
                 if not _is_whole(folder):
-                    _make_street(folder, seed)
+                    _make_street(folder, seed, *changes)
     except OSError as error:
         raise InputError(
             f"{folder.parent}: the cache of generated scenes must be a folder that can be written, with room for 60 MB;"
@@ -51,7 +52,7 @@ def cached_street(seed: int = 2025) -> Path:
     return folder
 
 
-def _make_street(folder: Path, seed: int) -> None:
+def _make_street(folder: Path, seed: int, *changes: Path) -> None:
     """Write the street beside its place, then rename it; what killed makers left goes first."""
     for path in sorted(folder.parent.iterdir()):
         if HALF_MADE.fullmatch(path.name):
@@ -63,17 +64,17 @@ def _make_street(folder: Path, seed: int) -> None:
         )
     own = folder.with_name(f"{folder.name}.{os.getpid()}")
     try:
-        write_scene(_build_street(seed), own, {"source": "generated", "licence": "Apache-2.0"})
+        write_scene(_build_street(seed, *changes), own, {"source": "generated", "licence": "Apache-2.0"})
         (own / MARKER).write_text(_facts_hash(own))
         own.rename(folder)
     finally:
         _remove_street(own)
 
 
-def _build_street(seed: int) -> Scene:
+def _build_street(seed: int, *changes: Path) -> Scene:
     from tasks.scene.street.build import build_street
 
-    return build_street(load_street_layout(STREET_FILE), seed)
+    return build_street(load_street_layout(STREET_FILE, *changes), seed)
 
 
 def _is_whole(folder: Path) -> bool:
@@ -112,9 +113,10 @@ def _only_maker(root: Path) -> FileLock:
     return FileLock(root / "street.lock", mode=0o644)
 
 
-def _recipe_hash() -> str:
-    """Over the street's entry, the code that makes it and the libraries that it computes with."""
-    digest = hashlib.sha256(f"{np.__version__} {scipy.__version__}".encode() + STREET_FILE.read_bytes())
+def _recipe_hash(*changes: Path) -> str:
+    """Over the entries of a street, the code that makes it and the libraries that it computes with."""
+    entries = [path.read_bytes() for path in (STREET_FILE, *changes)]
+    digest = hashlib.sha256(b"".join([f"{np.__version__} {scipy.__version__}".encode(), *entries]))
     package = Path(tasks.scene.__file__).parent
     for path in sorted(package.rglob("*.py")):
         if "stereo" not in path.parts:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from catalogs.low_speed import load_kept_low_speed
+from catalogs.road_grade import load_kept_grade
 from catalogs.scenario import Scenario, find_scenario_problems
 from catalogs.studies import load_sensitivity_study
 from catalogs.studies.ablation import FamilyWeather, cut_coupling, load_kept_families
@@ -20,6 +21,7 @@ from flows.auditing.kept_lines import Line, is_number, scale_line
 from flows.making.driving import (
     collect_surface_figures,
     hazard_of,
+    peak_lateral_demand,
     ranges_of,
     simulate_drive,
     surface_of,
@@ -34,6 +36,7 @@ from tasks.explanation import Step, force_steps, pitch_steps, surface_steps
 from tasks.render.camera import body_poses
 from tasks.scene.route import Route
 from tasks.studies.sensitivity import StudyProtocol
+from tasks.surface.road_profile import RoadGrade
 from tasks.surface.state import SurfaceParameters, SurfaceState
 from tasks.vehicle.paper.low_speed import SteadyStop
 from tasks.vehicle.parameters import Vehicle, compute_surface_response
@@ -57,6 +60,7 @@ class Entries:
     study: StudyProtocol
     steady: SteadyStop | None
     families: FamilyWeather | None
+    grade: RoadGrade
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,6 +120,7 @@ def load_entries(inputs: Path, variant: Variant) -> Entries:
         study=load_sensitivity_study(inputs / STUDY)[0],
         steady=load_kept_low_speed(inputs),
         families=load_kept_families(inputs, variant),
+        grade=load_kept_grade(inputs),
     )
 
 
@@ -127,10 +132,11 @@ def drive_clip(asked: Asked, entries: Entries) -> Drive:
     asked : the drive
     entries : that it is driven with
     """
-    vehicle, surface, steady = entries.vehicle, entries.surface, entries.steady
+    vehicle, surface = entries.vehicle, entries.surface
     driven = cut_coupling(asked.scenario, asked.variant, entries.families)
-    state, ride = simulate_drive(driven, vehicle, surface, asked.mode, asked.duration_s, steady)
-    ranges = ranges_of(driven, state, vehicle, surface, entries.study, asked.mode, asked.duration_s, steady)
+    how = asked.mode, asked.duration_s, entries.steady, entries.grade
+    state, ride = simulate_drive(driven, vehicle, surface, *how)
+    ranges = ranges_of(driven, vehicle, surface, entries.study, *how)
     seen = surface_of(asked.scenario, surface)
     station = ride.columns["station"]
     route = asked.route or lay_straight_route(float(station.max()))
@@ -144,6 +150,7 @@ def drive_clip(asked: Asked, entries: Entries) -> Drive:
         "stopping_distance": ride.stopping_distance,
         "peak_pitch": float(ride.columns["pitch"].max()),
         **compute_lift_times(ride.columns),
+        "lateral_demand": peak_lateral_demand(ride, route),
         "static_pitch": ride.static_pitch,
     }
     numbers = {

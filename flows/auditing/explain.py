@@ -9,6 +9,7 @@ import numpy as np
 
 from catalogs.cameras import load_camera
 from catalogs.low_speed import load_kept_low_speed
+from catalogs.road_grade import load_kept_grade
 from catalogs.scenario import Scenario
 from catalogs.scenes import load_scene
 from catalogs.studies.ablation import cut_coupling, load_kept_families
@@ -100,8 +101,9 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
     )
     steady = load_kept_low_speed(layout.inputs)
     ride = simulate_scenario(
-        vehicle, state, controls_of(driven), hazard, mode=mode, duration_s=plan.duration_s, steady=steady
-    )
+        vehicle, state, controls_of(driven), hazard, mode=mode, duration_s=plan.duration_s, steady=steady,
+        grade=load_kept_grade(layout.inputs),
+    )  # fmt: skip
     response = compute_surface_response(vehicle, state.kind, state.friction)
     steps = [
         *surface_steps(weather_of(driven), surface, vehicle, row),

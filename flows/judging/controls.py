@@ -281,6 +281,7 @@ def _make_faulty_claims(
             plan.settings.vehicle_mode,
             plan.duration_s,
             catalogue.steady,
+            catalogue.grade,
         )
         made[variant] = Claim(pitch=ride.columns["pitch"][ticks], station=ride.columns["station"][ticks])
     for name, move in FALSE_RIGS.items():

@@ -9,6 +9,7 @@ from catalogs.gates import load_gates
 from catalogs.hazard_markings import load_marking
 from catalogs.low_speed import load_kept_low_speed
 from catalogs.references import read_reference
+from catalogs.road_grade import load_kept_grade
 from catalogs.scenes import load_scene
 from catalogs.studies import load_sensitivity_study
 from catalogs.studies.ablation import FamilyWeather, load_kept_families
@@ -27,6 +28,7 @@ from tasks.render.road_paint import HazardMarking
 from tasks.render.weather.parameters import WeatherParameters
 from tasks.scene.scene import Scene
 from tasks.studies.sensitivity import StudyProtocol
+from tasks.surface.road_profile import LEVEL_ROAD, RoadGrade
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.paper.low_speed import SteadyStop
 from tasks.vehicle.parameters import Vehicle
@@ -47,6 +49,7 @@ class Catalogue:
     traces: Reference | None = None
     steady: SteadyStop | None = None
     families: FamilyWeather | None = None
+    grade: RoadGrade = LEVEL_ROAD
 
     @property
     def weather_parameters(self) -> WeatherParameters:
@@ -80,4 +83,5 @@ def load_catalogue(inputs: Path, scene: str, variant: Variant = "full") -> Catal
         traces=read_reference(traces) if (traces := inputs / TRACES).is_dir() else None,
         steady=load_kept_low_speed(inputs),
         families=load_kept_families(inputs, variant),
+        grade=load_kept_grade(inputs),
     )

@@ -20,6 +20,7 @@ from flows.making.catalogue import Catalogue, catalogue_of
 from flows.making.driving import (
     collect_surface_figures,
     hazard_of,
+    peak_lateral_demand,
     ranges_of,
     simulate_drive,
     surface_of,
@@ -64,8 +65,8 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
     facts = collect_surface_figures(state, ride)
     driven = cut_coupling(clip.scenario, plan.settings.variant, catalogue.families)
     ranges = unknown_ranges() if catalogue.traces is not None else ranges_of(
-        driven, surface_of(driven, catalogue.surface), catalogue.vehicle, catalogue.surface, catalogue.study,
-        plan.settings.vehicle_mode, plan.duration_s, catalogue.steady,
+        driven, catalogue.vehicle, catalogue.surface, catalogue.study,
+        plan.settings.vehicle_mode, plan.duration_s, catalogue.steady, catalogue.grade,
     )  # fmt: skip
     frames = frame_rows(ride, plan, catalogue)
     buffers: dict[str, NDArray[Any]] = {}
@@ -97,6 +98,7 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
             "peak_pitch": float(ride.columns["pitch"].max()),
             **compute_lift_times(ride.columns),
             **compute_peaks(ride.columns),
+            "lateral_demand": peak_lateral_demand(ride, catalogue.scene.route),
             "static_pitch": ride.static_pitch,
             "calibration_extrapolated": ride.calibration_extrapolated,
         } | ranges),
@@ -135,7 +137,7 @@ def move_car(scenario: Scenario, plan: Plan, catalogue: Catalogue) -> tuple[Surf
         return replay_drive(scenario, catalogue.surface, catalogue.traces, plan.duration_s)
     _, ride = simulate_drive(
         cut_coupling(scenario, plan.settings.variant, catalogue.families), catalogue.vehicle,
-        catalogue.surface, plan.settings.vehicle_mode, plan.duration_s, catalogue.steady,
+        catalogue.surface, plan.settings.vehicle_mode, plan.duration_s, catalogue.steady, catalogue.grade,
     )  # fmt: skip
     return surface_of(scenario, catalogue.surface), ride
 

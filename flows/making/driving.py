@@ -2,10 +2,14 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from catalogs.scenario import Scenario
+from tasks.scene.route import Route
+from tasks.scene.route_shape import find_lateral_demand
 from tasks.studies.label_ranges import label_ranges, sampled_friction
 from tasks.studies.sensitivity import StudyProtocol
-from tasks.surface.road_profile import RoadHazard
+from tasks.surface.road_profile import LEVEL_ROAD, RoadGrade, RoadHazard
 from tasks.surface.state import SurfaceParameters, SurfaceState
 from tasks.surface.weather import Weather, surface_state
 from tasks.vehicle.brake import BrakeCommand
@@ -21,10 +25,11 @@ def simulate_drive(
     mode: Mode,
     duration_s: float,
     steady: SteadyStop | None = None,
+    grade: RoadGrade = LEVEL_ROAD,
 ) -> tuple[SurfaceState, Rollout]:
-    """Simulate a scenario: weather to surface state to friction to motion; ``steady`` is as the rollout has it."""
+    """Simulate a scenario: weather to surface state to friction to motion; the last two are as the rollout has them."""
     state = surface_of(scenario, surface)
-    return state, _simulate_vehicle(scenario, vehicle, state, mode, duration_s, steady)
+    return state, _simulate_vehicle(scenario, vehicle, state, mode, duration_s, steady, grade)
 
 
 def surface_of(scenario: Scenario, surface: SurfaceParameters) -> SurfaceState:
@@ -49,21 +54,29 @@ def collect_surface_depths(state: SurfaceState) -> dict[str, float]:
     }
 
 
+def peak_lateral_demand(ride: Rollout, route: Route) -> float:
+    """Return the most that the bends of the route ask of the car [m/s2]."""
+    demand = find_lateral_demand(route, ride.columns["station"], ride.columns["speed"])
+    return float(np.nanmax(demand, initial=0.0))
+
+
 def ranges_of(
     scenario: Scenario,
-    state: SurfaceState,
     vehicle: Vehicle,
     surface: SurfaceParameters,
     study: StudyProtocol,
     mode: Mode,
     duration_s: float,
     steady: SteadyStop | None = None,
+    grade: RoadGrade = LEVEL_ROAD,
 ) -> dict[str, float]:
     """Percentiles of the clip's labels under the bounds of the surface parameters; the snow's depth stays nominal."""
 
+    state = surface_of(scenario, surface)
+
     def again(friction: float) -> tuple[float, float]:
         ride = _simulate_vehicle(
-            scenario, vehicle, replace(state, friction=friction), mode, duration_s, steady
+            scenario, vehicle, replace(state, friction=friction), mode, duration_s, steady, grade
         )
         return ride.stopping_distance, float(ride.columns["pitch"].max())
 
@@ -77,9 +90,11 @@ def _simulate_vehicle(
     mode: Mode,
     duration_s: float,
     steady: SteadyStop | None,
+    grade: RoadGrade,
 ) -> Rollout:
     return simulate_scenario(
-        vehicle, state, controls_of(scenario), hazard_of(scenario), mode=mode, duration_s=duration_s, steady=steady
+        vehicle, state, controls_of(scenario), hazard_of(scenario), mode=mode, duration_s=duration_s, steady=steady,
+        grade=grade,
     )  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from flows.making.driving import simulate_drive
 from flows.making.generate import generate_dataset
-from flows.making.grid_inputs import find_private_entries
+from flows.making.grid_inputs import find_private_entries, grade_of
 from flows.making.places import find_scene
 from flows.making.plan import Plan, freeze_grid
 from flows.making.run_report import RunReport
@@ -246,9 +246,16 @@ def ticks_of(plan: Plan, asked: GridFile) -> dict[str, str]:
     steady = (
         cut_low_speed(load_low_speed(), plan.settings.variant) if plan.settings.keeps_stops_steady else None
     )
+    grade = grade_of(asked)
     rides = (
         simulate_drive(
-            cut_coupling(clip.scenario, plan.settings.variant), vehicle, surface, mode, duration_s, steady
+            cut_coupling(clip.scenario, plan.settings.variant),
+            vehicle,
+            surface,
+            mode,
+            duration_s,
+            steady,
+            grade,
         )[1]
         for clip in plan.clips
     )

@@ -11,21 +11,28 @@ from catalogs.gates import GATES
 from catalogs.grids import Grid, GridFile
 from catalogs.hazard_markings import load_marking
 from catalogs.low_speed import LOW_SPEED, NO_LOW_SPEED_RULE, is_rule_applied, load_low_speed
-from catalogs.scenario import find_range_problems, find_route_problems
+from catalogs.physical_limits import find_limit_problem, load_physical_limits
+from catalogs.road_grade import ROAD_GRADE, write_road_grade
+from catalogs.scenario import find_range_problems, find_route_problems, find_scenario_problems
 from catalogs.scenes import load_scene, scene_identity
+from catalogs.sentences import cap_problems
 from catalogs.studies import SENSITIVITY
 from catalogs.studies.ablation import ABLATION, cut_coupling, load_families
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_content, vehicle_tyre_source
 from catalogs.weather.grip import FOLDER as WEATHER_FOLDER
-from flows.making.driving import surface_of
+from flows.making.bends import find_bend_problems
+from flows.making.driving import hazard_of, surface_of
 from flows.making.memory import find_memory_problems
 from flows.making.places import remember_place
 from flows.making.traced import read_trace_inputs
 from tasks.errors import InputError
 from tasks.render.sensor import Sensor
 from tasks.render.weather.snow.layer import HIGHEST_LUMP
+from tasks.scene.route_shape import sample_grade
+from tasks.surface.road_profile import RoadGrade
 from tasks.surface.weather import WEATHERS, find_weather_problem
+from tasks.vehicle.strut_travel import compute_strut_travel
 
 LOADERS: Mapping[str, Callable[[Path], Any]] = {
     "vehicle.yaml": load_vehicle,
@@ -127,8 +134,15 @@ def read_grid_inputs(grid: Grid, tick_rate_hz: int) -> tuple[dict[str, bytes], d
     if not problems:
         problems += _find_weather_problems(grid.settings, weathers)
         problems += _find_buried_cameras(grid)
+    sound = not problems
     if scene:
         problems += _find_route_problems(grid)
+        if grid.poses is None and not (grade := grade_of(grid.settings)).is_level:
+            inputs[ROAD_GRADE] = write_road_grade(grade, scene["name"])
+    if sound:
+        problems += cap_problems(_find_feature_problems(grid))
+    if sound and grid.poses is None:
+        problems += cap_problems(find_bend_problems(grid))
     if grid.poses is not None:
         traces, found = read_trace_inputs(grid, grid.poses)
         inputs, problems = inputs | traces, problems + found
@@ -218,9 +232,38 @@ def _find_camera_problems(settings: GridFile, tick_rate_hz: int) -> list[str]:
     ]
 
 
+def _find_feature_problems(grid: Grid) -> list[str]:
+    """Road features that move a strut of the vehicle beyond its stops, which the model does not have."""
+    vehicle, limit = load_vehicle(grid.settings.vehicle), load_physical_limits().strut_travel
+    problems: dict[str, str] = {}
+    for label, scenario in grid.scenarios:
+        if scenario.hazard_height_m == 0 or find_scenario_problems(scenario):
+            continue  # a faulty scenario has been told of
+        travel = compute_strut_travel(vehicle, hazard_of(scenario), scenario.initial_speed_km_h / 3.6)
+        rule = (
+            f"strut travel on the road feature of {scenario.hazard_length_m:g} x {scenario.hazard_height_m:g} m at"
+            f" {scenario.initial_speed_km_h:g} km/h"
+        )
+        if problem := find_limit_problem(rule, travel, limit):
+            problems.setdefault(
+                problem, f"scenario {label}: {problem}: drive more slowly, or flatten the feature"
+            )
+    return list(problems.values())
+
+
+def grade_of(settings: GridFile) -> RoadGrade:
+    """Return the grade of the road in a grid's scene."""
+    return sample_grade(load_scene(settings.scene).route)
+
+
 def _find_route_problems(grid: Grid) -> list[str]:
     route = load_scene(grid.settings.scene).route
     problems: dict[str, str] = {}
+    steepest = max(map(abs, sample_grade(route).rise))
+    if problem := find_limit_problem("grade of the road", steepest, load_physical_limits().road_grade):
+        problems["grade"] = (
+            f"scene {grid.settings.scene}: {problem}: its z axis must point up, against gravity"
+        )
     for label, scenario in grid.scenarios:
         for problem in find_route_problems(scenario, route.length, grid.settings.scene):
             problems.setdefault(problem, f"scenario {label}: {problem}")

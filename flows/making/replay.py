@@ -111,7 +111,7 @@ def _run_clip(clip: ClipPlan, plan: Plan, catalogue: Catalogue, frames: int) -> 
     driven = cut_coupling(clip.scenario, plan.settings.variant, catalogue.families)
     _, ride = simulate_drive(
         driven, catalogue.vehicle, catalogue.surface, plan.settings.vehicle_mode, plan.duration_s,
-        catalogue.steady,
+        catalogue.steady, catalogue.grade,
     )  # fmt: skip
     state = surface_of(clip.scenario, catalogue.surface)
     rows = frame_rows(ride, plan, catalogue)

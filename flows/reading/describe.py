@@ -6,6 +6,7 @@ from typing import Any
 from catalogs.cameras import load_camera
 from catalogs.grids import load_grid, warn_of_late_brakes
 from catalogs.variants import warn_of_variant
+from flows.making.bends import warn_of_bends
 from flows.making.plan import make_plan
 from flows.store.address import open_for_reading, stored_bytes, want_manifest
 from flows.store.sealed import read_manifest, recorded_grid
@@ -71,7 +72,9 @@ def validate_grid(grid: str, *, vehicle: str | None = None, pictures: bool = Tru
     settings = plan.settings
     read = load_grid(grid)
     camera = load_camera(read.settings.camera)  # of a file the plan records the name, without its folder
-    warnings = [w for w in (warn_of_variant(settings.variant), warn_of_late_brakes(read)) if w]
+    warnings = [
+        w for w in (warn_of_variant(settings.variant), warn_of_late_brakes(read), warn_of_bends(read)) if w
+    ]
     frames = len(plan.clips) * settings.frames if settings.pictures else 0
     ticks = len(plan.clips) * plan.ticks_per_clip
     pixels = frames * camera.width * camera.height

@@ -1,4 +1,4 @@
-"""The raised-cosine road feature that both the wheels and the visible road follow."""
+"""The road along its length: the raised-cosine feature that wheels and picture follow, and the grade of a hill."""
 
 from dataclasses import dataclass
 from math import isfinite
@@ -42,8 +42,68 @@ class RoadHazard:
         if problems:
             raise InputError(problems)
 
+    @property
+    def steepest_slope(self) -> float:
+        """Largest slope of its flanks, pi A_g / L_g [1]."""
+        return float(np.pi * abs(self.height_m) / self.length_m) if self.height_m != 0 else 0.0
+
 
 FLAT_ROAD = RoadHazard(center_m=0.0, length_m=0.0, height_m=0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RoadGrade:
+    """Grade along a road: linear between equally spaced stations, constant before the first and beyond the last.
+
+    It is the rise per metre of way, the sine of the road's angle: m g times it is the weight's share along the road,
+    and its integral over the station is the height.
+
+    Parameters
+    ----------
+    rise : at each station; a single one holds everywhere [1]
+    spacing_m : between the stations, of which the first is 0 [m]
+
+    Raises
+    ------
+    InputError
+        For a rise that no road has, or stations that do not ascend.
+    """
+
+    rise: tuple[float, ...] = (0.0,)
+    spacing_m: float = 1.0
+
+    def __post_init__(self) -> None:
+        problems = [
+            f"the grade of a road must be above -1 and below 1; it is {one:g}"
+            for one in self.rise
+            if not -1 < one < 1
+        ]
+        if not self.rise:
+            problems.append("the grade of a road needs one value or more; it has none")
+        if not (isfinite(self.spacing_m) and self.spacing_m > 0):
+            problems.append(
+                f"the stations of a grade must lie spacing_m above 0 apart; it is {self.spacing_m:g}"
+            )
+        if problems:
+            raise InputError(problems[:1] + problems[-1:] if len(problems) > 2 else problems)
+
+    @property
+    def is_level(self) -> bool:
+        """Whether the road neither climbs nor falls anywhere."""
+        return not any(self.rise)
+
+    def at(self, station: ArrayLike) -> NDArray[np.float64]:
+        """Return the grade at stations, any shape [1].
+
+        Parameters
+        ----------
+        station : route coordinate [m]
+        """
+        known = self.spacing_m * np.arange(len(self.rise))
+        return np.asarray(np.interp(np.asarray(station, float), known, self.rise), float)
+
+
+LEVEL_ROAD = RoadGrade()
 
 
 def road_elevation(station: ArrayLike, hazard: RoadHazard) -> NDArray[np.float64]:

@@ -1,11 +1,13 @@
-"""Height and slope of the road at one station, for the kernels: a feature, and lines that another program gives."""
+"""Height and slope of the road at one station, for the kernels: a feature, lines of another program, and the grade."""
 
 from math import cos, pi, sin
 from typing import NamedTuple
 
+import numpy as np
 from numba.extending import register_jitable
+from numpy.typing import NDArray
 
-from tasks.surface.road_profile import RoadHazard
+from tasks.surface.road_profile import RoadGrade, RoadHazard
 
 
 class RoadLine(NamedTuple):
@@ -35,6 +37,51 @@ class RoadFeature(NamedTuple):
     under_axles: bool = False
     front: RoadLine = LEVEL
     rear: RoadLine = LEVEL
+
+
+class Climb(NamedTuple):
+    """Deceleration that the grade of a road causes.
+
+    Parameters
+    ----------
+    spacing : between the stations, of which the first is 0 [m]
+    deceleration : at each, float64 [N]; empty on a level road [m/s2]
+    """
+
+    spacing: float
+    deceleration: NDArray[np.float64]
+
+
+def make_climb(grade: RoadGrade, gravity: float, direction: int = 1) -> Climb:
+    """Return the deceleration that a grade causes.
+
+    Parameters
+    ----------
+    grade : of the road
+    gravity : g [m/s2]
+    direction : +1 along the route, -1 against it
+    """
+    rise = np.array(() if grade.is_level else grade.rise, dtype=np.float64)
+    return Climb(float(grade.spacing_m), gravity * rise * direction)
+
+
+@register_jitable(cache=True)
+def compute_climb(station: float, climb: Climb) -> float:
+    """Return the deceleration that the grade causes at a station [m/s2].
+
+    Parameters
+    ----------
+    station : route position of the front axle [m]
+    climb : along the road
+    """
+    known = climb.deceleration
+    last = len(known) - 1
+    if last < 0:
+        return 0.0
+    place = min(max(station / climb.spacing, 0.0), float(last))
+    before = min(int(place), max(last - 1, 0))
+    after = min(before + 1, last)
+    return float(known[before] + (place - before) * (known[after] - known[before]))
 
 
 def make_road_feature(hazard: RoadHazard) -> RoadFeature:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
-from tasks.surface.road_profile import RoadHazard
+from tasks.surface.road_profile import LEVEL_ROAD, RoadGrade, RoadHazard
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.brake import BrakeCommand
 from tasks.vehicle.history import History
@@ -95,6 +95,7 @@ def simulate_scenario(
     duration_s: float,
     step_s: float = INTERNAL_STEP_S,
     steady: SteadyStop | None = None,
+    grade: RoadGrade = LEVEL_ROAD,
 ) -> Rollout:
     """Simulate one scenario; after a stop the vehicle stands and its body comes to rest too.
 
@@ -108,6 +109,7 @@ def simulate_scenario(
     duration_s : length of the telemetry, whole milliseconds [s]
     step_s : internal step, a whole fraction of a millisecond [s]
     steady : of paper mode: how the end of a stop is kept steady; None takes the published steps literally
+    grade : of the road along the station, beside the feature
 
     Raises
     ------
@@ -121,7 +123,7 @@ def simulate_scenario(
     if mode == "paper":
         run = run_paper_mode(
             vehicle, response, controls.initial_speed, controls.hold_speed_until_brake, controls.brake.profile,
-            hazard, StepGrid(steps=ticks * per_tick, step=step_s), steady,
+            hazard, StepGrid(steps=ticks * per_tick, step=step_s), steady, grade,
         )  # fmt: skip
         history = sample_history(run, step_s, per_tick)
     else:
@@ -129,13 +131,14 @@ def simulate_scenario(
             simulate(
                 vehicle, response,
                 make_command_input(controls.brake.profile, hold_speed=controls.hold_speed_until_brake),
-                Conditions(hazard=hazard, snow_depth_mm=snow_depth_mm),
+                Conditions(hazard=hazard, snow_depth_mm=snow_depth_mm, grade=grade),
                 Recording(samples=ticks + 1, interval=0.001, substeps=per_tick),
                 initial_speed=controls.initial_speed,
             )
         )  # fmt: skip
     columns: dict[str, NDArray[Any]] = dict(history.columns)
     columns["t_ns"] = np.arange(len(columns["speed"]), dtype=np.int64) * TICK_NS
+    columns["road_grade"] = grade.at(columns["station"])
     columns["contact_f"] = columns["axle_load_f"] > 0
     columns["contact_r"] = columns["axle_load_r"] > 0
     braked = history.onset <= duration_s

@@ -9,7 +9,7 @@ from catalogs.scenario import Scenario
 from catalogs.studies import load_sensitivity_study
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
-from flows.making.driving import controls_of, hazard_of, ranges_of, simulate_drive, weather_of
+from flows.making.driving import controls_of, hazard_of, ranges_of, weather_of
 from tasks.studies.label_ranges import DRIVEN_PERCENTILES, label_ranges, sampled_friction
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.rollout import simulate_scenario
@@ -26,8 +26,7 @@ def entries():
 
 def ranges(scenario: Scenario, entries, duration_s: float = 8.0) -> dict[str, float]:
     vehicle, surface, study = entries
-    state, _ = simulate_drive(scenario, vehicle, surface, "paper", duration_s)
-    return ranges_of(scenario, state, vehicle, surface, study, "paper", duration_s)
+    return ranges_of(scenario, vehicle, surface, study, "paper", duration_s)
 
 
 @pytest.mark.parametrize(

@@ -44,7 +44,7 @@ def test_rates_agree_with_the_twin_in_any_state(vehicle, pressure):
             motion,
             Memory(AT_REST, AT_REST),
             tuple(x),
-            Instant(0.0, pressure, 0.0, 0.0, False, False, 0.0),
+            Instant(0.0, pressure, 0.0, 0.0, False, False, 0.0, 0.0),
             1.0,
             1.0,
             1.0,

@@ -7,7 +7,7 @@ import pytest
 
 from catalogs.vehicles import load_vehicle
 from tasks.errors import InputError
-from tasks.surface.road_profile import RoadHazard
+from tasks.surface.road_profile import RoadGrade, RoadHazard
 from tasks.vehicle.brake import compute_brake_pressure
 from tasks.vehicle.effects.grown import apply_effects
 from tasks.vehicle.effects.ports import AXLE_VARIABLES, VARIABLES
@@ -126,7 +126,7 @@ def test_a_form_of_an_axles_own_variable_acts_on_that_axle_alone(run, variable, 
 
 
 def test_what_two_axles_can_differ_in_is_what_a_table_says():
-    instant = Instant(1.0, 2.0, 3.0, 4.0, False, False, 0.0)
+    instant = Instant(1.0, 2.0, 3.0, 4.0, False, False, 0.0, 0.0)
     front = collect_form_variables(20.0, 1.2, Strut(0.01, 0.2, 0.0), AxleMemory(0.0, 0.0, 50.0), instant)
     rear = collect_form_variables(20.0, 0.8, Strut(0.02, 0.3, 0.0), AxleMemory(0.0, 0.0, 30.0), instant)
     differ = [name for name, a, b in zip(VARIABLES, front, rear, strict=True) if a != b]
@@ -138,7 +138,9 @@ def test_what_two_axles_can_differ_in_is_what_a_table_says():
 
 def test_a_grade_takes_its_share_of_gravity_and_pitches_the_body_as_braking_does(vehicle, run):
     coast = make_trace_input(np.zeros(300), 0.01)
-    up, flat, down = (run(coast, conditions=Conditions(grade=0.03, direction=d)) for d in (1, 0, -1))
+    up, flat, down = (
+        run(coast, conditions=Conditions(grade=RoadGrade(rise=(0.03,)), direction=d)) for d in (1, 0, -1)
+    )
     turning = (vehicle.wheel_inertia_f + vehicle.wheel_inertia_r) / vehicle.wheel_radius**2
     share = vehicle.mass / (vehicle.mass + turning)
     for hill, sign in ((up, 1.0), (down, -1.0)):
@@ -152,7 +154,8 @@ def test_a_car_that_stands_on_a_grade_rests_on_its_lower_axle(vehicle, run):
     """Statics: the weight along the grade, m g i, acts at the height of the centre of gravity on the wheelbase."""
     brake = make_trace_input(np.full(800, 2.0), 0.01)
     up, flat, down = (
-        run(brake, samples=800, conditions=Conditions(grade=0.1, direction=d)) for d in (1, 0, -1)
+        run(brake, samples=800, conditions=Conditions(grade=RoadGrade(rise=(0.1,)), direction=d))
+        for d in (1, 0, -1)
     )
     weight = 0.1 * vehicle.mass * vehicle.gravity
     for hill, sign in ((up, 1.0), (down, -1.0)):

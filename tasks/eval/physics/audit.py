@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tasks.eval.physics.body import body_laws, outcome_laws, surface_laws
 from tasks.eval.physics.constants import Constants
 from tasks.eval.physics.frames import frame_laws, pose_laws
+from tasks.eval.physics.grade import grade_laws
 from tasks.eval.physics.half_step import follow_half_step
 from tasks.eval.physics.laws import Law, command_laws, motion_laws, wheel_laws
 from tasks.eval.physics.pose_check import pose_check_laws
@@ -102,6 +103,7 @@ def evaluate_laws(
         *surface_laws(facts, constants),
         *frame_laws(ticks, frames, facts, constants),
         *pose_laws(frames, constants),
+        *grade_laws(ticks, frames, constants),
         *outcome_laws(ticks, facts, constants),
         *pose_check_laws(frames, facts),
     ]

@@ -96,6 +96,33 @@ class Constants:
         return front if axle == "f" else 1.0 - front
 
 
+def read_grade(ticks: Mapping[str, Floats]) -> Floats:
+    """Return the grade at each tick [N] [1]; 0 where an older dataset has none, whose roads were felt as level.
+
+    Parameters
+    ----------
+    ticks : columns of the tick table
+    """
+    if "road_grade" not in ticks:
+        return np.zeros(len(ticks["station"]))
+    return np.nan_to_num(np.asarray(ticks["road_grade"], np.float64))
+
+
+def find_climb(ticks: Mapping[str, Floats], constants: Constants) -> tuple[Floats, Floats, Floats]:
+    """Return the deceleration that the grade causes [m/s2]: at each tick, half a tick later, and what is open there.
+
+    Between two ticks the grade may bend once.
+
+    Parameters
+    ----------
+    ticks : columns of the tick table
+    constants : car and pavement
+    """
+    climb = constants.car["gravity"] * read_grade(ticks)
+    bend = np.abs(np.diff(climb, 2, prepend=climb[:1], append=climb[-1:]))
+    return climb, 0.5 * (climb[1:] + climb[:-1]), np.maximum(bend[1:], bend[:-1])
+
+
 def compute_burckhardt_friction(slip: Floats, base: tuple[float, float, float]) -> Floats:
     """b(kappa) (paper, Appendix B).
 

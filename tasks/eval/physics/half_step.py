@@ -11,6 +11,7 @@ from tasks.eval.physics.constants import (
     Constants,
     Floats,
     compute_burckhardt_friction,
+    find_climb,
     peak_slip,
     pressure_at,
     raised_cosine,
@@ -66,6 +67,7 @@ def follow_half_step(ticks: Mapping[str, Floats], facts: Mapping[str, Any], cons
     hump = facts["hazard_center_m"], facts["hazard_length_m"], facts["hazard_height_m"]
     analytic = constants.mode == "paper" and hump[2] == 0.0
     forward, rates, changes, doubts = np.zeros(len(speed)), {}, {}, {}
+    climb, later_climb, open_climb = find_climb(ticks, constants)
     slowest = find_slowest_explicit_speed(facts, constants, INNER_STEP)
     first, second = (np.flatnonzero((at < slowest) & (v[1:] > 0) & (v[:-1] > 0)) for at in (speed, v[1:]))
     for axle, behind, sign in (("f", 0.0, -1.0), ("r", L, 1.0)):
@@ -80,10 +82,10 @@ def follow_half_step(ticks: Mapping[str, Floats], facts: Mapping[str, Any], cons
         load = ticks[f"tyre_load_{axle}"]
         between = 0.5 * (load[1:] + load[:-1])
         bend = np.abs(np.diff(load, 2, prepend=load[:1], append=load[-1:]))
-        doubts[axle] = np.zeros(len(speed)) if analytic else np.maximum(bend[1:], bend[:-1])
+        doubts[axle] = m * car["cg_height"] / L * open_climb if analytic else np.maximum(bend[1:], bend[:-1])
         if analytic:
             lever = car["cg_to_rear_axle" if axle == "f" else "cg_to_front_axle"]
-            between = m / L * (car["gravity"] * lever + sign * a[:-1] * car["cg_height"])
+            between = m / L * (car["gravity"] * lever + sign * (a + climb)[:-1] * car["cg_height"])
         grip = compute_burckhardt_friction(beta * slip, tyre.burckhardt) / compute_burckhardt_friction(
             np.array(top), tyre.burckhardt
         )
@@ -97,7 +99,7 @@ def follow_half_step(ticks: Mapping[str, Floats], facts: Mapping[str, Any], cons
         changes[axle][second] = (omega - before)[second] + INNER_STEP * at_end
         forward -= push + between * raised_cosine(station - behind, *hump)[1]
     return HalfStep(
-        acceleration=forward / m - car["coast_deceleration"],
+        acceleration=forward / m - car["coast_deceleration"] - later_climb,
         rate=rates,
         change=changes,
         load_uncertainty=doubts,

@@ -15,6 +15,7 @@ from tasks.eval.physics.constants import (
     Constants,
     Floats,
     compute_burckhardt_friction,
+    find_climb,
     peak_slip,
     pressure_at,
     raised_cosine,
@@ -169,7 +170,8 @@ def motion_laws(
     both = np.flatnonzero(moves[1:] & moves[:-1]) + 1
     h = INNER_STEP
     coast = np.where(moves, car["coast_deceleration"], 0.0)
-    net = np.where(moves, (road - force) / m, 0.0) - coast
+    climb, later_climb, open_climb = find_climb(ticks, constants)
+    net = np.where(moves, (road - force) / m - climb, 0.0) - coast
     time = ticks["t_ns"]
 
     later = half.acceleration
@@ -197,8 +199,9 @@ def motion_laws(
         evaluate_law("station is the integral of speed", "station speed longitudinal_acceleration", way, 1e-10),
         evaluate_law("station rests with the car", "station speed", np.diff(s)[stays[1:] - 1], 1e-9),
         evaluate_law("speed is the integral of acceleration", "speed longitudinal_acceleration " + drives,
-            gained, h * (uncertainty + 1e-5)),
-        evaluate_law("m dv/dt is the sum of forces", "longitudinal_acceleration tyre_force_f tyre_force_r road_force",
+            gained, h * (uncertainty + open_climb[both - 1] + 1e-5)),
+        evaluate_law("m dv/dt is the sum of forces",
+            "longitudinal_acceleration tyre_force_f tyre_force_r road_force road_grade",
             a - net, rounding_tolerance(a, force / m, road / m)),
         evaluate_law("kinetic energy falls by the work done", "speed longitudinal_acceleration road_force " + drives,
             energy[rolling], 2e-5 * v[0] ** 2),
@@ -208,14 +211,15 @@ def motion_laws(
     if constants.mode == "paper" and hump[2] == 0.0:
         # Euler's half step between two ticks follows from both speeds, and so does its load
         before = np.diff(v)[both - 1] / h - a[both - 1]
-        moved = m * car["cg_height"] / L * before
+        lever_ratio = m * car["cg_height"] / L
+        moved = lever_ratio * (before + later_climb[both - 1])
         weight = m * car["gravity"]
         for axle, load, sign in (("f", load_f, -1.0), ("r", load_r, 1.0)):
             lever = car["cg_to_rear_axle" if axle == "f" else "cg_to_front_axle"] / L
             expected = np.maximum(weight * lever + sign * moved, 0.0)
             laws.append(
                 evaluate_law(f"analytic load transfer, {axle}", f"tyre_load_{axle} speed longitudinal_acceleration",
-                    load[both] - expected, 1e-4)
+                    load[both] - expected, lever_ratio * open_climb[both - 1] + 1e-4)
             )  # fmt: skip
         laws.append(evaluate_law("tyre loads sum to the weight", "tyre_load_f tyre_load_r",
                         load_f + load_r - weight, 1e-6))  # fmt: skip

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tasks.campaign.campaign import CHANNELS, Run, find_motion
 from tasks.campaign.gauge import zero_pressure_at_rest
 from tasks.identification.inference.recursion import filter_recursively
-from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
+from tasks.surface.road_profile import FLAT_ROAD, RoadGrade, RoadHazard
 from tasks.surface.state import SurfaceParameters
 from tasks.surface.weather import Weather, surface_state
 from tasks.vehicle.effects.grown import apply_effects
@@ -195,7 +195,7 @@ def equip_vehicle(model: RunModel, theta: NDArray[np.float64]) -> EquippedVehicl
     return EquippedVehicle(
         vehicle=car,
         surface=compute_surface_response(car, model.run.weather, model.surface_friction),
-        conditions=replace(model.conditions, grade=values.get("slope", 0.0)),
+        conditions=replace(model.conditions, grade=RoadGrade(rise=(values.get("slope", 0.0),))),
     )
 
 

@@ -17,19 +17,30 @@ _ROUTE_STEP = 0.5
 
 @dataclass(frozen=True, kw_only=True)
 class Course:
-    """The route's line in the plane, straight at first and then bending left.
+    """The route's line, straight and level at first, then bending left and climbing.
+
+    Walls stand upright on a hill: points are lifted by the road's rise, and only directions along the road tilt.
 
     Parameters
     ----------
-    station : float64 [M] increasing stations [m]
+    station : float64 [M] increasing stations, way on the road [m]
     x, y : float64 [M] position [m]
     heading : float64 [M] direction, counter-clockwise from x [rad]
+    z : float64 [M] height [m]
+    grade : float64 [M] rise per metre of way, the sine of the road's angle [1]
     """
 
     station: NDArray[np.float64]
     x: NDArray[np.float64]
     y: NDArray[np.float64]
     heading: NDArray[np.float64]
+    z: NDArray[np.float64]
+    grade: NDArray[np.float64]
+
+    @property
+    def is_level(self) -> bool:
+        """Whether the road neither climbs nor falls."""
+        return not self.grade.any()
 
     def heading_at(self, station: ArrayLike) -> NDArray[np.float64]:
         """Return the direction of the road at a station [m], in [rad]."""
@@ -41,6 +52,8 @@ class Course:
         heading = self.heading_at(s)
         x = np.interp(s, self.station, self.x) - d * np.sin(heading)
         y = np.interp(s, self.station, self.y) + d * np.cos(heading)
+        if not self.is_level:
+            z = z + np.interp(s, self.station, self.z)
         return np.stack([x, y, z], axis=1)
 
     def to_world_quaternions(
@@ -57,11 +70,15 @@ class Course:
         heading = self.heading_at(station)
         cos, sin = np.cos(heading), np.sin(heading)
         x, y, z = vectors.T
+        if not self.is_level:
+            rise = np.interp(np.asarray(station, dtype=np.float64), self.station, self.grade)
+            flat = np.sqrt(1 - rise**2)
+            x, z = x * flat - z * rise, x * rise + z * flat
         return np.stack([x * cos - y * sin, x * sin + y * cos, z], axis=1)
 
 
 def integrate_course(layout: StreetLayout) -> Course:
-    """Integrate the curvature, which grows smoothly from 0 to that of the bend, and again beyond the route."""
+    """Integrate curvature and grade, which grow smoothly from 0; the curvature grows again beyond the route."""
     first, last = layout.station_range
     n = round((last - first + 2 * _MARGIN) / _STEP) + 1
     station = first - _MARGIN + _STEP * np.arange(n, dtype=np.float64)
@@ -69,20 +86,28 @@ def integrate_course(layout: StreetLayout) -> Course:
     beyond = smooth_step((station - layout.route_length) / layout.bend_transition)
     curvature += beyond * (1 / layout.end_radius - 1 / layout.bend_radius)
     heading = _cumulative_integral(curvature)
-    x, y = _cumulative_integral(np.cos(heading)), _cumulative_integral(np.sin(heading))
-    return Course(station=station, x=x - np.interp(0.0, station, x), y=y, heading=heading)
+    grade = layout.grade * smooth_step((station - layout.grade_start) / layout.grade_transition)
+    flat = np.sqrt(1 - grade**2)
+    x, y = _cumulative_integral(flat * np.cos(heading)), _cumulative_integral(flat * np.sin(heading))
+    return Course(
+        station=station, x=x - np.interp(0.0, station, x), y=y, heading=heading, z=_cumulative_integral(grade),
+        grade=grade,
+    )  # fmt: skip
 
 
 def lay_route(layout: StreetLayout, line: Course) -> Route:
     """Return the route of rig poses every half metre along the lane's middle."""
     station = np.linspace(0.0, layout.route_length, round(layout.route_length / _ROUTE_STEP) + 1)
-    heading = line.heading_at(station)
     pose = np.tile(np.eye(4), (len(station), 1, 1))
+    heading = line.heading_at(station)
     pose[:, 0, 0] = pose[:, 1, 1] = np.cos(heading)
     pose[:, 1, 0] = np.sin(heading)
     pose[:, 0, 1] = -pose[:, 1, 0]
-    pose[:, 0, 3] = np.interp(station, line.station, line.x)
-    pose[:, 1, 3] = np.interp(station, line.station, line.y)
+    if not line.is_level:
+        for axis in (0, 2):
+            unit = np.tile(np.eye(3)[axis], (len(station), 1))
+            pose[:, :3, axis] = line.to_world_directions(station, unit)
+    pose[:, :3, 3] = line.to_world(np.stack([station, 0 * station, 0 * station], axis=1))
     return Route(station=station, T_world_rig=pose)
 
 

@@ -27,6 +27,9 @@ class StreetLayout:
     bend_transition : length over which the curvature grows to its full value [m]
     bend_radius : radius of the bend [m]
     end_radius : radius of the bend beyond the route, so that houses close the view [m]
+    grade_start : station at which the road begins to climb [m]
+    grade_transition : length over which the grade grows to its full value [m]
+    grade : rise of the road per metre of way from there on; negative falls [1]
     lane_width : width of a traffic lane [m]
     parking_width : width of the parking strip on either side [m]
     marking_width : width of a longitudinal marking [m]
@@ -54,6 +57,9 @@ class StreetLayout:
     bend_transition: float
     bend_radius: float
     end_radius: float
+    grade_start: float
+    grade_transition: float
+    grade: float
     lane_width: float
     parking_width: float
     marking_width: float

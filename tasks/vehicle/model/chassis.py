@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
+from tasks.surface.road_profile import FLAT_ROAD, LEVEL_ROAD, RoadGrade, RoadHazard
 from tasks.vehicle.effects.table import EffectValues, pack_effect_values
 from tasks.vehicle.half_car import HalfCar, build_half_car
 from tasks.vehicle.paper.wheels import Wheels, build_wheels
@@ -18,14 +18,14 @@ class Conditions:
     ----------
     hazard : road feature
     snow_depth_mm : depth of the snow on the road [mm]
-    grade : rise of the road along the route [1]
+    grade : rise of the road along the route, over the stations of the run
     direction : +1 along the route, -1 against it
     disc_rise : temperature of the discs above ambient at the start [K]
     """
 
     hazard: RoadHazard = FLAT_ROAD
     snow_depth_mm: float = 0.0
-    grade: float = 0.0
+    grade: RoadGrade = LEVEL_ROAD
     direction: int = 1
     disc_rise: float = 0.0
 
@@ -44,7 +44,6 @@ class Chassis(NamedTuple):
     wet : 1 on a wet road, else 0 [1]
     snow_depth_mm : depth of the snow on the road [mm]
     direction : +1 along the route, -1 against it; the wind blows along the route [1]
-    climb : deceleration that the grade causes [m/s2]
     """
 
     body: HalfCar
@@ -56,7 +55,6 @@ class Chassis(NamedTuple):
     wet: float
     snow_depth_mm: float
     direction: float
-    climb: float
 
 
 def build_chassis(vehicle: Vehicle, response: SurfaceResponse, conditions: Conditions) -> Chassis:
@@ -82,5 +80,4 @@ def build_chassis(vehicle: Vehicle, response: SurfaceResponse, conditions: Condi
         wet=float(response.wet),
         snow_depth_mm=float(conditions.snow_depth_mm),
         direction=float(conditions.direction),
-        climb=vehicle.gravity * conditions.grade * conditions.direction,
     )

@@ -23,7 +23,7 @@ from tasks.vehicle.model.embedded_variables import INPUTS, OUTPUTS
 from tasks.vehicle.model.simulation import integrate_motion
 from tasks.vehicle.model.states import STATE_WIDTH, make_rolling_state, unpack_state
 from tasks.vehicle.parameters import TyreFamily, Vehicle, compute_surface_response, compute_tyre_scale
-from tasks.vehicle.road import RoadFeature, RoadLine
+from tasks.vehicle.road import Climb, RoadFeature, RoadLine
 from tasks.vehicle.tyres.contract import Tyre, scale_curve
 
 STEP = 0.0005
@@ -96,7 +96,7 @@ def compile_advance(vehicle: Vehicle) -> Any:
         tyre = make_tyre(weather, block[_FRICTION])
         chassis = Chassis(
             fixed.body, fixed.wheels, fixed.lever, fixed.lock_speed, fixed.transfer, fixed.effects, wet[weather],
-            block[_SNOW], fixed.direction, fixed.climb,
+            block[_SNOW], fixed.direction,
         )  # fmt: skip
         if steps < 0:
             state = make_rolling_state(block[_SPEED], fixed.wheels.radius, block[_DISC_RISE], np.inf)
@@ -108,6 +108,7 @@ def compile_advance(vehicle: Vehicle) -> Any:
             RoadLine(state.motion.station, block[_FRONT_HEIGHT], block[_FRONT_SLOPE]),
             RoadLine(state.motion.station - fixed.wheels.wheelbase, block[_REAR_HEIGHT], block[_REAR_SLOPE]),
         )  # fmt: skip
+        level = Climb(1.0, block[:0])  # a hill comes by the slopes
         for _ in range(max(steps, 1)):
             samples = 1 if steps < 0 else 2
             if samples == 2:
@@ -116,7 +117,7 @@ def compile_advance(vehicle: Vehicle) -> Any:
             begin = (round(state.time / STEP) + 2 - held) * STEP
             drive = BrakeInput(NO_COMMAND, pressures, STEP, block[_HOLD] != 0.0, engines, begin)
             integrate_motion(
-                state, samples, _SUBSTEPS, STEP, drive, road, slots, chassis, tyre, history, states
+                state, samples, _SUBSTEPS, STEP, drive, road, level, slots, chassis, tyre, history, states
             )
             state = unpack_state(states[samples - 1])
         last = 0 if steps < 0 else 1

@@ -113,7 +113,7 @@ def compute_ports(
                 forms,
             )
     if standing:
-        pull = wheels.mass * chassis.climb / (body.static_f + body.static_r)
+        pull = wheels.mass * instant.climb / (body.static_f + body.static_r)
         front, rear = (
             compute_standing_axle(ground_f, strut_f, wheels, body.static_f * pull),
             compute_standing_axle(ground_r, strut_r, wheels, body.static_r * pull),
@@ -146,7 +146,7 @@ def compute_ports(
     drag = wheels.mass * wheels.coast + compute_resistance(
         effects, speed, chassis.direction, chassis.snow_depth_mm
     )
-    drag += wheels.mass * chassis.climb
+    drag += wheels.mass * instant.climb
     moment = effects.aero_pitch * speed * speed
     lift_f -= forms_f.suspension_force
     lift_r += forms_r.suspension_force
@@ -156,10 +156,14 @@ def compute_ports(
     acceleration = 0.0
     if not (standing or instant.held):
         acceleration = -(front.tyre_force + rear.tyre_force + slope_f + slope_r + drag) / wheels.mass
-    link_f = front.tyre_force + slope_f + body.unsprung_f * (acceleration + chassis.climb)
-    link_r = rear.tyre_force + slope_r + body.unsprung_r * (acceleration + chassis.climb)
+    link_f = front.tyre_force + slope_f + body.unsprung_f * (acceleration + instant.climb)
+    link_r = rear.tyre_force + slope_r + body.unsprung_r * (acceleration + instant.climb)
     braking = (link_f + link_r) * chassis.lever + front.brake_torque + rear.brake_torque
     braking += front.shaft_torque + rear.shaft_torque
+    if (
+        instant.held
+    ):  # what holds the speed drives at the ground, as the tyres of a standing car hold it there
+        braking -= wheels.mass * instant.climb * (chassis.lever + wheels.radius)
     moment += braking * (1.0 + effects.pitch_gain)
     return Ports(
         front, rear, -slope_f - slope_r, drag, acceleration, moment, effects.aero_lift * speed * speed

@@ -32,7 +32,7 @@ from tasks.vehicle.model.states import (
 )
 from tasks.vehicle.model.step import take_step
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle
-from tasks.vehicle.road import RoadFeature, make_road_feature
+from tasks.vehicle.road import Climb, RoadFeature, compute_climb, make_climb, make_road_feature
 from tasks.vehicle.tyres.contract import Tyre
 
 COLUMNS = (
@@ -138,6 +138,7 @@ def simulate(
         recording.step,
         drive,
         make_road_feature(conditions.hazard),
+        make_climb(conditions.grade, vehicle.gravity, conditions.direction),
         pack_slots(tables) if tables else None,
         build_chassis(vehicle, surface, conditions),
         surface.tyre,
@@ -155,6 +156,7 @@ def integrate_motion(
     step: float,
     drive: BrakeInput,
     road: RoadFeature,
+    climb: Climb,
     slots: SlotTables | None,
     chassis: Chassis,
     tyre: Tyre,
@@ -171,6 +173,7 @@ def integrate_motion(
     step : internal step [s]
     drive : input of the driver
     road : road feature
+    climb : of the road's grade
     slots : forms and disturbances; with None the compiled loop leaves them out
     chassis, tyre : the vehicle on its surface
     history : float64 [samples, len(COLUMNS)]
@@ -220,7 +223,9 @@ def integrate_motion(
         if len(drive.engine) > 0:
             engine = interpolate_trace(time - drive.begin, drive.engine, drive.interval)
             next_engine = interpolate_trace(time + step - drive.begin, drive.engine, drive.interval)
-        instant = Instant(time, line, rate, deceleration, standing, held, engine)
+        instant = Instant(
+            time, line, rate, deceleration, standing, held, engine, compute_climb(motion.station, climb)
+        )
         ports = compute_ports(motion, memory, x, instant, scale_f, scale_r, step, slots, chassis, tyre, road)
         if n % substeps == 0:
             f, r = ports.front, ports.rear
@@ -238,7 +243,17 @@ def integrate_motion(
         if n == last:
             break
         deceleration = -ports.acceleration
-        next_instant = Instant(time + step, next_line, rate, deceleration, standing, held, next_engine)
+        ahead = motion.station if standing else motion.station + step * motion.speed
+        next_instant = Instant(
+            time + step,
+            next_line,
+            rate,
+            deceleration,
+            standing,
+            held,
+            next_engine,
+            compute_climb(ahead, climb),
+        )
         motion, memory, x = take_step(
             motion, memory, x, ports, instant, next_instant, step, slots, chassis, tyre, road
         )

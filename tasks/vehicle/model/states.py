@@ -52,6 +52,7 @@ class Instant(NamedTuple):
     standing : the vehicle has come to rest
     held : the driver holds its speed
     engine : torque of the engine at the wheels, driving positive [N m]
+    climb : deceleration that the grade of the road causes [m/s2]
     """
 
     time: float
@@ -61,6 +62,7 @@ class Instant(NamedTuple):
     standing: bool
     held: bool
     engine: float
+    climb: float
 
 
 STATE_WIDTH = 27

@@ -11,7 +11,7 @@ from tasks.vehicle.brake import PressureProfile, compute_brake_pressure, find_on
 from tasks.vehicle.history import write_row
 from tasks.vehicle.paper.wheel_step import solve_wheel_speed
 from tasks.vehicle.paper.wheels import Wheels, compute_axle_step, compute_transferred_loads
-from tasks.vehicle.road import RoadFeature, compute_road_slope
+from tasks.vehicle.road import Climb, RoadFeature, compute_climb, compute_road_slope
 from tasks.vehicle.tyres.contract import Tyre
 
 DRIVE_COLUMNS = (
@@ -30,6 +30,7 @@ def simulate_drive(
     step: float,
     profile: PressureProfile,
     road: RoadFeature,
+    climb: Climb,
     loads: NDArray[np.float64],
     implicit_below: float,
     wheels: Wheels,
@@ -45,6 +46,7 @@ def simulate_drive(
     step : Euler step [s]
     profile : brake command
     road : road feature
+    climb : of the road's grade
     loads : half-car loads of the front and rear axle at each sample, shape (steps + 1, 2) [N]; with shape
         (0, 2) the analytic load transfer feeds the tyres
     implicit_below : speed below which the wheels take the implicit step and the stop lies between two samples;
@@ -59,7 +61,7 @@ def simulate_drive(
     log = np.empty((steps + 1, 17))
     station, speed = 0.0, initial_speed
     omega_f, omega_r = initial_speed / wheels.radius, initial_speed / wheels.radius
-    scale_f, scale_r, acceleration = 1.0, 1.0, 0.0
+    scale_f, scale_r, at_ground = 1.0, 1.0, 0.0
     onset, stop, stop_time = profile.onset_time, -1, inf
     for n in range(steps + 1):
         if isinf(onset):
@@ -68,17 +70,20 @@ def simulate_drive(
         if len(loads) > 0:
             load_f, load_r = loads[n, 0], loads[n, 1]
         else:
-            load_f, load_r = compute_transferred_loads(acceleration, wheels)
+            load_f, load_r = compute_transferred_loads(at_ground, wheels)
         f = compute_axle_step(speed, omega_f, load_f, pressure, scale_f, step, wheels.front, wheels, tyre)
         r = compute_axle_step(speed, omega_r, load_r, pressure, scale_r, step, wheels.rear, wheels, tyre)
         road_force = -load_f * compute_road_slope(station, road) - load_r * compute_road_slope(
             station - wheels.wheelbase, road
         )
-        acceleration = (road_force - (f.force + r.force)) * (1.0 / wheels.mass) - wheels.coast
+        pull = compute_climb(station, climb)
+        acceleration = (road_force - (f.force + r.force)) * (1.0 / wheels.mass) - wheels.coast - pull
         if stop >= 0:
             road_force, acceleration = 0.0, 0.0
         elif hold_speed and n * step < onset:
             acceleration = 0.0
+        # what moves the load is the force at the ground, not the weight's share along the road
+        at_ground = acceleration + pull
         sample = (
             station, speed, acceleration, f.slip, r.slip, omega_f, omega_r, f.force, r.force, load_f, load_r,
             f.torque, r.torque, f.scale, r.scale, pressure, road_force,
@@ -95,7 +100,8 @@ def simulate_drive(
                 station += 0.5 * share * step * (before + wheels.stop_speed)
             else:
                 station += 0.5 * step * (before + after)
-            speed, omega_f, omega_r, acceleration, scale_f, scale_r = 0.0, 0.0, 0.0, 0.0, 1.0, 1.0
+            speed, omega_f, omega_r, scale_f, scale_r = 0.0, 0.0, 0.0, 1.0, 1.0
+            at_ground = compute_climb(station, climb)
             continue
         station += 0.5 * step * (before + after)
         speed, scale_f, scale_r = after, f.scale, r.scale
@@ -106,7 +112,7 @@ def simulate_drive(
             omega_f += step * f.rate
             omega_r += step * r.rate
     if stop >= 0:
-        log_standing(log, stop, onset, step, profile, loads, wheels)
+        log_standing(log, stop, onset, step, profile, loads, compute_climb(station, climb), wheels)
     return log, onset, stop, stop_time
 
 
@@ -118,6 +124,7 @@ def log_standing(
     step: float,
     profile: PressureProfile,
     loads: NDArray[np.float64],
+    pull: float,
     wheels: Wheels,
 ) -> None:
     """Fill the log after the sample of the stop: a standing car changes its brake pressure and its loads alone.
@@ -129,8 +136,9 @@ def log_standing(
     onset : brake onset [s]
     step : Euler step [s]
     profile, loads, wheels : as in `simulate_drive`
+    pull : deceleration that the grade causes where the car stands [m/s2]
     """
-    load_f, load_r = compute_transferred_loads(0.0, wheels)
+    load_f, load_r = compute_transferred_loads(pull, wheels)
     for n in range(stop + 1, len(log)):
         pressure = compute_brake_pressure(n * step - onset, profile)
         if len(loads) > 0:

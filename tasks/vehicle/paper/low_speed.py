@@ -71,6 +71,7 @@ def compute_brake_pitch_input(
     step: float,
     braked: BrakedStop,
     *,
+    climb: NDArray[np.float64] | None = None,
     hold_s: float,
     release_s: float,
     hold_ratio: float,
@@ -79,11 +80,13 @@ def compute_brake_pitch_input(
     """Return the deceleration d_theta that drives the body's pitch [m/s2] (paper, Appendix B, low-speed pitch rule).
 
     The reference is the median of the positive decelerations over the 0.6 s before the hold; without any the
-    input stays as it is.
+    input stays as it is. On a grade the input is the deceleration that the forces at the ground cause, and what holds
+    a car on its grade counts too: the least input and the end of the release are no longer 0, but those of that force.
 
     Parameters
     ----------
     acceleration : dv/dt on the internal grid, shape (n,) [m/s2]
+    climb : deceleration that the grade causes, shape (n,); None on a level road [m/s2]
     step : grid interval [s]
     braked : when the brake begins, and the stop, with which the release begins
     hold_s : tau_h [s]
@@ -91,8 +94,10 @@ def compute_brake_pitch_input(
     hold_ratio : rho_h [1]
     held_share : part of the hold time over which the released value is the mean; 0 takes the last sample [1]
     """
-    d = np.maximum(-acceleration, 0.0)
+    d, rest = np.maximum(-acceleration, 0.0), 0.0
     stop = braked.sample
+    if climb is not None:
+        d, rest = np.maximum(-acceleration - climb, np.minimum(-climb, 0.0)), -float(climb[stop])
     if stop < 0 or not np.isfinite(braked.onset):
         return d
 
@@ -114,5 +119,5 @@ def compute_brake_pitch_input(
     first = min(max(hold, stop - count_samples(held_share * hold_s)), stop - 1)
     early = 0.0 if braked.time is None else stop * step - braked.time
     since_stop = np.arange(len(d) - stop) * step + early
-    d[stop:] = d[first:stop].mean() * np.maximum(1 - since_stop / release_s, 0.0)
+    d[stop:] = rest + (d[first:stop].mean() - rest) * np.maximum(1 - since_stop / release_s, 0.0)
     return d

@@ -11,7 +11,7 @@ from math import inf, isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.surface.road_profile import RoadHazard, road_elevation
+from tasks.surface.road_profile import LEVEL_ROAD, RoadGrade, RoadHazard, road_elevation
 from tasks.vehicle.brake import PressureProfile
 from tasks.vehicle.half_car import (
     build_half_car,
@@ -25,7 +25,7 @@ from tasks.vehicle.paper.low_speed import NO_STOP, BrakedStop, SteadyStop, compu
 from tasks.vehicle.paper.wheel_step import find_implicit_speed
 from tasks.vehicle.paper.wheels import build_wheels
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle
-from tasks.vehicle.road import make_road_feature
+from tasks.vehicle.road import make_climb, make_road_feature
 
 FIXED_POINT_PASSES = 5
 ANALYTIC_LOADS = np.empty((0, 2))
@@ -86,6 +86,7 @@ def run_paper_mode(
     hazard: RoadHazard,
     grid: StepGrid,
     steady: SteadyStop | None = None,
+    grade: RoadGrade = LEVEL_ROAD,
 ) -> PaperRun:
     """Simulate one run (paper, Appendix B).
 
@@ -99,8 +100,10 @@ def run_paper_mode(
     hazard : road feature
     grid : internal steps, and passes on a road feature
     steady : how the end of a stop is kept steady; None takes the published steps literally
+    grade : of the road, which the publication does not have
     """
     wheels, road = build_wheels(vehicle), make_road_feature(hazard)
+    climb = make_climb(grade, vehicle.gravity)
     implicit_below, held_share, pitch_rule = 0.0, 0.0, True
     if steady is not None:
         pitch_rule = steady.pitch_rule
@@ -111,13 +114,15 @@ def run_paper_mode(
 
     def drive(loads: NDArray[np.float64]) -> tuple[NDArray[np.float64], float, int, float]:
         return simulate_drive(
-            initial_speed, hold_speed, grid.steps, grid.step, profile, road, loads, implicit_below, wheels,
-            response.tyre,
+            initial_speed, hold_speed, grid.steps, grid.step, profile, road, climb, loads, implicit_below,
+            wheels, response.tyre,
         )  # fmt: skip
 
     def move_body() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         braked = BrakedStop(onset=onset, sample=stop, time=stop_time) if pitch_rule else NO_STOP
-        return simulate_body(vehicle, response, hazard, log, braked, grid.step, held_share=held_share)
+        return simulate_body(
+            vehicle, response, hazard, log, braked, grid.step, held_share=held_share, grade=grade
+        )
 
     log, onset, stop, stop_time = drive(ANALYTIC_LOADS)
     if hazard.height_m == 0:
@@ -151,6 +156,7 @@ def simulate_body(
     step: float,
     *,
     held_share: float = 0.0,
+    grade: RoadGrade = LEVEL_ROAD,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Return half-car states, road heights and contact loads along a drive (paper, Eqs. half_car and app_brake_pitch).
 
@@ -161,12 +167,14 @@ def simulate_body(
     braked : brake onset and stop of the drive; `NO_STOP` leaves the low-speed rule out
     step : step of the grid [s]
     held_share : as in `compute_brake_pitch_input`
+    grade : of the road
     """
     car = build_half_car(vehicle)
     d_theta = compute_brake_pitch_input(
         log[:, 2],
         step,
         braked,
+        climb=None if grade.is_level else vehicle.gravity * grade.at(log[:, 0]),
         hold_s=response.hold_s,
         release_s=response.release_s,
         hold_ratio=vehicle.hold_ratio,
