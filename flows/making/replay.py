@@ -75,7 +75,7 @@ def replay_audit(
     with tempfile.TemporaryDirectory() as folder, progress_bar("runs", count * (seeds + 1)) as advance:
         # the first seed comes twice: its picture must too
         for seed in (*range(checked.settings.seed, checked.settings.seed + seeds), checked.settings.seed):
-            settings = checked.settings.model_copy(update={"seed": seed})
+            settings = checked.settings.model_copy(update={"seed": seed, "visual_seeds": 1})
             plan, inputs = freeze_grid(replace(checked, settings=settings), grid, name)
             for file, content in inputs.items():
                 write_atomically(Path(folder) / file, content)

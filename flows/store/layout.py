@@ -122,9 +122,14 @@ def _flush_folder(folder: Path) -> None:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Readable JSON with sorted keys; the same value gives the same bytes."""
+    """Write readable JSON with sorted keys; the same value gives the same bytes."""
+    write_atomically(path, encode_json(value))
+
+
+def encode_json(value: Any) -> bytes:
+    """Return the bytes that `write_json` writes."""
     text = json.dumps(value, indent=1, sort_keys=True, allow_nan=False, ensure_ascii=False)
-    write_atomically(path, (text + "\n").encode())
+    return (text + "\n").encode()
 
 
 def read_json(path: Path) -> Any:
