@@ -55,15 +55,15 @@ def audit_dataset(
 
     Returns
     -------
-    The audit: ``not_checked`` and ``verdict``, a sentence each; ``verified`` (all well); what `flows.auditing.audit_facts.collect_facts` says of
-    dataset, tools and machine; ``files``, ``intact``, ``damaged[]`` and ``unrecorded[]`` as of
-    `flows.auditing.verify.compare_files`; ``signed``, ``signature``, ``signers``, ``key_id`` and ``key_sha256`` as of
-    `flows.auditing.signing.signature_findings`; ``contradictions[]`` of records as of
+    The audit: ``not_checked`` and ``verdict``, a sentence each; ``verified`` (all well); what
+    `flows.auditing.audit_facts.collect_facts` says of dataset, tools and machine; ``files``, ``intact``, ``damaged[]``
+    and ``unrecorded[]`` as of `flows.auditing.verify.compare_files`; ``signed``, ``signature``, ``signers``, ``key_id``
+    and ``key_sha256`` as of `flows.auditing.signing.signature_findings`; ``contradictions[]`` as of
     `flows.auditing.contradictions.find_contradictions`; ``unchecked[]``, what was left out and why, as of
-    `flows.auditing.audit_facts.list_unchecked`; ``share`` and ``seed`` of the draw; ``rerun[]``, ids of the
-    clips made again, and ``remade[]``, the same with label and outcome; ``compared``, how many tables and arrays of
-    them; ``mismatches[]``, each with where it differs first and the inputs that can be ``why``; ``differences[]`` of
-    inputs and tools between what made the dataset and what is here; ``not_remade[]``, why no clip could be made again;
+    `flows.auditing.audit_facts.list_unchecked`; ``share`` and ``seed`` of the draw; ``rerun[]``, ids of the clips made
+    again, and ``remade[]``, the same with label and outcome; ``compared``, how many tables and arrays of them;
+    ``mismatches[]``, each with where it differs first and the inputs that can be ``why``; ``differences[]`` of inputs
+    and tools between what made the dataset and what is here; ``not_remade[]``, why no clip could be made again;
     ``started_utc``, ``ended_utc``.
 
     Raises

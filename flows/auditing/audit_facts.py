@@ -92,13 +92,15 @@ def list_unchecked(
     clips, pictures = len(manifest["clips"]), manifest["grid"].get("pictures", True)
     lost, files = len(compared["damaged"]), compared["files"] + len(compared["unrecorded"])
     writers = " and ".join(name_other_writers(manifest))
-    strange = [path for path in compared["unrecorded"] if path not in {row["path"] for row in compared["damaged"]}]
+    strange = [
+        path for path in compared["unrecorded"] if path not in {row["path"] for row in compared["damaged"]}
+    ]
     rows = [
         _count_unchecked("motion, pictures and pose check" if pictures else "motion", clips - remade, clips, "clips",
             "not made again"),
         _count_unchecked("content", lost, files, "files", "damaged, or nobody recorded them"),
         _count_unchecked("content", len(strange), files, "files", f"nobody recorded them: {', '.join(strange)}"),
-        _count_unchecked("bytes", len(others), files, "files", f"written by another {writers}; their values are checked"),
+        _count_unchecked("bytes", len(others), files, "files", f"written by another {writers}; values are checked"),
         _count_unchecked(f"records of {', '.join(RECORDS_OF_TOOLS[:-1])} and {RECORDS_OF_TOOLS[-1]}",
             len(RECORDS_OF_TOOLS), len(RECORDS_OF_TOOLS), "records", "no byte follows from them"),
     ]  # fmt: skip

@@ -72,7 +72,9 @@ def find_contradictions(
         compare_sheet(layout, manifest, plan, known),
     ):
         if lies or is_same_writer:
-            found.append(lies or [f"{path}: must have the bytes that muSync makes of what it shows; it has others"])
+            found.append(
+                lies or [f"{path}: must have the bytes that muSync makes of what it shows; it has others"]
+            )
         else:
             others.append(path)
     sentences = [
@@ -152,7 +154,9 @@ def _compare_ids(manifest: Manifest, plan: Plan) -> Iterator[str]:
 def _compare_files(layout: Layout, manifest: Manifest, plan: Plan) -> Iterator[str]:
     """Yield the files that are recorded and not planned, or planned and not recorded, or recorded of another clip."""
     arrays = arrays_of(plan.settings.labels) if plan.settings.pictures else {}
-    planned: dict[str, str | None] = dict.fromkeys([*list_remade(plan), *(f"inputs/{name}" for name in plan.inputs)])
+    planned: dict[str, str | None] = dict.fromkeys(
+        [*list_remade(plan), *(f"inputs/{name}" for name in plan.inputs)]
+    )
     for clip in plan.clips:
         planned |= {layout.relative(layout.frame_shard(name, clip.index)): clip.clip_id for name in arrays}
     recorded = {path: clip_id for path, (_, clip_id) in recorded_files(manifest).items()}
@@ -169,6 +173,13 @@ def _compare_files(layout: Layout, manifest: Manifest, plan: Plan) -> Iterator[s
                 f" {_name_owner(recorded[path])}"
             )
     contents = {*STAGED_TABLES, *arrays}
+    for clip in manifest["clips"]:
+        passed, reasons = clip["verdict"]["passed"], clip["verdict"]["reasons"]
+        if (passed is True) == bool(reasons):
+            yield (
+                f"manifest.json: verdict.passed of clip {clip['label']} must say whether its check gave no reasons; it"
+                f" is {passed} with {len(reasons)}"
+            )
     for clip in manifest["clips"]:
         for name in sorted(clip["content"].keys() ^ contents):
             yield (

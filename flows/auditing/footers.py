@@ -31,16 +31,20 @@ def find_label_lies(file: pq.ParquetFile, wanted: pa.Schema, is_same_writer: boo
         rows = find_value_differences(_read_labels(ours), _read_labels(theirs))
         for key, a, b in rows:
             if is_same_writer or not (key in FREE_TEXT or ABSENT in (a, b)):
-                yield f"{key} of column {ours.name} must be {format_value(a)}, as muSync labels it; it is {format_value(b)}"
+                yield f"{key} of column {ours.name} must be {format_value(a)}; it is {format_value(b)}"
         if is_same_writer and ours.type != theirs.type:
             yield f"column {ours.name} must be of type {ours.type}; it is of {theirs.type}"
     more = {*(file.metadata.metadata or {})} - _OWN_KEYS
     if is_same_writer and more:
-        yield f"must carry no further metadata; it carries {format_value(sorted(key.decode(errors='replace') for key in more))}"
+        names = sorted(key.decode(errors="replace") for key in more)
+        yield f"must carry no further metadata; it carries {format_value(names)}"
 
 
 def _read_labels(field: pa.Field) -> dict[str, str]:
-    labels = {key.decode(errors="replace"): text.decode(errors="replace") for key, text in (field.metadata or {}).items()}
+    labels = {
+        key.decode(errors="replace"): text.decode(errors="replace")
+        for key, text in (field.metadata or {}).items()
+    }
     return {key: text for key, text in labels.items() if not key.startswith("PARQUET:")}
 
 
@@ -63,8 +67,8 @@ def find_footer_lies(file: pq.ParquetFile) -> Iterator[str]:
                 told = getattr(said, what) if what == "null_count" or said.has_min_max else None
                 if told is not None and told != value:
                     yield (
-                        f"{what} of column {name.split('.')[0]} in row group {group} must be {format_value(value)}, as its"
-                        f" rows say; its footer says {format_value(told)}"
+                        f"{what} of column {name.split('.')[0]} in row group {group} must be {format_value(value)}, as"
+                        f" its rows say; its footer says {format_value(told)}"
                     )
 
 
@@ -94,10 +98,13 @@ def find_writer_differences(file: pq.ParquetFile, wanted: bytes) -> list[str]:
     file : a table
     wanted : bytes that our writer makes of it
     """
-    ours, theirs = (_describe_writing(metadata) for metadata in (pq.read_metadata(pa.BufferReader(wanted)), file.metadata))
+    ours, theirs = (
+        _describe_writing(metadata) for metadata in (pq.read_metadata(pa.BufferReader(wanted)), file.metadata)
+    )
     rows = find_value_differences(ours, theirs)
     return [
-        f"{place} must be {format_value(a)}, as muSync writes it; it is {format_value(b)}" for place, a, b in rows
+        f"{place} must be {format_value(a)}, as muSync writes it; it is {format_value(b)}"
+        for place, a, b in rows
     ] or ["must have the bytes that muSync writes of its values; it has others"]
 
 
@@ -107,9 +114,11 @@ def _describe_writing(metadata: pq.FileMetaData) -> Mapping[str, Any]:
     return {
         "its writer": metadata.created_by,
         "rows of its row groups": str([group.num_rows for group in groups]),
-        "its compression": sorted({chunk.compression for chunk in chunks}),
-        "its encodings": sorted({name for chunk in chunks for name in chunk.encodings}),
-        "presence of an index of pages": any(chunk.has_column_index or chunk.has_offset_index for chunk in chunks),
+        "its compression": ", ".join(sorted({chunk.compression for chunk in chunks})),
+        "its encodings": ", ".join(sorted({name for chunk in chunks for name in chunk.encodings})),
+        "presence of an index of pages": any(
+            chunk.has_column_index or chunk.has_offset_index for chunk in chunks
+        ),
         "presence of filters": any(chunk.to_dict().get("bloom_filter_offset") for chunk in chunks),
         "its statistics": [_list_statistics(chunk) for chunk in chunks],
     }

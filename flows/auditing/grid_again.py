@@ -24,21 +24,24 @@ def find_grid_contradictions(plan: Plan, is_same_writer: bool) -> list[str]:
     Parameters
     ----------
     plan : of the dataset, with the settings and the clips that it records
-    is_same_writer : whether the code made the dataset; another version may place a clip in the calibrated range elsewhere
+    is_same_writer : whether the code made the dataset; another version may have another calibrated range
     """
-    first: list[str] | None = None
+    least: list[str] | None = None
     for settings in islice(_order_blocks(plan.settings), MOST_ORDERS):
         found = _compare_clips(settings, plan, is_same_writer)
+        if least is None or len(found) < len(least):
+            least = found
         if not found:
-            return []
-        first = first or found
-    return first or []
+            break
+    return least or []
 
 
 def _order_blocks(settings: GridFile) -> Iterator[GridFile]:
-    """Yield the settings in each order of axes and of drawn ranges; axes in step become axes, of which any pair can be."""
+    """Yield the settings in each order of axes and of drawn ranges; axes in step become axes like the others."""
     cube = settings.latin_hypercube
-    orders = product(permutations(settings.axes), permutations(settings.zip), permutations(cube.ranges if cube else ()))
+    orders = product(
+        permutations(settings.axes), permutations(settings.zip), permutations(cube.ranges if cube else ())
+    )
     for axes, steps, ranges in orders:
         blocks = {name: settings.axes[name] for name in axes}
         # an axis in step can have the name of another axis
@@ -58,7 +61,11 @@ def _compare_clips(settings: GridFile, plan: Plan, is_same_writer: bool) -> list
             fields |= partial
         asked["/".join(level for level, _ in combination)] = Scenario(**fields)
     seeds = range(settings.seed, settings.seed + settings.visual_seeds)
-    wanted = {name_clip(label, seed, len(seeds)): (scenario, seed) for label, scenario in asked.items() for seed in seeds}
+    wanted = {
+        name_clip(label, seed, len(seeds)): (scenario, seed)
+        for label, scenario in asked.items()
+        for seed in seeds
+    }
     labels = {clip.label for clip in plan.clips}
     found = [
         f"manifest.json: clip {clip.index} must have a label of its grid; it has {format_value(clip.label)}"
@@ -91,7 +98,12 @@ def _compare_clip(
         "calibration": facts[CALIBRATION] if is_same_writer else clip.calibration,
         "split": clip.split if clip.split in splits else min(splits),
     }
-    found = {**clip.scenario.as_row(), "seed": clip.seed, "calibration": clip.calibration, "split": clip.split}
+    found = {
+        **clip.scenario.as_row(),
+        "seed": clip.seed,
+        "calibration": clip.calibration,
+        "split": clip.split,
+    }
     for name, value in asked.items():
         if found[name] != value:
             yield (

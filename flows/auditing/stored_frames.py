@@ -46,7 +46,11 @@ def compare_frame_metadata(
             content = require_file(layout.root / path).read_bytes()
             if content == wanted:
                 continue
-            lies = list(_compare_values(*(parse_json(text, path, "metadata") for text in (wanted, content)), is_same_writer))
+            lies = list(
+                _compare_values(
+                    *(parse_json(text, path, "metadata") for text in (wanted, content)), is_same_writer
+                )
+            )
             if not is_same_writer:
                 members = [place.name for place in layout.frames.iterdir() if place.is_dir()]
                 check_frames(read_local_metadata(layout.frames), members, path, *arguments["shape"][:2])
@@ -78,7 +82,9 @@ def draw_sheet_again(layout: Layout, manifest: Manifest, plan: Plan) -> bytes:
         If a picture or a table that it shows cannot be read.
     """
     parts = {clip_id: path for path, ids in table_parts(plan, "frames").items() for clip_id in ids}
-    return preview_sheet(layout, plan, manifest["clips"], lambda clip_id: require_file(layout.root / parts[clip_id]))
+    return preview_sheet(
+        layout, plan, manifest["clips"], lambda clip_id: require_file(layout.root / parts[clip_id])
+    )
 
 
 def compare_sheet(

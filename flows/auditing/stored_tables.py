@@ -1,4 +1,4 @@
-"""The Parquet tables of a dataset as every reader meets them: their bytes are those that our writer makes of the values."""
+"""The Parquet tables of a dataset as every reader meets them: their bytes are what our writer makes of the values."""
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -18,6 +18,7 @@ from flows.making.summaries import summarise_clips
 from flows.store.layout import Layout
 from flows.store.links import require_file
 from flows.store.telemetry import columns_hash, encode_tables, labelled_table, table_columns
+from manifests.compare import find_row_difference
 from manifests.explain import format_value
 from manifests.records import Manifest, Receipt
 from tasks.conventions import FRAME_CHANNELS, TICK_CHANNELS
@@ -75,16 +76,29 @@ def _compare_file(
             if _holds_bytes(place, encode_tables(remake(file))) and not lies:
                 return
             lies.clear()
-            wanted = pa.concat_tables(remake(file)).unify_dictionaries() if is_same_writer else None
-            found = [*find_label_lies(file, next(iter(remake(file))).schema, is_same_writer)]
-            found += [*lies, *find_footer_lies(file)]
-            if not found and wanted is not None:
+            wanted = pa.concat_tables(remake(file)).unify_dictionaries()
+            found = [*find_label_lies(file, wanted.schema, is_same_writer), *lies, *find_footer_lies(file)]
+            if file.schema_arrow.names == wanted.column_names:
+                found += _find_value_lies(file.read(), wanted)
+            if not found and is_same_writer:
                 found = find_writer_differences(file, b"".join(encode_tables([wanted])))
     except InputError as error:
         found = list(error.problems)
     except (pa.ArrowException, OSError, ValueError, KeyError) as error:
         found = [f"must be a table as muSync writes it; {shorten(error)}"]
     yield path, [f"{path}: {lie}" for lie in cap_problems(list(dict.fromkeys(found)), _SHOWN)]
+
+
+def _find_value_lies(found: pa.Table, wanted: pa.Table) -> list[str]:
+    row = find_row_difference(table_columns(found), table_columns(wanted), wanted.column_names)
+    return (
+        []
+        if row is None
+        else [
+            f"{row['channel']} in row {row['tick']} must be {format_value(row['remade'])}, as manifest.json says; it is"
+            f" {format_value(row['recorded'])}"
+        ]
+    )
 
 
 def _holds_bytes(place: Path, pieces: Iterable[bytes]) -> bool:
@@ -173,7 +187,9 @@ class _Part:
             if not np.array_equal(columns[name], values)
         ]
         if columns_hash(columns, names) != clip["content"][self.table]:  # type: ignore[literal-required]
-            lies.append(f"the rows {of_clip} must have the hash that manifest.json records; they have another")
+            lies.append(
+                f"the rows {of_clip} must have the hash that manifest.json records; they have another"
+            )
         return lies
 
 

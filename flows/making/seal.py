@@ -51,7 +51,9 @@ def seal_dataset(layout: Layout, plan: Plan, executor: Executor | None = None) -
     sheet = layout.root / SHEET
     if plan.settings.pictures:
         shown = list(_read_receipts(layout, pick_evenly(plan.clips, PREVIEW_CLIPS)))
-        write_atomically(sheet, preview_sheet(layout, plan, shown, lambda clip_id: layout.staged(clip_id, "frames")))
+        write_atomically(
+            sheet, preview_sheet(layout, plan, shown, lambda clip_id: layout.staged(clip_id, "frames"))
+        )
     made = [
         *(layout.root / path for path in SUMMARIES),
         *([sheet] if plan.settings.pictures else []),
