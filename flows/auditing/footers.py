@@ -24,16 +24,17 @@ def find_label_lies(file: pq.ParquetFile, wanted: pa.Schema, is_same_writer: boo
     is_same_writer : whether our writer made it; else types, absent labels and labels in words may be others
     """
     found = file.schema_arrow
-    if found.names != wanted.names:
+    if is_same_writer and found.names != wanted.names:
         yield f"its columns must be {format_value(wanted.names)}; they are {format_value(found.names)}"
         return
-    for ours, theirs in zip(wanted, found, strict=True):
+    for name in [name for name in wanted.names if name in found.names]:
+        ours, theirs = wanted.field(name), found.field(name)
         rows = find_value_differences(_read_labels(ours), _read_labels(theirs))
         for key, a, b in rows:
             if is_same_writer or not (key in FREE_TEXT or ABSENT in (a, b)):
-                yield f"{key} of column {ours.name} must be {format_value(a)}; it is {format_value(b)}"
+                yield f"{key} of column {name} must be {format_value(a)}; it is {format_value(b)}"
         if is_same_writer and ours.type != theirs.type:
-            yield f"column {ours.name} must be of type {ours.type}; it is of {theirs.type}"
+            yield f"column {name} must be of type {ours.type}; it is of {theirs.type}"
     more = {*(file.metadata.metadata or {})} - _OWN_KEYS
     if is_same_writer and more:
         names = sorted(key.decode(errors="replace") for key in more)

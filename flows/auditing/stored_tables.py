@@ -55,11 +55,11 @@ def compare_tables(
         for table, (path, ids) in zip(_COLUMNS, parts, strict=True):
             part = _Part(table, plan, [clips[clip_id] for clip_id in ids], shown, is_same_writer)
             if path not in damaged:
-                yield from _compare_file(layout, path, part.remake, part.lies, is_same_writer)
+                yield from _compare_file(layout, path, part.remake, part.lies, part.names, is_same_writer)
     for path, tables in summarise_clips(plan, manifest["clips"]):
         if path not in damaged:
             held = list(tables)
-            yield from _compare_file(layout, path, lambda _, held=held: held, [], is_same_writer)
+            yield from _compare_file(layout, path, lambda _, held=held: held, [], (), is_same_writer)
 
 
 def _compare_file(
@@ -67,21 +67,22 @@ def _compare_file(
     path: str,
     remake: Callable[[pq.ParquetFile], Iterable[pa.Table]],
     lies: list[str],
+    names: Collection[str],
     is_same_writer: bool,
 ) -> Iterator[Difference]:
-    """Compare a table with what ``remake`` yields of it, which notes in ``lies`` what contradicts the records."""
+    """Compare a table with what ``remake`` yields of it: ``names`` as recorded, and in ``lies`` what contradicts it."""
     try:
         place = require_file(layout.root / path)
         with pq.ParquetFile(place, pre_buffer=False, page_checksum_verification=True) as file:
+            told = [name for name in file.schema_arrow.names if name in names]
             if _holds_bytes(place, encode_tables(remake(file))) and not lies:
                 return
             lies.clear()
-            wanted = pa.concat_tables(remake(file)).unify_dictionaries()
-            found = [*find_label_lies(file, wanted.schema, is_same_writer), *lies, *find_footer_lies(file)]
-            if file.schema_arrow.names == wanted.column_names:
-                found += _find_value_lies(file.read(), wanted)
+            schemas, words = zip(*((table.schema, table.select(told)) for table in remake(file)), strict=True)
+            found = [*find_label_lies(file, schemas[0], is_same_writer), *lies, *find_footer_lies(file)]
+            found += _find_word_lies(file.read(told), pa.concat_tables(words).unify_dictionaries())
             if not found and is_same_writer:
-                found = find_writer_differences(file, b"".join(encode_tables([wanted])))
+                found = find_writer_differences(file, b"".join(encode_tables(remake(file))))
     except InputError as error:
         found = list(error.problems)
     except (pa.ArrowException, OSError, ValueError, KeyError) as error:
@@ -89,16 +90,12 @@ def _compare_file(
     yield path, [f"{path}: {lie}" for lie in cap_problems(list(dict.fromkeys(found)), _SHOWN)]
 
 
-def _find_value_lies(found: pa.Table, wanted: pa.Table) -> list[str]:
+def _find_word_lies(found: pa.Table, wanted: pa.Table) -> list[str]:
     row = find_row_difference(table_columns(found), table_columns(wanted), wanted.column_names)
-    return (
-        []
-        if row is None
-        else [
-            f"{row['channel']} in row {row['tick']} must be {format_value(row['remade'])}, as manifest.json says; it is"
-            f" {format_value(row['recorded'])}"
-        ]
-    )
+    return [] if row is None else [
+        f"{row['channel']} in row {row['tick']} must be {format_value(row['remade'])}, as manifest.json says; it is"
+        f" {format_value(row['recorded'])}"
+    ]  # fmt: skip
 
 
 def _holds_bytes(place: Path, pieces: Iterable[bytes]) -> bool:
@@ -128,6 +125,7 @@ class _Part:
     ):
         self.table, self.plan, self.clips, self.shown = table, plan, clips, shown
         self.is_same_writer = is_same_writer
+        self.names = {*WORDS, *(() if table == "ticks" else clips[0]["figures"])}
         self.lies: list[str] = []
 
     def remake(self, file: pq.ParquetFile) -> Iterator[pa.Table]:
@@ -138,8 +136,8 @@ class _Part:
                 f"must have {rows} rows of each of its {len(self.clips)} clips; it has {file.metadata.num_rows} in all"
             )
         names = file.schema_arrow.names
-        figures = [] if self.table == "ticks" else [n for n in names if n in self.clips[0]["figures"]]
-        stored = [name for name in names if name not in (*WORDS, *figures)]
+        figures = [name for name in names if name in self.names and name not in WORDS]
+        stored = [name for name in names if name not in self.names]
         strange = [name for name in stored if name not in _COLUMNS[self.table]]
         lost = sorted(_COLUMNS[self.table] - {*stored}) if self.is_same_writer else []
         self.lies += [f"must have no column {name}, which muSync does not write there" for name in strange]

@@ -97,6 +97,18 @@ def test_pictures_of_two_clips_exchanged(copy):
     assert (row["stage"], row["channel"], row["changed"]) == ("render", "rgb", ["rgb"])
 
 
+def test_a_shard_with_more_than_its_pixels(copy):
+    shard = copy.frame_shard("rgb", 0)
+    content, index = shard.read_bytes(), 16 * 11 + 4  # two numbers a frame, and a checksum
+    shard.write_bytes(content[:-index] + b"more" + content[-index:])
+    reseal(copy)
+    (row,) = audited(copy, 0.25)["mismatches"]
+    assert (
+        row["changed"] == ["rgb"]
+        and "its pixels are those made again and its bytes are not" in row["problem"]
+    )
+
+
 @pytest.mark.parametrize(
     ("record", "key", "value"),
     [

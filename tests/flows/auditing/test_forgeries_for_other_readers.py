@@ -12,6 +12,7 @@ from flows.store.layout import Layout
 from tests.flows.auditing.forging import (
     CLIPS,
     FRAMES,
+    OURS,
     PAIRS,
     SHEET,
     TICKS,
