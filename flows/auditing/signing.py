@@ -11,7 +11,7 @@ from flows.store.address import open_for_writing, send_files
 from flows.store.layout import Layout, write_atomically
 from flows.store.lock import sole_writer
 from flows.store.sealed import read_manifest
-from flows.store.staging import remove_staging
+from flows.store.staging import left_overs, remove_staged, remove_staging
 from manifests.canonical import sha256_of
 from manifests.manifest import manifest_damage
 from manifests.signing import (
@@ -56,6 +56,7 @@ def sign_dataset(dataset: str, *, key: str) -> dict[str, Any]:
         read_manifest(layout, sealed=False)
         with sole_writer(layout):
             try:
+                remove_staged(left_overs(layout))
                 return _sign_manifest(layout, signer)
             finally:
                 remove_staging(layout)

@@ -53,7 +53,9 @@ def compare_frame_metadata(
             )
             if not is_same_writer:
                 members = [place.name for place in layout.frames.iterdir() if place.is_dir()]
-                check_frames(read_local_metadata(layout.frames), members, path, *arguments["shape"][:2])
+                check_frames(
+                    read_local_metadata(layout.frames), members, layout.frames.name, *arguments["shape"][:2]
+                )
         except InputError as error:
             lies = list(error.problems)
         yield path, [lie if lie.startswith(path) else f"{path}: {lie}" for lie in cap_problems(lies, _SHOWN)]
@@ -61,7 +63,7 @@ def compare_frame_metadata(
 
 def _compare_values(wanted: Any, found: Any, is_same_writer: bool) -> Iterator[str]:
     if not is_same_writer:
-        wanted, found = (value.get("attributes", {}) for value in (wanted, found))
+        wanted, found = ({"attributes": value.get("attributes", {})} for value in (wanted, found))
     for place, a, b in find_value_differences(wanted, found):
         if is_same_writer or not (place.rpartition(".")[2] in FREE_TEXT or ABSENT in (a, b)):
             yield (
