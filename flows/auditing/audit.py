@@ -5,8 +5,8 @@ import secrets
 from collections.abc import Sequence
 from typing import Any
 
-from flows.auditing.audit_facts import collect_facts, tell_time
-from flows.auditing.audit_report import format_text, tell_verdict, write_audit_page
+from flows.auditing.audit_facts import collect_facts, list_unchecked, name_other_writers, tell_time
+from flows.auditing.audit_report import format_text, tell_unchecked, tell_verdict, write_audit_page
 from flows.auditing.contradictions import find_contradictions
 from flows.auditing.remaking import remake_and_compare
 from flows.auditing.signing import signature_findings
@@ -42,7 +42,7 @@ def audit_dataset(
     workers: int | None = None,
     scheduler: str | None = None,
 ) -> dict[str, Any]:
-    """Verify every recorded hash, compare the records with each other, and a share of the clips with those made again.
+    """Verify every hash, hold all that any reader meets against the records, and a share of the clips against new ones.
 
     Parameters
     ----------
@@ -55,14 +55,15 @@ def audit_dataset(
 
     Returns
     -------
-    The audit: ``verdict``, a sentence; ``verified`` (all well); what `flows.auditing.audit_facts.collect_facts` says of
-    dataset, tools and machine; ``files``, ``intact``, ``damaged[]`` and ``unrecorded[]`` as of
-    `flows.auditing.verify.compare_files`; ``signed``, ``signature``, ``signers``, ``key_id`` and ``key_sha256`` as of
-    `flows.auditing.signing.signature_findings`; ``contradictions[]`` of records as of
-    `flows.auditing.contradictions.find_contradictions`; ``share`` and ``seed`` of the draw; ``rerun[]``, ids of the
-    clips made again, and ``remade[]``, the same with label and outcome; ``compared``, how many tables and arrays of
-    them; ``mismatches[]``, each with where it differs first and the inputs that can be ``why``; ``differences[]`` of
-    inputs and tools between what made the dataset and what is here; ``not_remade[]``, why no clip could be made again;
+    The audit: ``not_checked`` and ``verdict``, a sentence each; ``verified`` (all well); what
+    `flows.auditing.audit_facts.collect_facts` says of dataset, tools and machine; ``files``, ``intact``, ``damaged[]``
+    and ``unrecorded[]`` as of `flows.auditing.verify.compare_files`; ``signed``, ``signature``, ``signers``, ``key_id``
+    and ``key_sha256`` as of `flows.auditing.signing.signature_findings`; ``contradictions[]`` as of
+    `flows.auditing.contradictions.find_contradictions`; ``unchecked[]``, what was left out and why, as of
+    `flows.auditing.audit_facts.list_unchecked`; ``share`` and ``seed`` of the draw; ``rerun[]``, ids of the clips made
+    again, and ``remade[]``, the same with label and outcome; ``compared``, how many tables and arrays of them;
+    ``mismatches[]``, each with where it differs first and the inputs that can be ``why``; ``differences[]`` of inputs
+    and tools between what made the dataset and what is here; ``not_remade[]``, why no clip could be made again;
     ``started_utc``, ``ended_utc``.
 
     Raises
@@ -87,7 +88,13 @@ def audit_dataset(
         compared = run_as_stage(compare_files)(layout)
         facts = collect_facts(layout, manifest)
         damaged = {row["path"] for row in compared["damaged"]}
-        contradictions = run_as_stage(find_contradictions)(layout, manifest, damaged)
+        contradictions, others = (
+            ([], [])
+            if "manifest.json" in damaged
+            else run_as_stage(find_contradictions)(
+                layout, manifest, damaged, not name_other_writers(manifest)
+            )
+        )
         chosen = draw_clips(manifest, share, seed)
         try:
             changes = input_changes(layout, manifest)
@@ -98,6 +105,7 @@ def audit_dataset(
                 )
         except (InputError, ClipsFailed) as error:
             chosen, not_remade = [], explain_failure(error)
+    unchecked = list_unchecked(manifest, len(chosen), compared, others)
     differing = {row["clip_id"] for row in mismatches}
     result = {
         "verified": compared["verified"]
@@ -107,6 +115,7 @@ def audit_dataset(
         **{name: found for name, found in compared.items() if name != "verified"},
         **signature,
         "contradictions": contradictions,
+        "unchecked": unchecked,
         "share": share,
         "seed": seed,
         "runner": runner,
@@ -123,7 +132,7 @@ def audit_dataset(
         "started_utc": started,
         "ended_utc": tell_time(),
     }
-    result = {"verdict": tell_verdict(result), **result}
+    result = {"not_checked": tell_unchecked(unchecked), "verdict": tell_verdict(result), **result}
     results.write_json("audit.json", result)
     results.write("audit.txt", format_text(result))
     results.write("audit.html", write_audit_page(result))

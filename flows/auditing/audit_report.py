@@ -1,6 +1,6 @@
 """The report of an audit: its sentence, its lines for people, and a page that can be filed by itself."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +38,35 @@ def tell_verdict(result: Mapping[str, Any]) -> str:
     return f"{word}: {'; '.join(clauses)}."
 
 
+def tell_unchecked(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return in one sentence what an audit did not check, each with its count.
+
+    Parameters
+    ----------
+    rows : of `flows.auditing.audit_facts.list_unchecked`
+    """
+    told = (f"{row['what']} of {row['count']} of {row['of']} {row['unit']} ({row['why']})" for row in rows)
+    return f"Not checked: {'; '.join(told) or 'nothing'}."
+
+
+def list_remedies(result: Mapping[str, Any]) -> list[str]:
+    """Return what to do about what an audit found, a sentence for each kind.
+
+    Parameters
+    ----------
+    result : of `audit_dataset`
+    """
+    damage = {row["damage"] for row in result["damaged"]}
+    is_forged = result["contradictions"] or result["mismatches"]
+    remedies = {
+        "remove each file that nobody recorded, or move it out of the folder": "not recorded" in damage,
+        "musync repair makes damaged and missing files again": bool(damage - {"not recorded"}),
+        "trust no file or record named here: take the dataset from its maker again, and a signature with it, or make it"
+        " again with musync generate and compare the two with musync diff": bool(is_forged),
+    }
+    return [sentence for sentence, is_due in remedies.items() if is_due]
+
+
 def format_text(result: Mapping[str, Any]) -> str:
     """The audit in lines for people.
 
@@ -47,6 +76,7 @@ def format_text(result: Mapping[str, Any]) -> str:
     """
     version, machine = result["tools_here"]["code"]["version"], result["machine"]["name"]
     lines = [
+        result["not_checked"],
         result["verdict"],
         f"{result['dataset']}, run {result['run_id']}, seal {result['seal']}",
         f"audited {result['ended_utc']} by musync {version} on {machine}",
@@ -69,6 +99,7 @@ def format_text(result: Mapping[str, Any]) -> str:
         "inputs and tools that differ:" if result["differences"] else "no recorded input or tool differs"
     )
     lines += [f"  {difference}" for difference in result["differences"]]
+    lines += [f"what to do: {sentence}" for sentence in list_remedies(result)]
     lines.append("verified" if result["verified"] else "not verified")
     return "\n".join(lines) + "\n"
 
@@ -100,6 +131,7 @@ def write_audit_page(result: Mapping[str, Any]) -> str:
     return pages.get_template("audit.html").render(
         result=result,
         tools=compare_tools(result["tools_recorded"], result["tools_here"]),
+        remedies=list_remedies(result),
         places=[describe_place(row) for row in result["mismatches"]],
         style=style,
         policy=make_policy(style=style),

@@ -1,4 +1,4 @@
-"""Does a manifest agree with its plan, its ids, and the tables that follow from its records? No clip is made again."""
+"""Does all that a dataset says of itself agree, for every reader? No clip is made again."""
 
 from collections.abc import Collection, Iterator, Mapping
 from itertools import chain
@@ -8,13 +8,18 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from catalogs.documents import parse_json
 from catalogs.sentences import shorten
+from flows.auditing.grid_again import find_grid_contradictions
+from flows.auditing.stored_frames import compare_frame_metadata, compare_sheet
+from flows.auditing.stored_tables import compare_tables
 from flows.making.gathering import table_parts
 from flows.making.identity import identify_clip, identify_run, list_deciding
 from flows.making.plan import Plan
+from flows.making.seal import SHEET
 from flows.making.summaries import PAIRS, SUMMARIES, summarise_clips
 from flows.store.arrays import arrays_of
-from flows.store.layout import STAGED_TABLES, Layout
+from flows.store.layout import STAGED_TABLES, Layout, encode_json
 from flows.store.links import require_file
 from flows.store.parquet_files import refuse_footer
 from flows.store.sealed import read_plan_record
@@ -26,35 +31,95 @@ from manifests.records import ClipRecord, Manifest
 from tasks.conventions import ESSENTIAL
 from tasks.errors import InputError
 
+GRID = "inputs/grid.json"
 SHOWN = 8
 """Sentences about one kind of contradiction."""
 
 
-def find_contradictions(layout: Layout, manifest: Manifest, damaged: Collection[str]) -> list[str]:
-    """Return a sentence for each record of a dataset that another record does not agree with.
+def find_contradictions(
+    layout: Layout, manifest: Manifest, damaged: Collection[str], is_same_writer: bool
+) -> tuple[list[str], list[str]]:
+    """Hold every record of a dataset, and every file that follows from them, against the others.
 
-    Whoever changes a record and its hash must change all that follows from it: the plan says the same of each clip, the
-    ids are hashes of what decides the bytes, the files are those of the plan, and the tables of clips and pairs repeat
-    the records of the clips.
+    Whoever changes a record and its hash must change all that follows from it: the plan follows from the grid, the ids
+    are hashes of what decides the bytes, the files are those of the plan, the tables of clips and pairs repeat the
+    records of the clips, and every file but the pictures has the bytes that our writer makes of its values.
 
     Parameters
     ----------
     layout, manifest : of a sealed dataset
     damaged : paths that are known not to be as recorded, and so are not read
+    is_same_writer : whether code and libraries are those that wrote the dataset: then every byte counts
+
+    Returns
+    -------
+    A sentence for each contradiction, and the paths of files in whose values there is none but whose bytes another
+    writer made otherwise, so that the bytes are not compared.
     """
     plan = Plan.of(manifest, layout.manifest)
     found = [
         [] if "plan.json" in damaged else list(_compare_plan(layout, manifest)),
+        find_grid_contradictions(plan, is_same_writer),
         list(_compare_ids(manifest, plan)),
         list(_compare_files(layout, manifest, plan)),
         list(_compare_parts(layout, plan, damaged)),
         list(_compare_summaries(layout, manifest, plan, damaged)),
     ]
-    return [
+    told = {sentence.partition(": ")[0] for kind in found for sentence in kind}
+    known, others = {*damaged, *told}, []
+    for path, lies in chain(
+        _compare_json(layout, manifest, plan, known),
+        compare_tables(layout, manifest, plan, known, is_same_writer),
+        compare_frame_metadata(layout, plan, known, is_same_writer),
+        compare_sheet(layout, manifest, plan, known),
+    ):
+        if lies or is_same_writer:
+            found.append(
+                lies or [f"{path}: must have the bytes that muSync makes of what it shows; it has others"]
+            )
+        else:
+            others.append(path)
+    sentences = [
         sentence
         for kind in found
         for sentence in [*kind[:SHOWN], *([f"and {len(kind) - SHOWN} more"] if len(kind) > SHOWN else [])]
     ]
+    return sentences, others
+
+
+def list_remade(plan: Plan) -> list[str]:
+    """Return the paths of the files that `find_contradictions` holds against what our writer makes."""
+    names = arrays_of(plan.settings.labels) if plan.settings.pictures else {}
+    return [
+        "plan.json",
+        GRID,
+        *SUMMARIES,
+        *chain.from_iterable(table_parts(plan, table) for table in STAGED_TABLES),
+        *(f"frames.zarr/{name}zarr.json" for name in (names and ["", *(f"{name}/" for name in names)])),
+        *([SHEET] if plan.settings.pictures else []),
+    ]
+
+
+def _compare_json(
+    layout: Layout, manifest: Manifest, plan: Plan, damaged: Collection[str]
+) -> Iterator[tuple[str, list[str]]]:
+    settings = encode_json(plan.settings.model_dump(mode="json"))
+    for path, wanted in (("plan.json", b"".join(plan.file_pieces())), (GRID, settings)):
+        if path in damaged or not (layout.root / path).is_file():
+            continue
+        try:
+            content = require_file(layout.root / path).read_bytes()
+            if content != wanted:
+                found = parse_json(content, path, "record") if path == GRID else manifest["grid"]
+                yield (
+                    path,
+                    [
+                        f"{path}: {place} must be {format_value(a)}, as in manifest.json; it is {format_value(b)}"
+                        for place, a, b in find_value_differences(manifest["grid"], found)
+                    ],
+                )
+        except InputError as error:
+            yield path, list(error.problems)
 
 
 def _compare_plan(layout: Layout, manifest: Manifest) -> Iterator[str]:
@@ -89,21 +154,44 @@ def _compare_ids(manifest: Manifest, plan: Plan) -> Iterator[str]:
 
 
 def _compare_files(layout: Layout, manifest: Manifest, plan: Plan) -> Iterator[str]:
-    """Yield the files of data that are recorded and not planned, or planned and not recorded."""
+    """Yield the files that are recorded and not planned, or planned and not recorded, or recorded of another clip."""
     arrays = arrays_of(plan.settings.labels) if plan.settings.pictures else {}
-    planned = {
-        *SUMMARIES,
-        *chain.from_iterable(table_parts(plan, table) for table in STAGED_TABLES),
-        *(layout.relative(layout.frame_shard(name, clip.index)) for name in arrays for clip in plan.clips),
-        *(layout.relative(layout.frames / name / "zarr.json") for name in (arrays and ["", *arrays])),
-    }
-    recorded = {path for path in recorded_files(manifest) if path.startswith(("telemetry/", "frames.zarr/"))}
-    for path in sorted(recorded ^ planned):
+    planned: dict[str, str | None] = dict.fromkeys(
+        [*list_remade(plan), *(f"inputs/{name}" for name in plan.inputs)]
+    )
+    for clip in plan.clips:
+        planned |= {layout.relative(layout.frame_shard(name, clip.index)): clip.clip_id for name in arrays}
+    recorded = {path: clip_id for path, (_, clip_id) in recorded_files(manifest).items()}
+    for path in sorted(recorded.keys() ^ planned.keys()):
         is_recorded = path in recorded
         yield (
             f"manifest.json: {path} is {'recorded, and' if is_recorded else 'not recorded, but'} a file of"
             + (" no clip of the plan" if is_recorded else " its plan")
         )
+    for path in sorted(recorded.keys() & planned.keys()):
+        if recorded[path] != planned[path]:
+            yield (
+                f"manifest.json: {path} must be a file of {_name_owner(planned[path])}; it is recorded as one of"
+                f" {_name_owner(recorded[path])}"
+            )
+    contents = {*STAGED_TABLES, *arrays}
+    for clip in manifest["clips"]:
+        passed, reasons = clip["verdict"]["passed"], clip["verdict"]["reasons"]
+        if (passed is True) == bool(reasons):
+            yield (
+                f"manifest.json: verdict.passed of clip {clip['label']} must say whether its check gave no reasons; it"
+                f" is {passed} with {len(reasons)}"
+            )
+    for clip in manifest["clips"]:
+        for name in sorted(clip["content"].keys() ^ contents):
+            yield (
+                f"manifest.json: content of clip {clip['label']} must be of {', '.join(sorted(contents))};"
+                f" {name} is {'one more' if name in clip['content'] else 'absent'}"
+            )
+
+
+def _name_owner(clip_id: str | None) -> str:
+    return "all clips" if clip_id is None else f"clip {clip_id}"
 
 
 def _compare_parts(layout: Layout, plan: Plan, damaged: Collection[str]) -> Iterator[str]:

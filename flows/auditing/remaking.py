@@ -7,6 +7,7 @@ from typing import Any
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from flows.auditing.audit_facts import name_other_writers
 from flows.making.gathering import table_parts
 from flows.making.generate import create_frame_arrays, fan_out, open_workers
 from flows.making.plan import Plan, read_plan
@@ -18,6 +19,7 @@ from flows.store.links import require_file
 from flows.store.sealed import read_receipt
 from flows.store.staging import scratch_dataset
 from flows.store.telemetry import content_hash, read_columns, table_columns
+from manifests.canonical import sha256_of_file
 from manifests.compare import find_pixel_difference, find_row_difference
 from manifests.explain import find_value_differences
 from manifests.records import Manifest, Receipt
@@ -56,12 +58,18 @@ def remake_and_compare(
             for path, clip_ids in table_parts(plan, table).items()
             for clip_id in clip_ids
         }
-        found = (_compare_clip(layout, remade, plan, parts, clip) for clip in chosen)
+        is_same_writer = not name_other_writers(manifest)
+        found = (_compare_clip(layout, remade, plan, parts, clip, is_same_writer) for clip in chosen)
         return [difference for difference in found if difference is not None]
 
 
 def _compare_clip(
-    layout: Layout, remade: Layout, plan: Plan, parts: Mapping[tuple[str, str], str], clip: Receipt
+    layout: Layout,
+    remade: Layout,
+    plan: Plan,
+    parts: Mapping[tuple[str, str], str],
+    clip: Receipt,
+    is_same_writer: bool,
 ) -> dict[str, Any] | None:
     """Compare a clip as it is stored and recorded with the one made again; one array at a time is in memory.
 
@@ -71,6 +79,7 @@ def _compare_clip(
     plan : of both
     parts : file in the dataset that holds the rows of a clip, by table and clip id
     clip : as the manifest records it
+    is_same_writer : whether code and libraries are those that wrote the dataset, so that files must be equal too
 
     Returns
     -------
@@ -87,7 +96,7 @@ def _compare_clip(
                 columns = _read_as_stored(name, layout.root / parts[name, clip_id], remade, clip_id)
                 digest, stored = content_hash(name, columns[1]), _compare_rows(*columns)
             else:
-                stored = _compare_pixels(layout, remade, index, name, digest)
+                stored = _compare_pixels(layout, remade, index, name, digest, is_same_writer)
         except InputError as error:
             stored = {"channel": name, "problem": error.problems[0]}
         if stored is not None or digest != clip["content"].get(name):
@@ -124,14 +133,22 @@ def _compare_rows(recorded: Columns, remade: Columns) -> dict[str, Any] | None:
 
 
 def _compare_pixels(
-    layout: Layout, remade: Layout, index: int, name: str, digest: str
+    layout: Layout, remade: Layout, index: int, name: str, digest: str, is_same_writer: bool
 ) -> dict[str, Any] | None:
-    """Hold one array of a clip against the hash of the one made again, which is decoded only where they differ."""
-    require_file(layout.frame_shard(name, index))
-    recorded = read_clip(layout.frames, index, name)
-    if buffer_hash(recorded) == digest:
+    """Hold one array of a clip against the one made again; it is decoded only where its file is another."""
+    shard, again = (place.frame_shard(name, index) for place in (layout, remade))
+    if sha256_of_file(require_file(shard)) == sha256_of_file(again):
         return None
-    return find_pixel_difference(name, recorded, read_clip(remade.frames, index, name))
+    recorded = read_clip(layout.frames, index, name)
+    if buffer_hash(recorded) != digest:
+        return find_pixel_difference(name, recorded, read_clip(remade.frames, index, name))
+    if not is_same_writer:
+        return None
+    return {
+        "channel": name,
+        "problem": f"{layout.relative(shard)}: its pixels are those made again and its bytes are not, so that another"
+        " reader can see others",
+    }
 
 
 def _compare_record(name: str, recorded: Any, again: Any) -> dict[str, dict[str, Any]]:

@@ -10,7 +10,7 @@ from flows.making.generate import create_frame_arrays, fan_out, open_workers
 from flows.making.grid_inputs import input_sources
 from flows.making.input_changes import recorded_input
 from flows.making.plan import Plan, read_plan
-from flows.making.seal import preview_sheet
+from flows.making.seal import SHEET, preview_sheet
 from flows.making.summaries import SUMMARIES, summarise_clips
 from flows.running.orchestration import run_as_stage
 from flows.running.runner import RunnerName, check_runner
@@ -20,7 +20,7 @@ from flows.store.lock import sole_writer
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
 from flows.store.staging import left_overs, remove_staged, remove_staging, scratch_dataset
-from flows.store.telemetry import read_table, write_parquet, write_tables
+from flows.store.telemetry import write_tables
 from manifests.canonical import sha256_of_file
 from manifests.explain import as_sentences, find_tool_differences, tools_here
 from manifests.manifest import recorded_files
@@ -150,7 +150,7 @@ def restore_files(
             write_part(scratch, table, path, ids, plan.settings.rows_per_clip[table])
         move_in(scratch, [path for _, path, _ in broken])
         _remake_summaries(layout, scratch, plan, manifest, wanted)
-        move_in(scratch, [*SUMMARIES, "previews/contact_sheet.png"])
+        move_in(scratch, [*SUMMARIES, SHEET])
     return sorted(restored)
 
 
@@ -196,11 +196,7 @@ def _remake_summaries(
     receipts = manifest["clips"]
     for path, tables in summarise_clips(plan, receipts):
         write_tables(tables, scratch.root / path)
-    if "previews/contact_sheet.png" in wanted:
-        for path, ids in table_parts(plan, "frames").items():
-            for clip_id in ids:
-                rows = read_table(layout.root / path, clip_id, most=plan.settings.frames)
-                write_parquet(rows, scratch.staged(clip_id, "frames"))
-        write_atomically(
-            scratch.previews / "contact_sheet.png", preview_sheet(scratch, layout.frames, plan, receipts)
-        )
+    if SHEET in wanted:
+        parts = {clip_id: path for path, ids in table_parts(plan, "frames").items() for clip_id in ids}
+        sheet = preview_sheet(layout, plan, receipts, lambda clip_id: layout.root / parts[clip_id])
+        write_atomically(scratch.root / SHEET, sheet)

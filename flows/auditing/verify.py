@@ -17,7 +17,7 @@ from manifests.manifest import damaged_files, manifest_damage, recorded_files
 from manifests.signing import ENVELOPE
 from tasks.errors import InputError
 
-READ_AS_DATA = ("telemetry/", "frames.zarr/")
+READ_AS_DATA = ("telemetry/", "frames.zarr/", "inputs/")
 """Where a file that nobody recorded would still be read as data."""
 
 

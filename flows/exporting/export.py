@@ -17,7 +17,7 @@ from flows.reading.previews import select_clips
 from flows.reading.suggestions import suggest_names
 from flows.running.progress import progress_bar
 from flows.store.address import is_address, open_for_reading
-from flows.store.layout import PARTIAL, write_json
+from flows.store.layout import PARTIAL, list_abandoned, write_json
 from flows.store.outputs import find_dataset_problems
 from flows.store.sealed import read_manifest, refuse_changed_content
 from manifests.manifest import is_quarantined
@@ -150,6 +150,9 @@ def write_folder(folder: Path) -> Iterator[Path]:
     ----------
     folder : final place, new or empty
     """
+    for left in list_abandoned(folder.absolute().parent, {folder.absolute().name}):
+        if left.is_dir() and not left.is_symlink():
+            shutil.rmtree(left)
     partial = folder.absolute().with_name(f"{folder.absolute().name}.{os.getpid()}{PARTIAL}")
     partial.mkdir(parents=True)
     try:

@@ -95,9 +95,7 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
         "figures": _json_numbers(facts | {
             "stop_time": ride.stop_time,
             "stopping_distance": ride.stopping_distance,
-            "peak_pitch": float(ride.columns["pitch"].max()),
-            **compute_lift_times(ride.columns),
-            **compute_peaks(ride.columns),
+            **collect_motion_figures(ride.columns),
             "lateral_demand": peak_lateral_demand(ride, catalogue.scene.route),
             "static_pitch": ride.static_pitch,
             "calibration_extrapolated": ride.calibration_extrapolated,
@@ -113,6 +111,20 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
         "peak_memory_mib": measure_peak_memory(),
     }
     return receipt | {"cost": cost}
+
+
+def collect_motion_figures(columns: Mapping[str, NDArray[Any]]) -> dict[str, float]:
+    """Return the figures of a clip that follow from the columns of its ticks alone.
+
+    Parameters
+    ----------
+    columns : of the ticks [their units]
+    """
+    return {
+        "peak_pitch": float(columns["pitch"].max()),
+        **compute_lift_times(columns),
+        **compute_peaks(columns),
+    }
 
 
 def warm_up(layout: Layout, scene: str) -> None:

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor
 from contextlib import contextmanager, suppress
 from functools import partial
+from typing import Any
 
 from catalogs.grids import Grid
 from catalogs.scenes import load_scene
@@ -191,8 +192,18 @@ def _refuse_other_plan(layout: Layout, plan: Plan, inputs: Mapping[str, bytes]) 
 
 def create_frame_arrays(layout: Layout, plan: Plan) -> None:
     """Create the empty Zarr arrays of a plan; none where it makes telemetry alone."""
-    if not plan.settings.pictures:
-        return
+    if plan.settings.pictures:
+        create_arrays(layout.frames, **describe_frame_arrays(layout, plan))
+
+
+def describe_frame_arrays(layout: Layout, plan: Plan) -> dict[str, Any]:
+    """Return the arguments of `flows.store.frames.encode_arrays` for a plan with pictures.
+
+    Parameters
+    ----------
+    layout : of the dataset, which keeps its camera
+    plan : of the dataset
+    """
     from catalogs.cameras import load_camera
     from tasks.render.lens import Lens
 
@@ -213,8 +224,12 @@ def create_frame_arrays(layout: Layout, plan: Plan) -> None:
             "motion_blur_s": camera.exposure_s if camera.motion_blur else 0.0,
             "frame_time": "of the middle of the picture, in the middle of its exposure; rows are read downwards",
         }
-    shape = (len(plan.clips), plan.settings.frames, camera.height, camera.width)
-    create_arrays(layout.frames, shape, plan.settings.labels, attributes, plan.settings.compression)
+    return {
+        "shape": (len(plan.clips), plan.settings.frames, camera.height, camera.width),
+        "labels": plan.settings.labels,
+        "attributes": attributes,
+        "compression": plan.settings.compression,
+    }
 
 
 @contextmanager

@@ -263,16 +263,40 @@ def _clip_plans(grid: Grid, deciding: Mapping[str, Any]) -> Iterator[ClipPlan]:
              for seed in seeds]  # fmt: skip
     for index, (label, scenario, (split, calibration), grid_seed) in enumerate(named):
         row = scenario.as_row()
-        # the seed follows the scenario, not its place in the grid, so that a longer grid repeats its clips; and not
-        # the road feature, so that a feature clip and its flat twin share every drop and every patch of snow
-        seen = {name: value for name, value in row.items() if not name.startswith("hazard_")}
-        seed = str(int(sha256_of([f"{grid_seed}/{content_id(seen)}".encode()])[:16], 16))
+        seed = derive_seed(grid_seed, row)
         yield ClipPlan(
             index=index,
             clip_id=identify_clip(deciding, row, seed),
-            label=label if len(seeds) == 1 else f"{label}/seed-{grid_seed}",
+            label=name_clip(label, grid_seed, len(seeds)),
             seed=seed,
             scenario=scenario,
             split=split,
             calibration=calibration,
         )
+
+
+def derive_seed(grid_seed: int, scenario: Mapping[str, Any]) -> str:
+    """Return the visual seed of a clip.
+
+    It follows the scenario, not its place in the grid, so that a longer grid repeats its clips; and not the road
+    feature, so that a feature clip and its flat twin share every drop and every patch of snow.
+
+    Parameters
+    ----------
+    grid_seed : one of the grid's visual seeds [1]
+    scenario : of the clip
+    """
+    seen = {name: value for name, value in scenario.items() if not name.startswith("hazard_")}
+    return str(int(sha256_of([f"{grid_seed}/{content_id(seen)}".encode()])[:16], 16))
+
+
+def name_clip(label: str, grid_seed: int, seeds: int) -> str:
+    """Return the label of a clip.
+
+    Parameters
+    ----------
+    label : of its scenario
+    grid_seed : its visual seed, as the grid counts them [1]
+    seeds : visual seeds of the grid [1]
+    """
+    return label if seeds == 1 else f"{label}/seed-{grid_seed}"

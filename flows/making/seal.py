@@ -1,6 +1,6 @@
 """Sealing: staged clips become the dataset's tables, preview and frozen manifest."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,7 @@ from manifests.provenance import describe_processor, git_commit
 from manifests.records import Receipt
 from tasks.render.contact_sheet import draw_contact_sheet, encode_png
 
+SHEET = "previews/contact_sheet.png"
 PREVIEW_FRAMES = (0, 20, 40, 80)
 PREVIEW_CLIPS = 24
 
@@ -47,10 +48,12 @@ def seal_dataset(layout: Layout, plan: Plan, executor: Executor | None = None) -
     fetch_files(layout, _read_here(layout, plan))
     for path, tables in summarise_clips(plan, _read_receipts(layout, plan.clips)):
         write_tables(tables, layout.root / path)
-    sheet = layout.previews / "contact_sheet.png"
+    sheet = layout.root / SHEET
     if plan.settings.pictures:
         shown = list(_read_receipts(layout, pick_evenly(plan.clips, PREVIEW_CLIPS)))
-        write_atomically(sheet, preview_sheet(layout, layout.frames, plan, shown))
+        write_atomically(
+            sheet, preview_sheet(layout, plan, shown, lambda clip_id: layout.staged(clip_id, "frames"))
+        )
     made = [
         *(layout.root / path for path in SUMMARIES),
         *([sheet] if plan.settings.pictures else []),
@@ -103,13 +106,22 @@ def _read_here(layout: Layout, plan: Plan) -> Iterator[Path]:
         yield layout.frame_shard("rgb", clip.index)
 
 
-def preview_sheet(layout: Layout, pictures_at: Path, plan: Plan, receipts: Sequence[Receipt]) -> bytes:
-    """The contact sheet as PNG, from staged frame tables and the frames at ``pictures_at``."""
+def preview_sheet(
+    layout: Layout, plan: Plan, receipts: Sequence[Receipt], find_table: Callable[[str], Path]
+) -> bytes:
+    """Return the contact sheet as PNG.
+
+    Parameters
+    ----------
+    layout, plan : of the dataset, whose pictures it shows
+    receipts : of its clips
+    find_table : the file with the frame rows of a clip, by its id
+    """
     frames = [frame for frame in PREVIEW_FRAMES if frame < plan.settings.frames]
     rows = []
     for receipt in pick_evenly(receipts, PREVIEW_CLIPS):
-        pictures = list(read_clip(pictures_at, receipt["index"], "rgb", frames))
-        columns = read_columns(layout.staged(receipt["clip_id"], "frames"), most=plan.settings.frames)
+        pictures = list(read_clip(layout.frames, receipt["index"], "rgb", frames))
+        columns = read_columns(find_table(receipt["clip_id"]), receipt["clip_id"], most=plan.settings.frames)
         label = receipt["label"] + (" (quarantined)" if is_quarantined(receipt) else "")
         rows.append((label, pictures, {"speed": columns["speed"], "pitch": columns["pitch"]}))
     return encode_png(draw_contact_sheet(rows, frames, plan.settings.frame_rate_hz))

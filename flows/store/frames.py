@@ -47,6 +47,22 @@ def create_arrays(
     Parameters
     ----------
     path : of the group
+    shape, labels, attributes, compression : as of `encode_arrays`
+    """
+    for name, content in encode_arrays(shape, labels, attributes, compression).items():
+        write_atomically(path / name, content)
+
+
+def encode_arrays(
+    shape: tuple[int, int, int, int],
+    labels: bool,
+    attributes: Mapping[str, Any],
+    compression: Literal["zstd", "lz4"] = "zstd",
+) -> dict[str, bytes]:
+    """Return the files of the group and its arrays while these are empty: their metadata, by path in the group.
+
+    Parameters
+    ----------
     shape : clips, frames, height and width of pictures [1, 1, px, px]
     labels : whether the arrays of labels are wanted too
     attributes : of the group
@@ -83,7 +99,7 @@ def create_arrays(
         # Zarr 3 has no words for copied metadata yet: who does not know them reads each array's own file
         simplefilter("ignore", ZarrUserWarning)
         zarr.consolidate_metadata(group.store)
-    _write_files(path, metadata)
+    return {name: content.to_bytes() for name, content in metadata.items()}
 
 
 def write_clip(path: Path, index: int, buffers: Mapping[str, np.ndarray]) -> None:
@@ -101,7 +117,8 @@ def write_clip(path: Path, index: int, buffers: Mapping[str, np.ndarray]) -> Non
         if len(files) == 1:
             array.with_config({"write_empty_chunks": True})[index] = values
         del files["zarr.json"]
-        _write_files(path / name, files)
+        for file, content in files.items():
+            write_atomically(path / name / file, content.to_bytes())
 
 
 def read_clip(path: Path, index: int, name: str, frames: Sequence[int] | None = None) -> np.ndarray:
@@ -165,11 +182,6 @@ def buffer_hash(buffer: np.ndarray) -> str:
     """SHA-256 of the decoded pixels with their shape and type."""
     values = np.ascontiguousarray(buffer)
     return sha256_of([f"{values.dtype.str} {values.shape}\n".encode(), values.data.cast("B")])
-
-
-def _write_files(folder: Path, files: Mapping[str, Buffer]) -> None:
-    for name, content in files.items():
-        write_atomically(folder / name, content.to_bytes())
 
 
 def _describe_array(array: PixelArray) -> dict[str, Any]:

@@ -2,7 +2,8 @@
 
 import json
 import os
-from collections.abc import Iterable
+import re
+from collections.abc import Container, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from threading import get_native_id
@@ -14,6 +15,7 @@ from flows.store.arrays import arrays_of
 STAGED_TABLES = ("ticks", "frames")
 PARTIAL = ".musync-partial"
 """End of the name of a file that is being written."""
+_HALF = re.compile(rf"(.+)\.(\d+)(?:-\d+)?{re.escape(PARTIAL)}", re.DOTALL)
 RECORD = "file of a muSync dataset"
 """How messages call plan, receipts and manifest."""
 
@@ -122,9 +124,14 @@ def _flush_folder(folder: Path) -> None:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Readable JSON with sorted keys; the same value gives the same bytes."""
+    """Write readable JSON with sorted keys; the same value gives the same bytes."""
+    write_atomically(path, encode_json(value))
+
+
+def encode_json(value: Any) -> bytes:
+    """Return the bytes that `write_json` writes."""
     text = json.dumps(value, indent=1, sort_keys=True, allow_nan=False, ensure_ascii=False)
-    write_atomically(path, (text + "\n").encode())
+    return (text + "\n").encode()
 
 
 def read_json(path: Path) -> Any:
@@ -136,3 +143,25 @@ def read_json(path: Path) -> Any:
         If it is missing, no regular file, or not JSON.
     """
     return read_json_document(path, RECORD)
+
+
+def list_abandoned(folder: Path, names: Container[str]) -> list[Path]:
+    """Return the halves of files and folders that processes of this machine were writing which are no more.
+
+    Parameters
+    ----------
+    folder : in which they lie; it need not exist
+    names : that the whole ones would have
+    """
+    halves = ((path, _HALF.fullmatch(path.name)) for path in (folder.iterdir() if folder.is_dir() else ()))
+    return [path for path, half in halves if half and half[1] in names and not _is_alive(int(half[2]))]
+
+
+def _is_alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        return True
+    return True

@@ -18,7 +18,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from catalogs.documents import parse_json
-from flows.store.layout import PARTIAL, write_atomically, write_json
+from flows.store.layout import PARTIAL, list_abandoned, write_atomically, write_json
 from tasks.errors import InputError
 
 MARKER = ".musync-written"
@@ -71,6 +71,7 @@ class Outputs:
             self._refuse_strangers(self.folder)
             self.folder.mkdir(parents=True, exist_ok=True)
             with self._locked(self.folder):
+                self._remove_abandoned(self.folder)
                 _write_marker(self.folder, read_marker(self.folder) | dict.fromkeys(self.names, self.command))
             self._claimed = True
         return self.folder / name
@@ -121,6 +122,16 @@ class Outputs:
                 for half in place.parent.glob(f"{escape(place.name)}.*{PARTIAL}"):
                     if stat.S_ISREG(half.lstat().st_mode):
                         half.unlink()
+
+    def _remove_abandoned(self, folder: Path) -> None:
+        """Remove what a killed call was writing; the folders above are those that `_refuse_strangers` has looked at."""
+        by_folder: dict[Path, set[str]] = {folder: {MARKER}}
+        for name in self.names:
+            by_folder.setdefault((folder / name).parent, set()).add(PurePosixPath(name).name)
+        for place, names in by_folder.items():
+            for half in list_abandoned(place, names):
+                if stat.S_ISREG(half.lstat().st_mode):
+                    half.unlink()
 
     def _locked(self, folder: Path) -> AbstractContextManager[None]:
         return nullcontext() if self._alone else _lock_folder(folder, wait=True)

@@ -62,7 +62,12 @@ def write_tables(tables: Iterable[pa.Table], path: Path) -> None:
     tables : at least one, of one schema and with common dictionaries
     path : of the file, which is there whole or not at all
     """
-    write_pieces(path, _parquet_pieces(_cut_row_groups(tables)))
+    write_pieces(path, encode_tables(tables))
+
+
+def encode_tables(tables: Iterable[pa.Table]) -> Iterator[bytes]:
+    """Yield the bytes that `write_tables` writes, those of a row group as soon as they are there."""
+    return _parquet_pieces(_cut_row_groups(tables))
 
 
 def _cut_row_groups(tables: Iterable[pa.Table]) -> Iterator[pa.Table]:

@@ -10,10 +10,12 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
+import pyarrow.parquet as pq
 import pytest
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
 
+import manifests.explain
 from flows.auditing.audit import audit_dataset
 from flows.auditing.audit_report import format_text, tell_verdict, write_audit_page
 from flows.auditing.signing import sign_dataset
@@ -21,6 +23,7 @@ from flows.auditing.verify import describe_files, verify_dataset
 from flows.store.layout import Layout
 from manifests.provenance import code_version, library_versions
 from tests.browsers import find_barriers, open_chromium
+from tests.flows.reseal import reseal
 from tests.manifests.test_signing import private_pem, public_pem
 
 
@@ -81,8 +84,40 @@ def test_verify_and_audit_count_the_same_files_and_say_so_positively(audit):
     )  # the envelope
     told = f"all {result['files']} files are those recorded"
     assert told in result["verdict"] and told in verified["verdict"]
-    assert result["verdict"] == format_text(result).splitlines()[0] == tell_verdict(result)
+    assert [result["not_checked"], result["verdict"]] == format_text(result).splitlines()[:2]
+    assert result["verdict"] == tell_verdict(result)
     assert result["verdict"].startswith("Verified: ") and "1 of 4 clips, made again" in result["verdict"]
+
+
+def test_the_first_sentence_counts_what_was_not_checked(audit):
+    result = audit["result"]
+    assert result["not_checked"] == (
+        "Not checked: motion, pictures and pose check of 3 of 4 clips (not made again); records of processor, git and"
+        " environment of 3 of 3 records (no byte follows from them)."
+    )
+    assert [(row["count"], row["of"], row["unit"]) for row in result["unchecked"]] == [
+        (3, 4, "clips"),
+        (3, 3, "records"),
+    ]
+    page = (audit["folder"] / "out" / "audit.html").read_text()
+    body = page[page.index("<body>") :]
+    assert 0 < body.index(result["not_checked"]) < body.index(result["verdict"])
+
+
+def test_another_version_of_the_writer_is_counted_and_not_mistaken_for_a_forger(audit, tmp_path, monkeypatch):
+    copy = Layout(Path(shutil.copytree(audit["layout"].root, tmp_path / "copy")))
+    table = copy.telemetry / "clips.parquet"
+    pq.write_table(pq.read_table(table), table, compression="zstd")
+    reseal(copy)
+    assert not audit_dataset(str(copy.root), share=0.0)["verified"]
+    here = manifests.explain.tools_here()
+    here["made_with"]["libraries"]["pyarrow"] = "9.9"
+    monkeypatch.setattr("flows.auditing.audit_facts.tools_here", lambda: here)
+    result = audit_dataset(str(copy.root), share=0.0)
+    assert result["verified"] and result["contradictions"] == []
+    files = result["files"]
+    told = f"bytes of 1 of {files} files (written by another pyarrow; values are checked)"
+    assert told in result["not_checked"]
 
 
 def test_the_page_has_every_fact_and_loads_and_runs_nothing(audit):

@@ -1,13 +1,18 @@
 """The replay audit: a seed that reaches the motion, or a picture that ignores it, is named."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from catalogs.entries import entry_names
+from catalogs.grids import load_grid
 from flows.making import replay
 from flows.making.clip import render_frames
 from flows.making.driving import simulate_drive
 from tasks.errors import InputError
+from tasks.render.sensor import Sensor
 from tests.toy_street import write_toy_grid
 
 
@@ -49,3 +54,25 @@ def test_snow_that_ignores_the_seed_is_named(grid, monkeypatch):
 def test_one_seed_is_no_audit(grid):
     with pytest.raises(InputError, match="seeds and frames must be at least 2"):
         replay.replay_audit(grid, seeds=1)
+
+
+@pytest.mark.parametrize("name", entry_names("grid"))
+def test_each_scenario_of_a_grid_that_ships_is_held_against_itself_whatever_seeds_the_grid_has(
+    name, monkeypatch
+):
+    def run(clip, plan, catalogue, frames):
+        """Motion by the scenario, pictures by what falls and the seed."""
+        asked = [float(value) for value in clip.scenario.as_row().values() if isinstance(value, float)]
+        seen = (clip.label, clip.scenario.weather != "dry" and clip.seed)
+        return replay.Replay(
+            label=clip.label,
+            seed=plan.settings.seed,
+            columns={"asked": np.array(asked)},
+            frames_sha256=str(seen),
+        )
+
+    monkeypatch.setattr(replay, "_run_clip", run)
+    camera = SimpleNamespace(camera=SimpleNamespace(sensor=Sensor()))
+    monkeypatch.setattr(replay, "load_catalogue", lambda *given: camera)
+    result = replay.replay_audit(name, seeds=3)
+    assert result["problems"] == [] and result["runs"] == 3 * len(load_grid(name).scenarios)
