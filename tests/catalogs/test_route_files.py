@@ -1,6 +1,7 @@
 """Routes from camera poses and points, and the scenes imported along them."""
 
 import json
+import struct
 
 import numpy as np
 import pytest
@@ -175,3 +176,148 @@ def test_a_unit_of_its_own_scales_route_and_cloud_alike(tmp_path):
     )
     # the first camera stays camera_height above the road, whatever the unit
     np.testing.assert_allclose((T_world_source @ [0, 0, 0, 1])[2], 1.65, atol=1e-9)
+
+
+def curved_poses() -> np.ndarray:
+    """OpenCV camera poses along a bend, in a frame of no account."""
+    poses = camera_poses()
+    poses[:, :3, :3] = Rotation.from_euler("y", np.linspace(0, 0.5, 20)[:, None]).as_matrix()
+    poses[1:, :3, 3] = np.cumsum(1.2 * poses[:-1, :3, 2], axis=0)
+    return poses
+
+
+def format_rows(rows) -> str:
+    return "\n".join(" ".join(f"{value:.9e}" for value in row) for row in rows)
+
+
+def colmap_numbers(pose):
+    """Quaternion, the scalar first, and place of the world in the camera, as COLMAP writes them."""
+    view = np.linalg.inv(pose)
+    return [*Rotation.from_matrix(view[:3, :3]).as_quat(scalar_first=True), *view[:3, 3]]
+
+
+def write_other_set(path, poses, name) -> None:
+    rows, order = poses.reshape(len(poses), 16), [*range(10, 20), *range(10)]
+    match name:
+        case "matrices.txt":
+            path.write_text(format_rows(rows))
+        case "kitti-360.txt":
+            path.write_text(format_rows(np.column_stack([np.arange(20), rows])))
+        case "indexed.txt":
+            path.write_text(format_rows(np.column_stack([np.arange(20), rows[:, :12]])))
+        case "images.txt":
+            numbers = {i: " ".join(f"{value:.17g}" for value in colmap_numbers(poses[i])) for i in order}
+            points = "10.5 20.25 -1 " * 4 + "30 40 7"
+            lines = [f"{i + 1} {numbers[i]} 1 front {i}.png\n{points if i % 2 else ''}" for i in order]
+            path.write_text("# Image list with two lines of data per image:\n" + "\n".join(lines) + "\n")
+        case "images.bin":
+            content = struct.pack("<Q", 20)
+            for i in order:
+                content += struct.pack("<I7dI", i + 1, *colmap_numbers(poses[i]), 1) + f"{i}.png\0".encode()
+                content += struct.pack("<Q", i) + bytes(24 * i)
+            path.write_bytes(content)
+
+
+@pytest.mark.parametrize("name", ["matrices.txt", "kitti-360.txt", "indexed.txt", "images.txt", "images.bin"])
+def test_poses_of_other_sets_are_those_of_kitti(tmp_path, name):
+    poses = curved_poses()
+    (tmp_path / "kitti.txt").write_text(format_rows(poses[:, :3].reshape(20, 12)))
+    write_other_set(tmp_path / name, poses, name)
+    (kitti, T_kitti), (other, T_other) = (
+        read_route(tmp_path / file, 1.65, 2.0) for file in ("kitti.txt", name)
+    )
+    np.testing.assert_allclose(other.T_world_rig, kitti.T_world_rig, atol=1e-6)
+    np.testing.assert_allclose(T_other, T_kitti, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "sentence"),
+    [
+        ("r.txt", "1 " * 18 + "\n", "the first has 18: leave out other columns"),
+        ("r.txt", "1 0 0 0 0 1 0 0 0 0 1 0 0 0 3 1\n", "column by column: transpose it"),
+        ("r.txt", "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 2\n", "must end in the row 0 0 0 1"),
+        ("images.txt", "1 1 0 0 0 0 0 x 1 a.png\n", "line 1 must hold"),
+        ("images.bin", "\2" + "\0" * 7, "images.bin, whole"),
+        ("r.json", '{"frames": [{"transform_matrix": [[1]]}], "applied_scale": -1}', "applied_scale"),
+        (
+            "r.csv",
+            "x,y,z\n" + "\n".join(f"{i % 20},{i // 20},0" for i in range(40)),
+            "lead ahead all the way",
+        ),
+        (
+            "r.csv",
+            "x,y,z,qw,qx,qy,qz\n" + "\n".join(f"{i},0,0,0,0,0,1" for i in range(20)),
+            "look along the way",
+        ),
+    ],
+)
+def test_other_faults_of_poses_are_one_sentence_too(tmp_path, name, content, sentence):
+    (tmp_path / name).write_text(content)
+    with pytest.raises(InputError, match=sentence):
+        read_route(tmp_path / name, 1.5)
+
+
+def test_the_cameras_of_a_rig_in_one_file_are_told(tmp_path):
+    front = camera_poses()
+    front[:, :3, :3] = front[:, :3, :3] @ np.diag([1, -1, -1])
+    rear = front @ np.diag([-1.0, 1, -1, 1])
+    frames = [
+        {"file_path": f"{name}/{i:04d}.png", "transform_matrix": pose.tolist()}
+        for name, poses in (("front", front), ("rear", rear))
+        for i, pose in enumerate(poses)
+    ]
+    (tmp_path / "transforms.json").write_text(json.dumps({"frames": frames}))
+    with pytest.raises(
+        InputError, match=r"pose 20 lies 22\.8 m behind pose 19: keep the poses of one camera"
+    ):
+        read_route(tmp_path / "transforms.json", 1.5)
+
+
+def test_a_stated_form_of_poses_is_taken(tmp_path):
+    (tmp_path / "gl.txt").write_text(
+        format_rows((curved_poses() @ np.diag([1.0, -1, -1, 1]))[:, :3].reshape(20, 12))
+    )
+    (tmp_path / "cv.txt").write_text(format_rows(curved_poses()[:, :3].reshape(20, 12)))
+    with pytest.raises(InputError, match="give --poses opengl"):
+        read_route(tmp_path / "gl.txt", 1.65)
+    route, _ = read_route(tmp_path / "gl.txt", 1.65, poses="opengl")
+    plain, _ = read_route(tmp_path / "cv.txt", 1.65)
+    np.testing.assert_allclose(route.T_world_rig, plain.T_world_rig, atol=1e-6)
+    with pytest.raises(InputError, match="poses must be one of opencv"):
+        read_route(tmp_path / "gl.txt", 1.65, poses="blender")
+    with pytest.raises(InputError, match="scalar-first is asked for"):
+        read_route(tmp_path / "gl.txt", 1.65, poses="scalar-first")
+
+
+def test_the_frame_that_nerfstudio_trains_in_leads_back_to_that_of_its_poses(tmp_path):
+    """Forwards as nerfstudio goes: applied_transform, applied_scale, then its own turn, shift and scale."""
+    write_nerfstudio(tmp_path / "transforms.json")
+    content = json.loads((tmp_path / "transforms.json").read_text())
+    applied = np.array([[1.0, 0, 0, 0.3], [0, 0, 1, -2], [0, -1, 0, 0.1]])
+    content |= {"applied_transform": applied.tolist(), "applied_scale": 0.5}
+    (tmp_path / "transforms.json").write_text(json.dumps(content))
+    own = np.eye(4)
+    own[:3, :3], own[:3, 3] = Rotation.from_euler("xyz", [0.3, -1, 2]).as_matrix(), (4, 5, -6)
+    parser = {
+        "transform": (own @ np.vstack([applied, [0, 0, 0, 1]]))[:3].tolist(),
+        "scale": 0.08 * 0.5,
+    }
+    (tmp_path / "dataparser_transforms.json").write_text(json.dumps(parser))
+    _, T_world_source = read_route(tmp_path / "transforms.json", 1.65)
+    _, T_world_cloud = read_route(
+        tmp_path / "transforms.json", 1.65, dataparser=tmp_path / "dataparser_transforms.json"
+    )
+    point = np.array([0.7, 1.1, 9.0, 1.0])
+    trained = 0.08 * (own @ point)[:3]
+    np.testing.assert_allclose(T_world_cloud @ [*trained, 1], T_world_source @ point, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "content", ["{}", "[]", '{"transform": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 2, 0]], "scale": 0}']
+)
+def test_a_faulty_dataparser_is_told_with_all_its_faults(tmp_path, content):
+    write_nerfstudio(tmp_path / "transforms.json")
+    (tmp_path / "d.json").write_text(content)
+    with pytest.raises(InputError) as caught:
+        read_route(tmp_path / "transforms.json", 1.65, dataparser=tmp_path / "d.json")
+    assert ["transform" in caught.value.problems[0], "scale" in caught.value.problems[1]] == [True, True]
