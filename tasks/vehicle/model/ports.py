@@ -115,8 +115,12 @@ def compute_ports(
     if standing:
         pull = wheels.mass * chassis.climb / (body.static_f + body.static_r)
         front, rear = (
-            compute_standing_axle(ground_f, strut_f, wheels, body.static_f * pull),
-            compute_standing_axle(ground_r, strut_r, wheels, body.static_r * pull),
+            compute_standing_axle(
+                ground_f, strut_f, memory.front, wheels, body.static_f * pull, effects, tyre
+            ),
+            compute_standing_axle(
+                ground_r, strut_r, memory.rear, wheels, body.static_r * pull, effects, tyre
+            ),
         )
     else:
         gain_f, gain_r = compute_brake_gains(instant.pressure, chassis)
