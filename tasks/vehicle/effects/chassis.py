@@ -98,18 +98,6 @@ def compute_stick_friction(tyre: Tyre, effects: EffectValues) -> float:
 
 
 @register_jitable(cache=True, error_model="numpy", forceinline=True)
-def compute_stick_direction(slip: float) -> float:
-    """Return the share of a sticking tyre's friction that a braking slip asks for [1].
-
-    Parameters
-    ----------
-    slip : braking slip, 0 or more [1]
-    """
-    u = slip / STICK_SLIP
-    return u / sqrt(1.0 + u * u)
-
-
-@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_effective_friction(
     slip: float, load: float, share: float, tyre: Tyre, effects: EffectValues, wound: float = 0.0
 ) -> float:
@@ -122,7 +110,7 @@ def compute_effective_friction(
     share : share of the tyre that sticks [1]
     tyre : the tyre on the surface
     effects : numbers of the vehicle's effects
-    wound : side force of the sticking tyre over its friction, before braking takes its part [1]
+    wound : lateral force of the sticking tyre over its friction, before braking takes its part [1]
     """
     rolling = compute_rolling_friction(slip, load, tyre, effects)
     if share == 0.0:
@@ -147,7 +135,7 @@ def compute_effective_slope(
     share : share of the tyre that sticks [1]
     tyre : the tyre on the surface
     effects : numbers of the vehicle's effects
-    wound : side force of the sticking tyre over its friction, before braking takes its part [1]
+    wound : lateral force of the sticking tyre over its friction, before braking takes its part [1]
     """
     rolling = compute_rolling_slope(slip, load, tyre, effects)
     if share == 0.0:

@@ -14,13 +14,7 @@ from tasks.vehicle.effects.chassis import (
     compute_stick_share,
 )
 from tasks.vehicle.effects.equations import compute_friction_factor
-from tasks.vehicle.effects.side_force import (
-    compute_deflection_rate,
-    compute_rolling_side_force,
-    compute_side_motion,
-    compute_sticking_side_force,
-    compute_wound_share,
-)
+from tasks.vehicle.effects.lateral_force import NO_HOLD, LateralHold, compute_lateral_hold
 from tasks.vehicle.effects.slots import PortSums
 from tasks.vehicle.effects.table import EffectValues
 from tasks.vehicle.model.chassis import Chassis
@@ -49,8 +43,7 @@ class AxlePorts(NamedTuple):
     suspension_force : force of spring, damper and links [N]
     lever : lever of the tyre force about the wheel centre [m]
     ground_moment : moment of the contact load, against the wheel's rotation [N m]
-    wound : side force of the sticking tyre over its friction, before braking takes its part [1]
-    side_rate : rate of the tyres' sideways deflection [m/s]
+    hold : hold of the tyres on the road, sideways
     """
 
     ground: Ground
@@ -64,8 +57,7 @@ class AxlePorts(NamedTuple):
     suspension_force: float
     lever: float
     ground_moment: float
-    wound: float = 0.0
-    side_rate: float = 0.0
+    hold: LateralHold = NO_HOLD
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
@@ -94,7 +86,7 @@ def compute_signed_friction(
     share : share of the tyre that sticks [1]
     tyre : the tyre on the surface
     effects : numbers of the vehicle's effects
-    wound : side force of the sticking tyre over its friction, before braking takes its part [1]
+    wound : lateral force of the sticking tyre over its friction, before braking takes its part [1]
     """
     friction = compute_effective_friction(abs(slip), load, share, tyre, effects, wound)
     return friction if slip >= 0.0 else -friction
@@ -188,19 +180,14 @@ def compute_rolling_axle(
     pressure *= max(1.0 + forms.brake_torque, 0.0)
     sticking = compute_stick_share(speed, effects)
     limit = compute_stick_friction(tyre, effects) * grip * ground.load
-    wound = compute_wound_share(memory.side, limit, effects)
-    tyre_force = (
-        compute_signed_friction(force_slip, ground.load, sticking, tyre, effects, wound) * grip * ground.load
+    hold = compute_lateral_hold(
+        memory.lateral, force_slip, strut.travel, strut.rate, speed, limit, sticking, effects
     )
-    side = compute_side_motion(strut.travel, strut.rate, speed, effects)
-    links, side_rate = 0.0, 0.0
-    if side.incline != 0.0:
-        angle = side.speed / max(speed, wheels.speed_floor)
-        side_force = 0.0 * (1.0 - sticking) * grip * compute_rolling_side_force(
-            force_slip, angle, ground.load, tyre, effects
-        ) + sticking * compute_sticking_side_force(force_slip, wound, limit)
-        links = side_force * side.incline
-        side_rate = compute_deflection_rate(memory.side, side.speed, limit, effects)
+    tyre_force = (
+        compute_signed_friction(force_slip, ground.load, sticking, tyre, effects, hold.wound)
+        * grip
+        * ground.load
+    )
     wanted = (
         compute_abs_command(slip, tyre.target_slip, wheels.release_width)
         if speed >= effects.abs_cutoff
@@ -216,7 +203,7 @@ def compute_rolling_axle(
     ground_moment = ground.load * lever * offset
     return AxlePorts(
         ground, slip, force_slip, tyre_force, abs_scale, gain * pressure, brake_torque, shaft_torque * turning,
-        strut.force + links, lever, ground_moment, wound, side_rate,
+        strut.force, lever, ground_moment, hold,
     )  # fmt: skip
 
 
@@ -229,7 +216,7 @@ def compute_standing_axle(
     Parameters
     ----------
     ground, strut : ground under the axle and strut above it
-    memory : sideways deflection of the axle
+    memory : lateral deflection of the axle
     wheels : wheels, brakes and longitudinal values
     pull : part of the weight along the grade that the axle holds, rearward positive [N]
     effects : numbers of the vehicle's effects
@@ -237,12 +224,7 @@ def compute_standing_axle(
     """
     tyre_force = -ground.load * ground.slope - pull
     limit = compute_stick_friction(tyre, effects) * ground.load
-    wound = compute_wound_share(memory.side, limit, effects)
-    side = compute_side_motion(strut.travel, strut.rate, 0.0, effects)
-    links, side_rate = 0.0, 0.0
-    if side.incline != 0.0:
-        links = compute_sticking_side_force(0.0, wound, limit) * side.incline
-        side_rate = compute_deflection_rate(memory.side, side.speed, limit, effects)
+    hold = compute_lateral_hold(memory.lateral, 0.0, strut.travel, strut.rate, 0.0, limit, 1.0, effects)
     return AxlePorts(
         ground,
         0.0,
@@ -252,11 +234,10 @@ def compute_standing_axle(
         0.0,
         wheels.radius * tyre_force,
         0.0,
-        strut.force + links,
+        strut.force,
         wheels.radius,
         0.0,
-        wound,
-        side_rate,
+        hold,
     )
 
 
@@ -272,7 +253,7 @@ def add_link_force(ports: AxlePorts, force: float) -> AxlePorts:
     return AxlePorts(
         ports.ground, ports.slip, ports.force_slip, ports.tyre_force, ports.abs_scale, ports.full_torque,
         ports.brake_torque, ports.shaft_torque, ports.suspension_force + force, ports.lever, ports.ground_moment,
-        ports.wound, ports.side_rate,
+        ports.hold,
     )  # fmt: skip
 
 

@@ -152,8 +152,8 @@ def compute_ports(
     )
     drag += wheels.mass * chassis.climb
     moment = effects.aero_pitch * speed * speed
-    lift_f -= forms_f.suspension_force
-    lift_r += forms_r.suspension_force
+    lift_f -= front.hold.link_force + forms_f.suspension_force
+    lift_r += rear.hold.link_force + forms_r.suspension_force
     drag += forms_f.longitudinal_force
     moment += forms_f.pitch_moment
     front, rear = add_link_force(front, -lift_f), add_link_force(rear, lift_r)

@@ -78,7 +78,7 @@ def compute_axle_slope(
     if abs(ports.slip) < 1.0:
         share = compute_stick_share(motion.speed, chassis.effects)
         load = ports.ground.load
-        force = compute_effective_slope(abs(ports.force_slip), load, share, tyre, chassis.effects, ports.wound) * load
+        force = compute_effective_slope(abs(ports.force_slip), load, share, tyre, chassis.effects, ports.hold.wound) * load
         if share > 0.0 and ports.slip * (ports.slip + slip_per_wheel * change) < 0.0:
             force = max(force, ports.tyre_force / ports.slip)
         width = wheels.release_width * tyre.target_slip
@@ -154,4 +154,4 @@ def _restore_slip(memory: AxleMemory, slope: AxleSlope, speed: float, omega: flo
     if slope.slip_share == 0.0:
         return memory
     slip = slope.slip_share * memory.slip + slope.slip_by_speed * speed + slope.slip_by_wheel * omega
-    return AxleMemory(slip, memory.slip_heat, memory.disc_rise, memory.side)
+    return AxleMemory(slip, memory.slip_heat, memory.disc_rise, memory.lateral)

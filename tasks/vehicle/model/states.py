@@ -27,13 +27,13 @@ class AxleMemory(NamedTuple):
     slip : slip that builds up the force where the tyre has a relaxation length, else 0 [1]
     slip_heat : energy of sliding since the start [J]
     disc_rise : temperature of the discs above ambient [K]
-    side : sideways deflection of the contacts where the tyre has a side stiffness, else 0 [m]
+    lateral : lateral deflection of the tyres where they have a lateral stiffness, else 0 [m]
     """
 
     slip: float
     slip_heat: float
     disc_rise: float
-    side: float = 0.0
+    lateral: float = 0.0
 
 
 class Memory(NamedTuple):
@@ -107,7 +107,7 @@ def pack_state(state: VehicleState) -> tuple[float, ...]:
         state.time, motion.station, motion.speed, motion.omega_f, motion.omega_r, front.slip, front.slip_heat,
         front.disc_rise, rear.slip, rear.slip_heat, rear.disc_rise, x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7],
         state.line, state.scale_f, state.scale_r, state.deceleration, 1.0 if state.standing else 0.0, state.onset,
-        state.onset_station, state.stop, front.side, rear.side,
+        state.onset_station, state.stop, front.lateral, rear.lateral,
     )  # fmt: skip
 
 
@@ -163,15 +163,15 @@ def advance_axle(memory: AxleMemory, rate: AxleMemory, step: float) -> AxleMemor
         memory.slip + step * rate.slip,
         memory.slip_heat + step * rate.slip_heat,
         memory.disc_rise + step * rate.disc_rise,
-        memory.side + step * rate.side,
+        memory.lateral + step * rate.lateral,
     )
 
 
 @register_jitable(cache=True, forceinline=True)
 def clear_slip(memory: Memory) -> Memory:
-    """Return the memory with slip 0, as at rest; tyres and discs stay warm, and the tyres keep their place."""
+    """Return the memory with slip 0, as at rest; tyres and discs stay warm, and tyres keep their deflection."""
     front, rear = memory.front, memory.rear
     return Memory(
-        AxleMemory(0.0, front.slip_heat, front.disc_rise, front.side),
-        AxleMemory(0.0, rear.slip_heat, rear.disc_rise, rear.side),
+        AxleMemory(0.0, front.slip_heat, front.disc_rise, front.lateral),
+        AxleMemory(0.0, rear.slip_heat, rear.disc_rise, rear.lateral),
     )
