@@ -50,6 +50,7 @@ PAGES: dict[str, tuple[str, str, tuple[str, ...]]] = {
             "tasks.vehicle.effects.table",
             "tasks.vehicle.effects.equations",
             "tasks.vehicle.effects.chassis",
+            "tasks.vehicle.effects.lateral_force",
             "tasks.vehicle.effects.brake_line",
             "tasks.vehicle.effects.forms",
             "tasks.vehicle.effects.grown",

@@ -27,6 +27,7 @@ HORNE = "Horne and Dreher (1963), NASA TN D-2056"
 SHOOP = "Shoop et al. (2006), J. Terramechanics 43, doi:10.1016/j.jterra.2005.03.002"
 ZEGELAAR = "Zegelaar (1998), The dynamic response of tyres to brake torque variations and road unevennesses"
 RILL = "Hirschberg, Rill and Weinfurter (2007), Tire model TMeasy, doi:10.1080/00423110701776284"
+DAHL = "Dahl (1968), A solid friction model, Aerospace Corporation TOR-0158(3107-18)-1"
 DECLARED = "declared, from the residuals of the multibody reference"
 
 
@@ -169,6 +170,10 @@ EFFECT_TABLE = (
     _add_number("stick_anti_dive", "sticking tyre", "1", "suspension_force", (-2.0, 2.0), 0.05, DECLARED),
     _add_number("stick_anti_lift", "sticking tyre", "1", "suspension_force", (-2.0, 2.0), 0.05, DECLARED),
     _add_number("scrub_stiffness", "scrub", "1", "suspension_force", (-1.0, 1.0), 0.02, DECLARED),
+    _add_number("track_change", "lateral sticking", "1", "suspension_force", (-0.5, 0.5), 0.02, MITSCHKE),
+    _add_number("track_change_by_travel", "lateral sticking", "m-1", "suspension_force", (-5.0, 5.0), 0.2, MITSCHKE),
+    _add_number("bump_steer", "lateral sticking", "m-1", "suspension_force", (-0.5, 0.5), 0.02, MITSCHKE),
+    _add_number("lateral_stiffness", "lateral sticking", "N m-1", "suspension_force", (0.0, 5e5), 1e4, DAHL),
     _add_number("aero_lift", "air's pitch moment and lift", "N s2 m-2", "suspension_force", (-3.0, 3.0), 0.2,
                 GILLESPIE),
     _add_number("enveloping_length", "footprint", "m", "tyre_load", (0.0, 0.6), 0.02, ZEGELAAR),

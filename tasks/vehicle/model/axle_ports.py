@@ -10,9 +10,11 @@ from tasks.vehicle.effects.brake_line import compute_acting_pressure
 from tasks.vehicle.effects.chassis import (
     compute_effective_friction,
     compute_lateral_reserve,
+    compute_stick_friction,
     compute_stick_share,
 )
 from tasks.vehicle.effects.equations import compute_friction_factor
+from tasks.vehicle.effects.lateral_force import NO_HOLD, LateralHold, compute_lateral_hold
 from tasks.vehicle.effects.slots import PortSums
 from tasks.vehicle.effects.table import EffectValues
 from tasks.vehicle.model.chassis import Chassis
@@ -41,6 +43,7 @@ class AxlePorts(NamedTuple):
     suspension_force : force of spring, damper and links [N]
     lever : lever of the tyre force about the wheel centre [m]
     ground_moment : moment of the contact load, against the wheel's rotation [N m]
+    hold : hold of the tyres on the road, sideways
     """
 
     ground: Ground
@@ -54,6 +57,7 @@ class AxlePorts(NamedTuple):
     suspension_force: float
     lever: float
     ground_moment: float
+    hold: LateralHold = NO_HOLD
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
@@ -71,7 +75,7 @@ def compute_signed_slip(speed: float, rim_speed: float, speed_floor: float) -> f
 
 @register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_signed_friction(
-    slip: float, load: float, share: float, tyre: Tyre, effects: EffectValues
+    slip: float, load: float, share: float, tyre: Tyre, effects: EffectValues, wound: float = 0.0
 ) -> float:
     """Return the friction of the tyre, continued as an odd function to driving slip [1].
 
@@ -82,8 +86,9 @@ def compute_signed_friction(
     share : share of the tyre that sticks [1]
     tyre : the tyre on the surface
     effects : numbers of the vehicle's effects
+    wound : lateral force of the sticking tyre over its friction, before braking takes its part [1]
     """
-    friction = compute_effective_friction(abs(slip), load, share, tyre, effects)
+    friction = compute_effective_friction(abs(slip), load, share, tyre, effects, wound)
     return friction if slip >= 0.0 else -friction
 
 
@@ -174,8 +179,14 @@ def compute_rolling_axle(
     pressure = compute_acting_pressure(instant.pressure, speed, memory.disc_rise, effects)
     pressure *= max(1.0 + forms.brake_torque, 0.0)
     sticking = compute_stick_share(speed, effects)
+    limit = compute_stick_friction(tyre, effects) * grip * ground.load
+    hold = compute_lateral_hold(
+        memory.lateral, force_slip, strut.travel, strut.rate, speed, limit, sticking, effects
+    )
     tyre_force = (
-        compute_signed_friction(force_slip, ground.load, sticking, tyre, effects) * grip * ground.load
+        compute_signed_friction(force_slip, ground.load, sticking, tyre, effects, hold.wound)
+        * grip
+        * ground.load
     )
     wanted = (
         compute_abs_command(slip, tyre.target_slip, wheels.release_width)
@@ -192,21 +203,28 @@ def compute_rolling_axle(
     ground_moment = ground.load * lever * offset
     return AxlePorts(
         ground, slip, force_slip, tyre_force, abs_scale, gain * pressure, brake_torque, shaft_torque * turning,
-        strut.force, lever, ground_moment,
+        strut.force, lever, ground_moment, hold,
     )  # fmt: skip
 
 
 @register_jitable(cache=True, error_model="numpy", forceinline=True)
-def compute_standing_axle(ground: Ground, strut: Strut, wheels: Wheels, pull: float) -> AxlePorts:
+def compute_standing_axle(
+    ground: Ground, strut: Strut, memory: AxleMemory, wheels: Wheels, pull: float, effects: EffectValues, tyre: Tyre
+) -> AxlePorts:
     """Return the ports of an axle at rest: the tyre holds the vehicle on the slope, the brake holds the wheel.
 
     Parameters
     ----------
     ground, strut : ground under the axle and strut above it
+    memory : lateral deflection of the axle
     wheels : wheels, brakes and longitudinal values
     pull : part of the weight along the grade that the axle holds, rearward positive [N]
+    effects : numbers of the vehicle's effects
+    tyre : the tyre on the surface
     """
     tyre_force = -ground.load * ground.slope - pull
+    limit = compute_stick_friction(tyre, effects) * ground.load
+    hold = compute_lateral_hold(memory.lateral, 0.0, strut.travel, strut.rate, 0.0, limit, 1.0, effects)
     return AxlePorts(
         ground,
         0.0,
@@ -219,6 +237,7 @@ def compute_standing_axle(ground: Ground, strut: Strut, wheels: Wheels, pull: fl
         strut.force,
         wheels.radius,
         0.0,
+        hold,
     )
 
 
@@ -234,6 +253,7 @@ def add_link_force(ports: AxlePorts, force: float) -> AxlePorts:
     return AxlePorts(
         ports.ground, ports.slip, ports.force_slip, ports.tyre_force, ports.abs_scale, ports.full_torque,
         ports.brake_torque, ports.shaft_torque, ports.suspension_force + force, ports.lever, ports.ground_moment,
+        ports.hold,
     )  # fmt: skip
 
 

@@ -115,8 +115,12 @@ def compute_ports(
     if standing:
         pull = wheels.mass * instant.climb / (body.static_f + body.static_r)
         front, rear = (
-            compute_standing_axle(ground_f, strut_f, wheels, body.static_f * pull),
-            compute_standing_axle(ground_r, strut_r, wheels, body.static_r * pull),
+            compute_standing_axle(
+                ground_f, strut_f, memory.front, wheels, body.static_f * pull, effects, tyre
+            ),
+            compute_standing_axle(
+                ground_r, strut_r, memory.rear, wheels, body.static_r * pull, effects, tyre
+            ),
         )
     else:
         gain_f, gain_r = compute_brake_gains(instant.pressure, chassis)
@@ -148,8 +152,8 @@ def compute_ports(
     )
     drag += wheels.mass * instant.climb
     moment = effects.aero_pitch * speed * speed
-    lift_f -= forms_f.suspension_force
-    lift_r += forms_r.suspension_force
+    lift_f -= front.hold.link_force + forms_f.suspension_force
+    lift_r += rear.hold.link_force + forms_r.suspension_force
     drag += forms_f.longitudinal_force
     moment += forms_f.pitch_moment
     front, rear = add_link_force(front, -lift_f), add_link_force(rear, lift_r)

@@ -54,8 +54,9 @@ def compute_axle_slope(
 ) -> AxleSlope:
     """Return the derivatives of speed and wheel rate through the slip of one axle.
 
-    What is stiff counts as soon as the wheel can reach it within the step: the pad friction of a locked wheel, and the
-    anti-lock brake, which takes all torque away within a few percent of slip. A wheel that is only met there after a
+    What is stiff counts as soon as the wheel can reach it within the step: the pad friction of a locked wheel, the
+    anti-lock brake, which takes all torque away within a few percent of slip, and the grip of a sticking tyre, whose
+    force changes its sign within some tenths of a percent. A wheel that is only met there after a
     step has swung through it, and swings on; its motion then hangs on rounding.
 
     Parameters
@@ -77,7 +78,9 @@ def compute_axle_slope(
     if abs(ports.slip) < 1.0:
         share = compute_stick_share(motion.speed, chassis.effects)
         load = ports.ground.load
-        force = compute_effective_slope(abs(ports.force_slip), load, share, tyre, chassis.effects) * load
+        force = compute_effective_slope(abs(ports.force_slip), load, share, tyre, chassis.effects, ports.hold.wound) * load
+        if ports.hold.wound != 0.0 and ports.slip * (ports.slip + slip_per_wheel * change) < 0.0:
+            force = max(force, ports.tyre_force / ports.slip)
         width = wheels.release_width * tyre.target_slip
         ahead = ports.slip + slip_per_wheel * change
         enters = (
@@ -151,4 +154,4 @@ def _restore_slip(memory: AxleMemory, slope: AxleSlope, speed: float, omega: flo
     if slope.slip_share == 0.0:
         return memory
     slip = slope.slip_share * memory.slip + slope.slip_by_speed * speed + slope.slip_by_wheel * omega
-    return AxleMemory(slip, memory.slip_heat, memory.disc_rise)
+    return AxleMemory(slip, memory.slip_heat, memory.disc_rise, memory.lateral)

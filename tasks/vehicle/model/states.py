@@ -27,11 +27,13 @@ class AxleMemory(NamedTuple):
     slip : slip that builds up the force where the tyre has a relaxation length, else 0 [1]
     slip_heat : energy of sliding since the start [J]
     disc_rise : temperature of the discs above ambient [K]
+    lateral : lateral deflection of the tyres where they have a lateral stiffness, else 0 [m]
     """
 
     slip: float
     slip_heat: float
     disc_rise: float
+    lateral: float = 0.0
 
 
 class Memory(NamedTuple):
@@ -65,9 +67,9 @@ class Instant(NamedTuple):
     climb: float
 
 
-STATE_WIDTH = 27
+STATE_WIDTH = 29
 """Number of values in a state's row."""
-AT_REST = AxleMemory(0.0, 0.0, 0.0)
+AT_REST = AxleMemory(0.0, 0.0, 0.0, 0.0)
 """No slip, tyres and discs at ambient temperature."""
 
 
@@ -107,7 +109,7 @@ def pack_state(state: VehicleState) -> tuple[float, ...]:
         state.time, motion.station, motion.speed, motion.omega_f, motion.omega_r, front.slip, front.slip_heat,
         front.disc_rise, rear.slip, rear.slip_heat, rear.disc_rise, x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7],
         state.line, state.scale_f, state.scale_r, state.deceleration, 1.0 if state.standing else 0.0, state.onset,
-        state.onset_station, state.stop,
+        state.onset_station, state.stop, front.lateral, rear.lateral,
     )  # fmt: skip
 
 
@@ -121,7 +123,7 @@ def unpack_state(row: NDArray[np.float64]) -> VehicleState:
     """
     v = row
     return VehicleState(
-        v[0], Motion(v[1], v[2], v[3], v[4]), Memory(AxleMemory(v[5], v[6], v[7]), AxleMemory(v[8], v[9], v[10])),
+        v[0], Motion(v[1], v[2], v[3], v[4]), Memory(AxleMemory(v[5], v[6], v[7], v[27]), AxleMemory(v[8], v[9], v[10], v[28])),
         (v[11], v[12], v[13], v[14], v[15], v[16], v[17], v[18]), v[19], v[20], v[21], v[22], bool(v[23]), v[24],
         v[25], v[26],
     )  # fmt: skip
@@ -138,7 +140,7 @@ def make_rolling_state(speed: float, wheel_radius: float, disc_rise: float, onse
     disc_rise : temperature of the discs above ambient [K]
     onset : brake onset; infinite before it is known [s]
     """
-    rolling, cold = speed / wheel_radius, AxleMemory(0.0, 0.0, disc_rise)
+    rolling, cold = speed / wheel_radius, AxleMemory(0.0, 0.0, disc_rise, 0.0)
     return VehicleState(
         0.0, Motion(0.0, speed, rolling, rolling), Memory(cold, cold), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0,
         1.0, 1.0, 0.0, False, onset, inf, inf,
@@ -163,13 +165,15 @@ def advance_axle(memory: AxleMemory, rate: AxleMemory, step: float) -> AxleMemor
         memory.slip + step * rate.slip,
         memory.slip_heat + step * rate.slip_heat,
         memory.disc_rise + step * rate.disc_rise,
+        memory.lateral + step * rate.lateral,
     )
 
 
 @register_jitable(cache=True, forceinline=True)
 def clear_slip(memory: Memory) -> Memory:
-    """Return the memory with slip 0, as at rest; tyres and discs stay warm."""
+    """Return the memory with slip 0, as at rest; tyres and discs stay warm, and tyres keep their deflection."""
     front, rear = memory.front, memory.rear
     return Memory(
-        AxleMemory(0.0, front.slip_heat, front.disc_rise), AxleMemory(0.0, rear.slip_heat, rear.disc_rise)
+        AxleMemory(0.0, front.slip_heat, front.disc_rise, front.lateral),
+        AxleMemory(0.0, rear.slip_heat, rear.disc_rise, rear.lateral),
     )

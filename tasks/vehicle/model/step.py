@@ -38,7 +38,7 @@ def compute_wheel_rate(ports: AxlePorts, axle: Axle) -> float:
 def compute_axle_memory_rate(
     memory: AxleMemory, ports: AxlePorts, speed: float, omega: float, disc_capacity: float, chassis: Chassis
 ) -> AxleMemory:
-    """Return the rates of an axle's slip state, sliding energy and disc temperature.
+    """Return the rates of an axle's slip state, sliding energy, disc temperature and lateral deflection.
 
     Parameters
     ----------
@@ -53,6 +53,7 @@ def compute_axle_memory_rate(
         following * (ports.slip - memory.slip),
         abs(ports.tyre_force * ports.force_slip) * speed,
         compute_disc_temperature_rate(memory.disc_rise, ports.brake_torque * omega, disc_capacity),
+        ports.hold.rate,
     )
 
 
@@ -80,7 +81,7 @@ def compute_motion_rates(motion: Motion, ports: Ports, standing: bool, chassis: 
 
 @register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_memory_rates(memory: Memory, motion: Motion, ports: Ports, chassis: Chassis) -> Memory:
-    """Return the rates of both axles' slip states, sliding energies and disc temperatures.
+    """Return the rates of both axles' slip states, sliding energies, disc temperatures and lateral deflections.
 
     Parameters
     ----------
