@@ -61,8 +61,14 @@ class Table:
         meanings = {} if channel_map is None else channel_map.meanings_of(name)
         if self.csv is None:
             return Spelling(meanings=meanings)
-        missing = {str(word): None for word in self.csv.missing}
-        return Spelling(meanings=missing | meanings, decimal=self.csv.decimal, thousands=self.csv.thousands)
+        return Spelling(
+            meanings=self.missing | meanings, decimal=self.csv.decimal, thousands=self.csv.thousands
+        )
+
+    @property
+    def missing(self) -> dict[str, float | None]:
+        """What stands for no value in every column but the clock's."""
+        return {} if self.csv is None else {str(word): None for word in self.csv.missing}
 
 
 Open = Callable[[Path, CsvEntry], Table]
@@ -154,7 +160,7 @@ def _convert_columns(
             columns[name], notes[name] = np.full(rows, np.nan), column
             continue
         values, note = convert_values(column, spelling)
-        columns[name] = replace_numbers(values, spelling.meanings)
+        columns[name] = replace_numbers(values, table.missing)
         if note:
             notes[name] = note
     return columns, notes

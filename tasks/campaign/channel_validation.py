@@ -1,12 +1,13 @@
 """Validation of measured channels, imported or of a campaign: rules on arrays, problems in sentences."""
 
 from collections.abc import Mapping
+from math import log
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.brake_validation import MOVING, find_brake_problems
-from tasks.campaign.channels import CHANNELS_BY_NAME, UNITS, guess_unit
+from tasks.campaign.channels import CHANNELS_BY_NAME, SPEED_UNITS, UNITS, guess_unit
 from tasks.campaign.signals import Signal
 from tasks.campaign.time_of_day import TIME_OF_DAY, looks_like_time_of_day
 from tasks.campaign.torque_validation import find_torque_problems
@@ -17,6 +18,8 @@ DIGITS_OF_DAY = (
     f" give unit: {TIME_OF_DAY} under time in the map"
 )
 """Problem of a time of day that is taken for seconds."""
+FEW = 0.05
+"""Share of samples beyond what a road car does up to which they are faults of their own, and not of the unit [1]."""
 GAP_STEPS = 5.0
 """A step between samples longer than this many median steps is a gap."""
 FROZEN_SECONDS = 0.5
@@ -26,6 +29,8 @@ SHORT_FREEZE_SECONDS = 0.25
 """This long suffices for a sensor that hardly holds values: it must be as many times longer than 95 % of the holds."""
 ROUNDING_STEP = 1e-6
 """Share of the largest value below which a step is rounding of a resampled value, and no step of the sensor [1]."""
+SAME_UNIT = 1.12
+"""Ratio within which an acceleration and the rate of a speed agree in a unit [1]: gain of the one and dive of the car."""
 SMOOTHING = 0.2
 """Width of the mean over which two channels are compared [s]."""
 DIVE_PER_DECELERATION = (0.02, 2.0)
@@ -89,6 +94,28 @@ def _say_what_to_do(back: NDArray[np.float64]) -> str:
     if np.any(back < 0):
         return "cut the run there"
     return "give repeats: keep_first under time in the map if the logger stamps samples twice, else cut the run there"
+
+
+def find_outliers(name: str, logged: Signal, converted: Signal) -> list[str]:
+    """Return the problem of a few samples beyond what a road car does, as a logger's number for no value is.
+
+    Parameters
+    ----------
+    name : channel
+    logged : as the logger wrote it
+    converted : the same in the channel's unit
+    """
+    channel = CHANNELS_BY_NAME[name]
+    beyond = (converted.values > channel.limit) | (converted.values < min(channel.lowest, -channel.limit))
+    beyond &= np.isfinite(converted.values)
+    if not 0 < np.count_nonzero(beyond) <= FEW * len(beyond):
+        return []
+    at = int(np.argmax(beyond))
+    return [
+        f"has {np.count_nonzero(beyond)} samples beyond what a road car does (limit {channel.limit:g} {channel.unit}), the"
+        f" first at {logged.time[at]:.3f} s of {logged.values[at]:.10g}: cut the run there; where the logger writes it for no"
+        f' value, give values: {{"{logged.values[at]:.10g}": null}} of the channel'
+    ]
 
 
 def find_frozen_problem(name: str, signal: Signal, speed: Signal | None) -> str | None:
@@ -183,9 +210,9 @@ def find_plausibility_problems(
         rate = np.gradient(smooth["speed"], interval)
         if "longitudinal_acceleration" in smooth:
             felt = smooth["longitudinal_acceleration"]
-            unit = units["longitudinal_acceleration"]
+            taken = units["longitudinal_acceleration"], units.get("speed", "m/s")
             problems += _find_pair_problems(
-                "longitudinal_acceleration", felt, "the rate of speed", rate, 0.8, unit
+                "longitudinal_acceleration", felt, "the rate of speed", rate, 0.8, *taken
             ) or _find_axis_problems(felt, rate)
         if "pitch" in smooth:
             problems += _find_pitch_problems(smooth, rate, interval)
@@ -227,8 +254,12 @@ def _find_pair_problems(
     other: NDArray[np.float64],
     correlation: float,
     mapped_unit: str | None,
+    speed_unit: str | None = None,
 ) -> list[str]:
-    """Check the sign of one channel by another, and its size where both must be equal, so that a unit is given."""
+    """Check the sign of one channel by another, and its size where both must be equal, so that a unit is given.
+
+    Where the other is the rate of a speed, its ratio is held against that of every other unit of the speed.
+    """
     x, y = other - other.mean(), values - values.mean()
     spread = float(np.sqrt((x @ x) * (y @ y)))
     if spread <= 0 or abs(float(x @ y)) < correlation * spread:
@@ -238,13 +269,30 @@ def _find_pair_problems(
         return [
             f"channel {name} runs against {other_name} (correlation {float(x @ y) / spread:.2f}): turn its sign over"
         ]
-    if 0.4 < slope < 2.5 or mapped_unit is None:
+    if mapped_unit is None:
         return []
-    guess = guess_unit(mapped_unit, slope)
+    of_speed = None if speed_unit is None else _guess_speed_unit(speed_unit, slope)
+    if 0.4 < slope < 2.5 and of_speed is None:
+        return []
+    guess = None if of_speed else guess_unit(mapped_unit, slope)
     hint = f"; taken as {mapped_unit}, it looks like {guess}" if guess else ""
+    hint = f"; the speed taken as {speed_unit}, it looks like {of_speed}" if of_speed else hint
     return [
         f"channel {name} is {slope:.3g} times {other_name}: the unit or scale of one of them is wrong{hint}"
     ]
+
+
+def _guess_speed_unit(taken: str, ratio: float) -> str | None:
+    """Return the unit of a speed whose rate an acceleration is ``ratio`` times, where it is nearer to it than to the own.
+
+    Parameters
+    ----------
+    taken : the assumed unit
+    ratio : of the acceleration over the rate of the speed [1]
+    """
+    apart = {unit: abs(log(ratio * UNITS[taken][1] / UNITS[unit][1])) for unit in SPEED_UNITS}
+    near = min(apart, key=apart.__getitem__)
+    return near if near != taken and apart[near] < log(SAME_UNIT) else None
 
 
 def _find_axis_problems(felt: NDArray[np.float64], rate: NDArray[np.float64]) -> list[str]:

@@ -24,6 +24,8 @@ UNITS: dict[str, tuple[str, float]] = {
     "1": ("ratio", 1.0), "%": ("ratio", 1e-2),
 }  # fmt: skip
 """Unit to its dimension and its size in the dimension's SI unit."""
+SPEED_UNITS = ("km/h", "mph", "kn", "m/s")
+"""Units in which loggers write the speed of a car, the most usual first."""
 ALIASES = {
     "kmh": "km/h", "kph": "km/h", "kmph": "km/h", "km/hr": "km/h", "kilometers/hour": "km/h", "mps": "m/s", "m/sec": "m/s",
     "mi/h": "mph", "miles/h": "mph", "miles/hour": "mph", "knot": "kn", "knots": "kn", "kt": "kn", "kts": "kn",

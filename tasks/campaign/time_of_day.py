@@ -17,8 +17,11 @@ def convert_to_seconds(stamps: NDArray[np.float64], unit: str) -> NDArray[np.flo
     Parameters
     ----------
     stamps : float64 [N] [``unit``]
-    unit : of time, or `TIME_OF_DAY`
+    unit : of time, or `TIME_OF_DAY`; days, as of a spreadsheet or MATLAB's datenum, count from the first one's midnight
     """
+    if unit == "d":
+        told = stamps[np.isfinite(stamps)]
+        return (stamps - np.floor(told[0] if told.size else 0.0)) * DAY
     return read_time_of_day(stamps) if unit == TIME_OF_DAY else stamps * unit_factor(unit, "s")
 
 
