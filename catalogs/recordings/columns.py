@@ -57,7 +57,7 @@ def convert_values(column: pd.Series, spelling: Spelling) -> tuple[NDArray[np.fl
     text = _strip_text(column)
     plain = text.str.replace(spelling.thousands, "") if spelling.thousands else text
     plain = plain if spelling.decimal == "." else plain.str.replace(spelling.decimal, ".")
-    values = pd.to_numeric(plain, errors="coerce").to_numpy(np.float64)
+    values = np.array(pd.to_numeric(plain, errors="coerce"), dtype=np.float64)
     low = text.str.lower()
     told = low.isin(NO_VALUE).to_numpy()
     for word, number in spelling.meanings.items():

@@ -29,8 +29,11 @@ SHORT_FREEZE_SECONDS = 0.25
 """This long suffices for a sensor that hardly holds values: it must be as many times longer than 95 % of the holds."""
 ROUNDING_STEP = 1e-6
 """Share of the largest value below which a step is rounding of a resampled value, and no step of the sensor [1]."""
-SAME_UNIT = 1.12
-"""Ratio within which an acceleration and the rate of a speed agree in a unit [1]: gain of the one and dive of the car."""
+SAME_UNIT, NEARER = 1.15, 2.0
+"""Ratio within which an acceleration and the rate of a speed agree in a unit: gain of the one and dive of the car; and
+how much nearer they are in another unit than in their own, where that is the true one [1]."""
+CHANGING = 1.0
+"""Standard deviation of an acceleration from which its ratio to the rate of a speed is sharp [m/s^2]."""
 SMOOTHING = 0.2
 """Width of the mean over which two channels are compared [s]."""
 DIVE_PER_DECELERATION = (0.02, 2.0)
@@ -271,7 +274,8 @@ def _find_pair_problems(
         ]
     if mapped_unit is None:
         return []
-    of_speed = None if speed_unit is None else _guess_speed_unit(speed_unit, slope)
+    sharp = speed_unit is not None and float(np.std(y)) > CHANGING
+    of_speed = _guess_speed_unit(speed_unit, slope) if sharp and speed_unit is not None else None
     if 0.4 < slope < 2.5 and of_speed is None:
         return []
     guess = None if of_speed else guess_unit(mapped_unit, slope)
@@ -283,7 +287,7 @@ def _find_pair_problems(
 
 
 def _guess_speed_unit(taken: str, ratio: float) -> str | None:
-    """Return the unit of a speed whose rate an acceleration is ``ratio`` times, where it is nearer to it than to the own.
+    """Return the unit in which the rate of a speed agrees with an acceleration that is ``ratio`` times it; None if none.
 
     Parameters
     ----------
@@ -292,7 +296,7 @@ def _guess_speed_unit(taken: str, ratio: float) -> str | None:
     """
     apart = {unit: abs(log(ratio * UNITS[taken][1] / UNITS[unit][1])) for unit in SPEED_UNITS}
     near = min(apart, key=apart.__getitem__)
-    return near if near != taken and apart[near] < log(SAME_UNIT) else None
+    return near if apart[near] < min(log(SAME_UNIT), apart[taken] / NEARER) else None
 
 
 def _find_axis_problems(felt: NDArray[np.float64], rate: NDArray[np.float64]) -> list[str]:
