@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import AfterValidator, Field, ValidationError, ValidationInfo, field_validator
 
 from catalogs.channel_maps.conditions import Conditions, find_condition_problems
+from catalogs.channel_maps.text_files import CsvEntry
 from catalogs.channel_maps.tolerances import Tolerances
 from catalogs.documents import read_yaml
 from catalogs.entries import find_entry
@@ -129,29 +130,6 @@ class SegmentEntry(CatalogueEntry):
     before_s: Annotated[float, Field(strict=True, ge=0)]
     after_s: Annotated[float, Field(strict=True, ge=0)]
     held_out_every: Annotated[int, Field(strict=True, ge=2)]
-
-
-class CsvEntry(CatalogueEntry):
-    """How text files are written: rows above the names, what stands in rows below them, numbers, and no value."""
-
-    separator: Text = ","
-    decimal: Literal[".", ","] = "."
-    thousands: Literal["", ".", ",", " ", "'"] = ""
-    missing: tuple[Text | Number, ...] = ()
-    skip_rows: Annotated[int, Field(strict=True, ge=0)] = 0
-    units_row: Annotated[bool, Field(strict=True)] = False
-    below_names: tuple[Literal["units", "sources", "notes"], ...] = ()
-
-    @property
-    def rows_below(self) -> tuple[str, ...]:
-        """What stands in each row between the names and the samples; ``units_row`` is one row of units."""
-        return self.below_names or (("units",) if self.units_row else ())
-
-    @field_validator("below_names")
-    @classmethod
-    def _is_in_place_of_units_row(cls, rows: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
-        both = bool(rows) and bool(info.data.get("units_row"))
-        return _raise_problems(rows, ["give units_row or below_names, not both"] if both else [])
 
 
 class ChannelMap(CatalogueEntry):

@@ -9,9 +9,9 @@ import numpy as np
 from catalogs.channel_maps import ChannelMap
 from catalogs.recordings.bags import BAG, is_bag_folder, list_storage_files
 from catalogs.recordings.bus_json import BUS_JSON
+from catalogs.recordings.columns import replace_numbers
 from catalogs.recordings.forms import Form, SignalSummary
 from catalogs.recordings.matlab import MATLAB
-from catalogs.recordings.columns import replace_numbers
 from catalogs.recordings.mdf import MDF
 from catalogs.recordings.nuscenes_bus import SCENE, find_scene, list_scene_files
 from catalogs.recordings.oxts import OXTS, find_oxts_folder, list_oxts_files
@@ -29,7 +29,7 @@ SUFFIXES = tuple(FORMS)
 
 
 def recording_root(source: Path) -> Path:
-    """Return the folder in which the recordings of a source lie: itself, or that of a file or of what is one recording."""
+    """Return the folder in which the recordings of a source lie: itself, or that of what is one recording."""
     return source if source.is_dir() and not is_recording(source) else source.parent
 
 
@@ -41,7 +41,7 @@ def is_recording(path: Path) -> bool:
 def recording_files(source: Path, channel_map: ChannelMap | None = None) -> tuple[Path, ...]:
     """Return the recordings that a map reads: those its runs name, otherwise all in the folder, or the one file.
 
-    The folder of a ROS 2 bag or of a drive of KITTI is one recording, and so are a scene's files of nuScenes in a folder.
+    The folder of a ROS 2 bag or a drive of KITTI is one recording, and so are a scene's files of nuScenes.
 
     Raises
     ------
@@ -59,7 +59,9 @@ def recording_files(source: Path, channel_map: ChannelMap | None = None) -> tupl
     if source != folder:
         return (source,)
     there = sorted(
-        path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES or (path.is_dir() and is_recording(path))
+        path
+        for path in folder.iterdir()
+        if path.suffix.lower() in SUFFIXES or (path.is_dir() and is_recording(path))
     )
     files = tuple(dict.fromkeys(find_scene(path) or path for path in there))
     if not files:

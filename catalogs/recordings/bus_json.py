@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from catalogs.channel_maps import ChannelMap
 from catalogs.campaign_files import find_name_bounds
+from catalogs.channel_maps import ChannelMap
 from catalogs.documents import parse_json, read_content
 from catalogs.recordings.forms import (
     LARGEST_FILE,
@@ -72,8 +72,8 @@ def _load_content(path: Path) -> dict[str, Any] | list[Any]:
     )
     if not isinstance(content, dict) and not is_list_of_messages(content):
         raise InputError(
-            f"{path}: must be a table of signals, each with values of [time, value], or a list of messages, each with its"
-            " utime"
+            f"{path}: must be a table of signals, each with values of [time, value], or a list of messages, each with"
+            " its utime"
         )
     if isinstance(content, dict) and (problems := find_name_bounds(list(content), path.name)):
         raise InputError(problems)

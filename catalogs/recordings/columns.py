@@ -1,4 +1,4 @@
-"""Columns of any type as numbers: text that stands for no value or for a number, and clocks of dates or times of day."""
+"""Columns of any type as numbers: text that stands for no value or a number, and clocks of dates or times of day."""
 
 import re
 import warnings
@@ -17,7 +17,16 @@ from tasks.errors import InputError
 
 NO_VALUE = {"", "-", "--", "---", "nan", "-nan", "null", "none", "n/a", "na", "#n/a", "#na", "<na>", "nil"}
 """Text that stands for no value, in small letters."""
-SWITCH = {"off": 0.0, "on": 1.0, "false": 0.0, "true": 1.0, "no": 0.0, "yes": 1.0, "inactive": 0.0, "active": 1.0}
+SWITCH = {
+    "off": 0.0,
+    "on": 1.0,
+    "false": 0.0,
+    "true": 1.0,
+    "no": 0.0,
+    "yes": 1.0,
+    "inactive": 0.0,
+    "active": 1.0,
+}
 """Text of a switch, in small letters, and its number."""
 _TIME = r"(?:(\d+):)?(\d+):(\d+(?:[.,]\d+)?) ?([AaPp])?\.?[Mm]?\.?Z?"
 """A time of day, or minutes and seconds."""
@@ -116,7 +125,10 @@ def _advise(wrong: pd.Series, where: NDArray[np.bool_], spelling: Spelling) -> s
     if np.count_nonzero(where) == 1 and where[0]:
         return "if this is a row of units, give csv: {units_row: true} in the map; else correct it"
     words = shorten(", ".join(f'"{word}": 1' for word in list(dict.fromkeys(wrong))[:3]), 80)
-    return f"correct it, or leave it empty; or say what it stands for, as values: {{{words}}} of its channel, null for none"
+    return (
+        f"correct it, or leave it empty; or say what it stands for, as values: {{{words}}} of its channel, null for"
+        " none"
+    )
 
 
 def read_clock(place: str, clock: TimeEntry, column: pd.Series, spelling: Spelling) -> NDArray[np.float64]:
@@ -214,7 +226,9 @@ def make_series(column: pa.ChunkedArray) -> pd.Series | None:
         if of_day:
             column = column.cast(pa.time64("ns")).cast(pa.int64())
         span = of_day or pa.types.is_duration(kind)
-        return column.cast(pa.duration("ns") if span else pa.timestamp("ns", "UTC" if zone else None)).to_pandas()
+        return column.cast(
+            pa.duration("ns") if span else pa.timestamp("ns", "UTC" if zone else None)
+        ).to_pandas()
     if pa.types.is_decimal(kind):
         return column.cast(pa.float64()).to_pandas()
     text = pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_null(kind)

@@ -104,7 +104,10 @@ def find_clock_problem(path: Path, clock: TimeEntry, stated: str, stamps: NDArra
         )
     for unit in (parse_unit(stated), read_unit_of_name(clock.source, "time")):
         if unit and UNITS[unit][0] == "time" and unit != clock.unit and stamps is not None:
-            return f"{path.name}: clock {clock.source} is in {unit} by its file, in {clock.unit} by the map: correct the map"
+            return (
+                f"{path.name}: clock {clock.source} is in {unit} by its file, in {clock.unit} by the map: correct the"
+                " map"
+            )
     return ""
 
 
@@ -182,8 +185,8 @@ def describe_twice(path: Path, name: str, choices: Mapping[str, str]) -> str:
     """
     places = ", ".join(f"{choice} ({where})" if where else choice for choice, where in choices.items())
     return (
-        f"{path.name}: signal {shorten(name, 60)} stands {len(choices)} times: name one of them as its source, which are"
-        f" {shorten(places)}"
+        f"{path.name}: signal {shorten(name, 60)} stands {len(choices)} times: name one of them as its source, which"
+        f" are {shorten(places)}"
     )
 
 

@@ -17,4 +17,6 @@ class RecordingLimits(CatalogueEntry):
 @cache
 def load_recording_limits() -> RecordingLimits:
     """Return the limits of the catalogue."""
-    return read_entry(RecordingLimits, Path(__file__).with_name("limits.yaml"), "table of limits of recordings")
+    return read_entry(
+        RecordingLimits, Path(__file__).with_name("limits.yaml"), "table of limits of recordings"
+    )

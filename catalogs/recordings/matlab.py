@@ -119,8 +119,8 @@ def summarise_matlab(path: Path, channel_map: ChannelMap | None) -> list[SignalS
             stamps = None if clock is None else _find_clock(path, name, column, clock)
             if clock is not None and isinstance(stamps, Column):
                 signal = sample_column(
-                        convert_to_seconds(stamps.read(), clock.unit), column.read(), clock, column.unit
-                    )
+                    convert_to_seconds(stamps.read(), clock.unit), column.read(), clock, column.unit
+                )
             else:
                 signal = Signal(time=np.empty(0), values=column.read(), unit=column.unit)
             rows.append(summarise_signal(name, signal))

@@ -43,7 +43,7 @@ def load_v5_variables(content: bytes) -> Struct:
     twice = [str(warning.message) for warning in told if "Duplicate variable name" in str(warning.message)]
     if twice:
         raise InputError(
-            f"must have distinct variables; {shorten(twice[0].split(' in stream')[0])}: save each under a name of its own"
+            f"must have distinct variables; {shorten(twice[0].split(' in stream')[0])}: save each under its own name"
         )
     return spread_elements(
         (name, _convert_value(value, 0)) for name, value in loaded.items() if not name.startswith("__")

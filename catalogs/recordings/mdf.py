@@ -69,8 +69,14 @@ def _take_signals(path: Path, recording: Any, channel_map: ChannelMap) -> dict[s
     for name in signal_names(channel_map):
         place = choices.get(name) or _find_by_group(recording, name)
         if place is None:
-            twice = {choice: "" for choice in choices if choice.endswith(f".{name}") or choice.startswith(f"{name}#")}
-            problems += [describe_twice(path, name, twice)] if twice else describe_missing(path, (name,), (), choices)
+            twice = {
+                choice: ""
+                for choice in choices
+                if choice.endswith(f".{name}") or choice.startswith(f"{name}#")
+            }
+            problems += (
+                [describe_twice(path, name, twice)] if twice else describe_missing(path, (name,), (), choices)
+            )
             continue
         signals[name], note = _take_channel(recording, place, channel_map.meanings_of(name))
         if note:
@@ -117,9 +123,7 @@ def _find_by_group(recording: Any, wanted: str) -> Place | None:
     return found[0] if len(found) == 1 else None
 
 
-def _take_channel(
-    recording: Any, place: Place, meanings: Mapping[str, float | None]
-) -> tuple[Signal, str]:
+def _take_channel(recording: Any, place: Place, meanings: Mapping[str, float | None]) -> tuple[Signal, str]:
     """Return a channel, and why it is none of numbers; a table of values may give text for some of them."""
     channel = recording.get(group=place[0], index=place[1])
     values, note = np.full(len(channel.timestamps), np.nan), LISTS
@@ -129,7 +133,9 @@ def _take_channel(
         values, note = convert_values(pd.Series(text), Spelling(meanings=meanings))
     known = ~np.isnan(values) | (channel.samples.dtype.kind == "f")
     time = np.asarray(channel.timestamps, dtype=np.float64)
-    return Signal(time=time[known], values=values[known], unit=channel.unit or ""), note.replace("row", "sample", 1)
+    return Signal(time=time[known], values=values[known], unit=channel.unit or ""), note.replace(
+        "row", "sample", 1
+    )
 
 
 def _summarise_channels(recording: Any) -> list[SignalSummary]:

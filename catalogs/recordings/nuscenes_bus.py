@@ -1,7 +1,7 @@
 """CAN bus messages of nuScenes: a list of one kind of message of one scene, ``scene-0001_vehicle_monitor.json``.
 
-Each message has a ``utime`` [us]; its other numbers are signals, those of a list by their index: ``accel[0]``. The files
-of a scene in a folder are one recording; a name that several kinds of message have is given as ``KIND.NAME`` there.
+Each message has a ``utime`` [us]; its other numbers are signals, those of a list by their index: ``accel[0]``. The
+files of a scene in a folder are one recording; a name that several kinds of message have is given as ``KIND.NAME``.
 
 Format: python-sdk/nuscenes/can_bus/README.md of nuscenes-devkit
 """
@@ -90,7 +90,9 @@ def _load_signals(path: Path) -> dict[str, Signal]:
     signals: dict[str, Signal] = {}
     for file in list_scene_files(path) or (path,):
         kind = "" if file == path else f"{_FILE.fullmatch(file.name).group(2)}."  # type: ignore[union-attr]
-        content = parse_json(read_content(file, "recording", LARGEST_FILE), file, "recording", large_integers=True)
+        content = parse_json(
+            read_content(file, "recording", LARGEST_FILE), file, "recording", large_integers=True
+        )
         if is_list_of_messages(content):
             signals |= {f"{kind}{name}": signal for name, signal in collect_signals(file, content).items()}
         elif file == path:
@@ -100,8 +102,10 @@ def _load_signals(path: Path) -> dict[str, Signal]:
 
 def is_list_of_messages(content: Any) -> bool:
     """Return whether a document is a list of tables of which each has a ``utime``."""
-    return isinstance(content, list) and bool(content) and all(
-        isinstance(entry, dict) and _is_number(entry.get("utime")) for entry in content
+    return (
+        isinstance(content, list)
+        and bool(content)
+        and all(isinstance(entry, dict) and _is_number(entry.get("utime")) for entry in content)
     )
 
 
@@ -127,7 +131,9 @@ def collect_signals(path: Path, messages: list[dict[str, Any]]) -> dict[str, Sig
         if len(columns) > MOST_NAMES:
             raise InputError(f"{path.name}: must have at most {MOST_NAMES} signals; it has more")
     return {
-        name: Signal(time=np.array(times), values=np.array(values), unit=UNITS.get(name.partition("[")[0], ""))
+        name: Signal(
+            time=np.array(times), values=np.array(values), unit=UNITS.get(name.partition("[")[0], "")
+        )
         for name, (times, values) in columns.items()
     }
 

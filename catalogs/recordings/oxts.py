@@ -94,10 +94,12 @@ def _load_packets(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]
     lines = read_content(stamps, "list of time stamps", LARGEST_STAMPS).decode("latin-1").splitlines()
     if not 0 < len(files) <= MOST_PACKETS:
         raise InputError(f"{path.name}: a drive must have 1 to {MOST_PACKETS} packets; it has {len(files)}")
-    if len(wrong := [file.name for file in files if not file.stem.isdecimal() or int(file.stem) >= len(lines)]):
+    if len(
+        wrong := [file.name for file in files if not file.stem.isdecimal() or int(file.stem) >= len(lines)]
+    ):
         raise InputError(
-            f"{path.name}: each packet must have a time stamp; {shorten(wrong[0])} has none among the {len(lines)} lines"
-            f" of {stamps.name}"
+            f"{path.name}: each packet must have a time stamp; {shorten(wrong[0])} has none among the {len(lines)}"
+            f" lines of {stamps.name}"
         )
     column = pd.Series([lines[int(file.stem)] for file in files])
     column.index += 1

@@ -91,7 +91,9 @@ def _read_with(open_table: Open) -> Callable[[Path, ChannelMap], dict[str, Signa
         if problems:
             told = _describe_rows_of_text(table, series, [time, *columns.values()])
             raise InputError(told or problems)
-        if restarts := describe_restarts(time, table_row=1 + len(channel_map.csv.rows_below) * bool(table.csv)):
+        if restarts := describe_restarts(
+            time, table_row=1 + len(channel_map.csv.rows_below) * bool(table.csv)
+        ):
             raise InputError(f"{path.name}: clock {clock.source} {restarts}")
         return {
             name: sample_column(time, values, clock, table.units.get(name, ""))
@@ -169,7 +171,9 @@ def _convert_columns(
 def _read_times(table: Table, clock: TimeEntry, column: pd.Series | str) -> NDArray[np.float64]:
     """Return the times of a table's rows, NaN where one holds none, float64 [N] [s]."""
     if isinstance(column, str):
-        raise InputError(f"{table.path.name}: clock {clock.source} must be of numbers, dates or times; {column}")
+        raise InputError(
+            f"{table.path.name}: clock {clock.source} must be of numbers, dates or times; {column}"
+        )
     spelling = table.spell(None, clock.source)
     values, note = convert_values(column, spelling)
     stated = table.units.get(clock.source, "")
@@ -192,10 +196,20 @@ def _describe_rows_of_text(
         cells = [str(column.iloc[row]) for column in series.values() if not isinstance(column, str)]
         cells = [cell for cell in cells if cell not in ("nan", "None", "")]
         shown.append(", ".join(shorten_value(cell) for cell in cells))
-        kinds.append("units" if "units" not in kinds and any(parse_unit(cell) for cell in cells) else "sources")
+        kinds.append(
+            "units" if "units" not in kinds and any(parse_unit(cell) for cell in cells) else "sources"
+        )
     remedy = "units_row: true" if kinds == ["units"] else f"below_names: [{', '.join(kinds)}]"
-    instead = f" in place of {'units_row' if table.csv.units_row else 'what it says'}" if table.csv.rows_below else ""
-    looks = "looks like a row of units" if kinds[-first:] == ["units"] else f"looks like {' and '.join(kinds[-first:])}"
+    instead = (
+        f" in place of {'units_row' if table.csv.units_row else 'what it says'}"
+        if table.csv.rows_below
+        else ""
+    )
+    looks = (
+        "looks like a row of units"
+        if kinds[-first:] == ["units"]
+        else f"looks like {' and '.join(kinds[-first:])}"
+    )
     number = 1 + len(table.csv.rows_below)
     return (
         f"{table.path.name}: row {number} below the names must hold numbers; it holds {shown[0]}, which {looks}:"
@@ -205,7 +219,7 @@ def _describe_rows_of_text(
 
 def _open_csv(path: Path, options: CsvEntry) -> Table:
     text = read_text_table(path, options)
-    written = [f"column {k + 1}" if not name else name for k, name in enumerate(text.names)]
+    written = [name or f"column {k + 1}" for k, name in enumerate(text.names)]
     names = number_names(written)
     cells = [[row[k] for row in text.below if k < len(row) and row[k]] for k in range(len(names))]
     units = [
@@ -237,7 +251,9 @@ def _open_parquet(path: Path, _: CsvEntry) -> Table:
             read = dict(zip(number_names(table.column_names), table.columns, strict=True))
             columns = {names[k]: make_series(read[names[k]]) for k in places}
         return {
-            name: f"it is of {fields[names.index(name)].type}" if column is None else column.set_axis(range(1, len(column) + 1))
+            name: f"it is of {fields[names.index(name)].type}"
+            if column is None
+            else column.set_axis(range(1, len(column) + 1))
             for name, column in columns.items()
         }
 

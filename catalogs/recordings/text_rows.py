@@ -58,7 +58,9 @@ def read_text_table(path: Path, options: CsvEntry) -> TextTable:
     raw = io.BytesIO(content)
     try:
         rows = _read_rows(raw, encoding, options)
-        names = next((cells for number, cells in enumerate(rows) if number >= options.skip_rows and any(cells)), [])
+        names = next(
+            (cells for number, cells in enumerate(rows) if number >= options.skip_rows and any(cells)), []
+        )
         below = [next((cells for cells in rows if any(cells)), []) for _ in options.rows_below]
     except csv.Error as error:
         raise InputError(f"{path}: must be a table of text; {shorten(error)}") from None
@@ -68,7 +70,9 @@ def read_text_table(path: Path, options: CsvEntry) -> TextTable:
         raise InputError(f"{path}: {problem}")
     for kind, cells in zip(options.rows_below, below, strict=True):
         _check_row_below(path, kind, cells, options)
-    return TextTable(names=names, below=below, samples=_read_samples(path, raw, encoding, len(names), options))
+    return TextTable(
+        names=names, below=below, samples=_read_samples(path, raw, encoding, len(names), options)
+    )
 
 
 def find_row_of_names(path: Path, options: CsvEntry, wanted: tuple[str, ...]) -> int | None:
@@ -82,7 +86,9 @@ def find_row_of_names(path: Path, options: CsvEntry, wanted: tuple[str, ...]) ->
     content = read_content(path, "recording", LARGEST_FILE)
     rows = _read_rows(io.BytesIO(content), _find_encoding(path, content), options)
     try:
-        return next((k for k, cells in zip(range(SEARCHED), rows, strict=False) if {*wanted} <= {*cells}), None)
+        return next(
+            (k for k, cells in zip(range(SEARCHED), rows, strict=False) if {*wanted} <= {*cells}), None
+        )
     except csv.Error:
         return None
 

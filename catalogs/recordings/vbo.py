@@ -49,7 +49,9 @@ def read_vbo(path: Path, channel_map: ChannelMap) -> dict[str, Signal]:
     for name in signal_names(channel_map):
         if name not in samples:
             twice = {known: "" for known in samples if known.rpartition("#")[0] == name}
-            problems += [describe_twice(path, name, twice)] if twice else describe_missing(path, (name,), (), samples)
+            problems += (
+                [describe_twice(path, name, twice)] if twice else describe_missing(path, (name,), (), samples)
+            )
             continue
         values, note = convert_values(samples[name], Spelling(meanings=channel_map.meanings_of(name)))
         signals[name] = sample_column(time, values, channel_map.time or CLOCK, units[name])
@@ -89,7 +91,9 @@ def _load_columns(path: Path) -> tuple[dict[str, pd.Series], dict[str, str]]:
     if problems := find_name_bounds(words, path.name):
         raise InputError(problems)
     try:
-        frame = pd.read_csv(io.StringIO(data), sep=r"\s+", header=None, names=range(len(words)), index_col=False)
+        frame = pd.read_csv(
+            io.StringIO(data), sep=r"\s+", header=None, names=range(len(words)), index_col=False
+        )
     except (ValueError, OverflowError) as error:
         raise InputError(f"{path}: must be a table of text; {shorten(error)}") from None
     frame.index += 1
@@ -122,7 +126,9 @@ def _read_unit(line: str) -> str:
 
 def _read_times(path: Path, samples: dict[str, pd.Series]) -> np.ndarray:
     if "time" not in samples:
-        raise InputError(f"{path.name}: a VBOX file must have the column time; there are: {shorten(', '.join(samples))}")
+        raise InputError(
+            f"{path.name}: a VBOX file must have the column time; there are: {shorten(', '.join(samples))}"
+        )
     stamps, note = convert_values(samples["time"], Spelling())
     problem = find_clock_problem(path, CLOCK, "", stamps)
     if note or problem:

@@ -107,7 +107,9 @@ def import_measurements(
         raise InputError(problems)
     computed = any(found.computed for _, found in made)
     warnings = list_warnings(channel_map, readable, list(recordings.values()), computed=computed)
-    unknown = [found for signals in recordings.values() for found in find_unknown_units(channel_map.rules, signals)]
+    unknown = [
+        found for signals in recordings.values() for found in find_unknown_units(channel_map.rules, signals)
+    ]
     warnings += dict.fromkeys(unknown)
     if computed:
         channel_map, made = _leave_out_acceleration(channel_map, made)

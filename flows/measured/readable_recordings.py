@@ -47,7 +47,9 @@ def read_recordings(
     channel_map = _fill_units(channel_map, recordings)
     for file in list(recordings):
         if found := _find_recording_problems(recordings[file], channel_map):
-            problems += [PlacedProblem(name=file.name, place=file.name, sentence=problem) for problem in found]
+            problems += [
+                PlacedProblem(name=file.name, place=file.name, sentence=problem) for problem in found
+            ]
             del recordings[file]
     told = join_shared_problems(problems, len(files), "files", exact=True)
     lost = [file.name for file in files if file not in recordings]
@@ -141,7 +143,9 @@ def _find_recording_problems(signals: dict[str, Signal], channel_map: ChannelMap
     problems = find_unit_problems(channel_map.rules, signals)
     limits, clock = load_recording_limits(), channel_map.time
     taken = clock.unit if clock is not None and clock.unit in UNITS else "s"
-    speed = next((average_sources(signals, rule) for rule in channel_map.rules if rule.channel == "speed"), None)
+    speed = next(
+        (average_sources(signals, rule) for rule in channel_map.rules if rule.channel == "speed"), None
+    )
     scale = describe_clock_scale(
         list(signals.values()),
         speed,

@@ -27,7 +27,8 @@ UNITS: dict[str, tuple[str, float]] = {
 SPEED_UNITS = ("km/h", "mph", "kn", "m/s")
 """Units in which loggers write the speed of a car, the most usual first."""
 ALIASES = {
-    "kmh": "km/h", "kph": "km/h", "kmph": "km/h", "km/hr": "km/h", "kilometers/hour": "km/h", "mps": "m/s", "m/sec": "m/s",
+    "kmh": "km/h", "kph": "km/h", "kmph": "km/h", "km/hr": "km/h", "kilometers/hour": "km/h",
+    "mps": "m/s", "m/sec": "m/s",
     "mi/h": "mph", "miles/h": "mph", "miles/hour": "mph", "knot": "kn", "knots": "kn", "kt": "kn", "kts": "kn",
     "m/s/s": "m/s^2", "m/s**2": "m/s^2", "mps2": "m/s^2", "m/sec2": "m/s^2", "m/s-2": "m/s^2",
     "G's": "g", "gs": "g", "g-force": "g",

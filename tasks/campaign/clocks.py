@@ -38,9 +38,10 @@ def describe_restarts(time: NDArray[np.float64], table_row: int | None = None) -
     numbers = [str(told[k + 1] + first) for k in back]
     shown = ", ".join(numbers[:5]) + (f" and {len(numbers) - 5} more" if len(numbers) > 5 else "")
     return (
-        f"begins again at {kind}{'s' if len(numbers) > 1 else ''} {shown}{' below the names' if table_row else ''}, first"
-        f" from {time[told[back[0]]]:.3f} to {time[told[back[0] + 1]]:.3f} s: the same times stand for several stretches,"
-        f" so cut the file before {'that' if len(numbers) == 1 else 'each such'} {kind} into files of their own"
+        f"begins again at {kind}{'s' if len(numbers) > 1 else ''} {shown}{' below the names' if table_row else ''},"
+        f" first from {time[told[back[0]]]:.3f} to {time[told[back[0] + 1]]:.3f} s: the same times stand for several"
+        f" stretches, so cut the file before {'that' if len(numbers) == 1 else 'each such'} {kind}"
+        " into files of their own"
     )
 
 
@@ -95,8 +96,8 @@ def describe_clock_scale(
     hint = f", it looks like {near}" if near and fits[near] < np.log(LIKE) else ""
     falls = f" and the speed falls by {fall:.2g} m/s^2" if fast or slow else ""
     return (
-        f"samples come every {_write_time(step)}{falls}: the clock is not in {taken}{hint}: correct the unit of time in the"
-        " map"
+        f"samples come every {_write_time(step)}{falls}: the clock is not in {taken}{hint}: correct the unit of time in"
+        " the map"
     )
 
 

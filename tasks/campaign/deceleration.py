@@ -33,6 +33,6 @@ def find_deceleration_problems(
     likely = [other for other in SPEED_UNITS if UNITS[other][1] < UNITS[unit][1]]
     hint = f"; taken as {unit}, it looks like {likely[0]}" if likely else ""
     return [
-        f"channel speed falls by {max(wrong.values()):.3g} m/s^2 in {list_names(list(wrong))}, which the tyres of no road"
-        f" car give (limit {limit:g}): correct its unit or scale{hint}"
+        f"channel speed falls by {max(wrong.values()):.3g} m/s^2 in {list_names(list(wrong))}, which the tyres of no"
+        f" road car give (limit {limit:g}): correct its unit or scale{hint}"
     ]

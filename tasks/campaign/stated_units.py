@@ -1,4 +1,4 @@
-"""Units that a file states, in its metadata, a row below the names or a name itself, beside those of the channel map."""
+"""Units that a file states, in its metadata, a row below the names or a name itself, beside those of the map."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -16,7 +16,9 @@ def _compact(text: str) -> str:
     return re.sub(r"[\s^.*·]", "", text.strip().strip("[]()").replace("²", "2").replace("_", "/")).lower()
 
 
-_KNOWN = {_compact(spelling): unit for spelling, unit in (*ALIASES.items(), *((unit, unit) for unit in UNITS))}
+_KNOWN = {
+    _compact(spelling): unit for spelling, unit in (*ALIASES.items(), *((unit, unit) for unit in UNITS))
+}
 _KNOWN.pop("kn")  # in other letters it may be knots or kilonewtons
 _KNOWN |= {"": "", "-": "1"}
 
@@ -112,20 +114,19 @@ def choose_unit(rule: ChannelRule, recordings: Sequence[Mapping[str, Signal]]) -
     recordings : signals of each by name
     """
     wanted = UNITS[CHANNELS_BY_NAME[rule.channel].unit][0]
-    found = {
-        name: list_stated_units(name, signals[name]) or [""] for signals in recordings for name in rule.sources
-    }
-    found = {
-        name: [unit for unit in units if unit and UNITS[unit][0] == wanted] or units for name, units in found.items()
-    }
-    stated = list(dict.fromkeys(unit for units in found.values() for unit in units))
-    if len(stated) == 1 and stated[0]:
-        return stated[0]
-    if missing := [name for name, units in found.items() if units == [""]]:
+    found = [
+        (name, list_stated_units(name, signals[name])) for signals in recordings for name in rule.sources
+    ]
+    # of a unit in the file and another word at the end of the name, that which the channel can have
+    found = [(name, [u for u in units if UNITS[u][0] == wanted] or units) for name, units in found]
+    if missing := dict.fromkeys(name for name, units in found if not units):
         return [
-            f"channel {rule.channel}: the map gives no unit, and the file states none for {', '.join(missing)}: give its"
-            " unit in the map"
+            f"channel {rule.channel}: the map gives no unit, and the file states none for {', '.join(missing)}: give"
+            " its unit in the map"
         ]
+    stated = list(dict.fromkeys(unit for _, units in found for unit in units))
+    if len(stated) == 1:
+        return stated[0]
     return [f"channel {rule.channel}: the files state {' and '.join(stated)}: give its unit in the map"]
 
 

@@ -34,7 +34,10 @@ sats time velocity Brake_Pressure
 
 def test_a_vbox_file_has_its_own_clock_names_and_units(tmp_path: Path) -> None:
     (tmp_path / "log.vbo").write_text(VBO, newline="\r\n")
-    channels = {"speed": {"source": "velocity"}, "brake_pressure": {"source": "Brake_Pressure", "unit": "bar"}}
+    channels = {
+        "speed": {"source": "velocity"},
+        "brake_pressure": {"source": "Brake_Pressure", "unit": "bar"},
+    }
     found = read_signals(tmp_path / "log.vbo", make_map(channels, time=None))
     np.testing.assert_allclose(found["velocity"].time, [86399.9, 86399.95, 86400.0], rtol=0, atol=1e-9)
     assert (found["velocity"].values.tolist(), found["velocity"].unit) == ([80.0, 79.5, 79.0], "kmh")
@@ -98,9 +101,10 @@ class Group:
 class Recording:
     """What of an open MDF file is asked for: one name in two groups, and a table of values."""
 
-    channels_db = {"time": ((0, 0), (1, 0)), "v": ((0, 1), (1, 1)), "switch": ((0, 2),)}
-    masters_db = {0: 0, 1: 0}
-    groups = [Group("CAN1 ESP_01"), Group("CAN2 GPS_01")]
+    def __init__(self) -> None:
+        self.channels_db = {"time": ((0, 0), (1, 0)), "v": ((0, 1), (1, 1)), "switch": ((0, 2),)}
+        self.masters_db = {0: 0, 1: 0}
+        self.groups = [Group("CAN1 ESP_01"), Group("CAN2 GPS_01")]
 
     def get(self, group: int, index: int) -> Any:
         values = np.array([b"released", b"pressed"]) if index == 2 else np.array([10.0 + group, 9.0 + group])

@@ -60,11 +60,11 @@ def test_a_matlab_variable_that_stands_twice_is_refused(tmp_path: Path) -> None:
     savemat(tmp_path / "b.mat", {"v": np.arange(3.0) + 5.0})
     both = (tmp_path / "a.mat").read_bytes() + (tmp_path / "b.mat").read_bytes()[128:]
     (tmp_path / "log.mat").write_bytes(both)
-    with pytest.raises(InputError, match="distinct variables.* v"):
+    with pytest.raises(InputError, match=r"distinct variables.* v"):
         read_signals(tmp_path / "log.mat", take())
 
 
-RACE = "Format,3\nNote,\"one line\nand another\"\n\nt,v\ns,m/s\n100: gps,calc\n0,1\n1,2\n"
+RACE = 'Format,3\nNote,"one line\nand another"\n\nt,v\ns,m/s\n100: gps,calc\n0,1\n1,2\n'
 """As a lap timer exports: a note over two lines, and two rows below the names."""
 
 
@@ -72,9 +72,13 @@ def test_rows_below_the_names_are_declared_and_the_advice_fits_what_the_map_has(
     path = write(tmp_path, RACE)
     with pytest.raises(InputError, match=r"stand in row 4: give csv: \{skip_rows: 3\}"):
         read_signals(path, take())
-    with pytest.raises(InputError, match=r"row 1 .*units and sources: give csv: \{below_names: \[units, sources\]\}"):
+    with pytest.raises(
+        InputError, match=r"row 1 .*units and sources: give csv: \{below_names: \[units, sources\]\}"
+    ):
         read_signals(path, take(csv={"skip_rows": 3}))
-    with pytest.raises(InputError, match=r"row 2 .* give csv: \{below_names: \[units, sources\]\} .* of units_row"):
+    with pytest.raises(
+        InputError, match=r"row 2 .* give csv: \{below_names: \[units, sources\]\} .* of units_row"
+    ):
         read_signals(path, take(csv={"skip_rows": 3, "units_row": True}))
     whole = {"skip_rows": 3, "below_names": ["units", "sources"]}
     assert read_values(path, take(csv=whole)) == [1.0, 2.0]
@@ -128,7 +132,12 @@ def test_advice_on_a_mark_does_not_make_1066_into_1(
 @pytest.mark.parametrize(
     ("first", "second", "start", "step"),
     [
-        ("2026-08-04 13:16:03.000000001+00:00", "2026-08-04 13:16:03.049999872+00:00", 47763.000000001, 0.049999871),
+        (
+            "2026-08-04 13:16:03.000000001+00:00",
+            "2026-08-04 13:16:03.049999872+00:00",
+            47763.000000001,
+            0.049999871,
+        ),
         ("2026-08-04T13:16:03+02:00", "2026-08-04T13:16:03.05+02:00", 40563.0, 0.05),
         ("04-Aug-2026 13:16:03.000", "04-Aug-2026 13:16:03.050", 47763.0, 0.05),
         ("13:16:03", "13:16:03.05", 47763.0, 0.05),
@@ -144,25 +153,31 @@ def test_a_clock_of_dates_or_times_of_day_is_one(
     np.testing.assert_allclose([times[0], times[1] - times[0]], [start, step], rtol=0, atol=1e-10)
 
 
-@pytest.mark.parametrize("kind", [pa.timestamp("ns", "UTC"), pa.timestamp("us"), pa.time64("ns"), pa.duration("ms")])
+@pytest.mark.parametrize(
+    "kind", [pa.timestamp("ns", "UTC"), pa.timestamp("us"), pa.time64("ns"), pa.duration("ms")]
+)
 def test_a_clock_of_parquet_has_any_type_of_time(tmp_path: Path, kind: pa.DataType) -> None:
     per_second = {"ns": 10**9, "us": 10**6, "ms": 10**3}[kind.unit]
     stamps = pa.array([3 * per_second, 3 * per_second + per_second // 20, None], pa.int64()).cast(kind)
     pq.write_table(pa.table({"t": stamps, "v": [1.0, 2.0, 3.0]}), tmp_path / "log.parquet")
     assert read_times(tmp_path / "log.parquet", take()) == [3.0, 3.05]
-    with pytest.raises(InputError, match="dates or times, which have no unit.* leave unit: ms away"):
+    with pytest.raises(InputError, match=r"dates or times, which have no unit.* leave unit: ms away"):
         read_signals(tmp_path / "log.parquet", take(time={"source": "t", "unit": "ms"}))
 
 
 @pytest.mark.parametrize("day", [46238.0, 740199.0])
 def test_days_of_a_spreadsheet_or_datenum_count_from_midnight(tmp_path: Path, day: float) -> None:
     path = write(tmp_path, f"t,v\n{day + 0.25:.12f},1\n{day + 0.25 + 1 / 86400:.12f},2\n")
-    np.testing.assert_allclose(read_times(path, take(time={"source": "t", "unit": "d"})), [21600.0, 21601.0], atol=2e-5)
+    np.testing.assert_allclose(
+        read_times(path, take(time={"source": "t", "unit": "d"})), [21600.0, 21601.0], atol=2e-5
+    )
 
 
 def test_a_clock_that_begins_again_is_told_with_its_row(tmp_path: Path) -> None:
     path = write(tmp_path, "t,v\n0,1\n5,2\n9,3\n0,4\n5,5\n")
-    with pytest.raises(InputError, match=r"clock t begins again at row 4 below the names, first from 9.000 to 0.000 s"):
+    with pytest.raises(
+        InputError, match=r"clock t begins again at row 4 below the names, first from 9.000 to 0.000 s"
+    ):
         read_signals(path, take())
 
 
@@ -170,7 +185,10 @@ def test_a_table_out_of_bounds_is_refused_before_it_is_read(tmp_path: Path) -> N
     names = [f"c{k}" for k in range(MOST_COLUMNS + 1)]
     with pytest.raises(InputError, match=f"at most {MOST_COLUMNS} columns"):
         read_signals(write(tmp_path, ",".join(names) + "\n"), take())
-    for length, words in ((LONGEST_COLUMN + 1, "names of at most"), (2_000_000, "names of at most|must be a table")):
+    for length, words in (
+        (LONGEST_COLUMN + 1, "names of at most"),
+        (2_000_000, "names of at most|must be a table"),
+    ):
         with pytest.raises(InputError, match=words) as caught:
             read_signals(write(tmp_path, "t,v," + "x" * length + "\n0,1,2\n"), take())
         assert len(str(caught.value)) < 500

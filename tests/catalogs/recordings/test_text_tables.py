@@ -65,7 +65,7 @@ def test_the_first_sample_of_a_time_is_the_first_that_has_a_value(tmp_path: Path
         (b't,v\ns,"m\n0,1\n1,2\n', "csv: {units_row: true}", "the row of units must be a row of text"),
         (b"t,v\nms,m/s\n0,10\n1,11\n", "csv: {units_row: true}", "clock t is in ms by its file, in s by the map"),
         (b"t,v\n0,10\n1,Err\n", "", "v must be of numbers; row 2 .* 'Err': correct it, or leave it empty"),
-        (b"t,v\n12:00:01,10\nnoon,11\n", "", "t must be of numbers, dates or times of day; row 2 .* 'noon': write times"),
+        (b"t,v\n12:00:01,10\nnoon,11\n", "", "t must be of numbers, dates or times of day; row 2 .* 'noon': write"),
         ("t,v\n0,10\n".encode("utf-16"), "", "must be UTF-8 or Latin-1 text; it holds zero bytes: save it as UTF-8"),
     ],
 )  # fmt: skip
