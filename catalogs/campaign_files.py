@@ -3,10 +3,11 @@
 import csv
 import io
 import os
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from math import isfinite
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import pyarrow as pa
@@ -31,6 +32,8 @@ SPELLINGS = {"m s-1": "m/s", "m s-2": "m/s^2", "rad s-1": "rad/s"}
 """Units as the telemetry of a dataset writes them, and as a campaign does."""
 MOST_SAMPLES = 20_000_000
 """Samples of a run [1]: five hours at 1 kHz; a few bytes of Parquet can claim billions."""
+MOST_COLUMNS, LONGEST_COLUMN = 20_000, 1_000
+"""Columns of a table, and characters of the name of one [1]."""
 
 
 class CampaignHeader(BaseModel):
@@ -156,21 +159,65 @@ def parse_columns(
     InputError
         With one sentence per problem: no Parquet, too many samples, columns that are no numbers or stand twice.
     """
+    with open_parquet(content, file) as parquet:
+        schema = parquet.schema_arrow
+        found = [name for name in schema.names if name in names]
+        if problems := _find_column_problems(schema, found, file):
+            raise InputError(problems)
+        table = parquet.read(columns=found, use_threads=False)
+        columns = {name: _as_floats(table[name].combine_chunks()) for name in found}
+        units = {name: read_unit(schema.field(name)) for name in found}
+    return columns, {name: unit for name, unit in units.items() if unit is not None}
+
+
+@contextmanager
+def open_parquet(content: bytes, file: str, **options: Any) -> Iterator[pq.ParquetFile]:
+    """Open the Parquet file of somebody else; what Arrow raises while it is read becomes a sentence.
+
+    Read its columns with ``use_threads=False``: a thread of Arrow that outlives a command aborts it as it ends.
+
+    Parameters
+    ----------
+    content : the file
+    file : its name, for the sentences
+    options : of `pyarrow.parquet.ParquetFile`
+
+    Raises
+    ------
+    InputError
+        If it is no Parquet, or its footer promises more rows, columns or longer names than a recording may have.
+    """
     try:
-        with pq.ParquetFile(pa.BufferReader(content)) as parquet:
-            schema, count = parquet.schema_arrow, parquet.metadata.num_rows
-            found = [name for name in schema.names if name in names]
-            problems = _find_column_problems(schema, found, count, file)
+        with pq.ParquetFile(pa.BufferReader(content), pre_buffer=False, **options) as parquet:
+            count = parquet.metadata.num_rows
+            problems = find_name_bounds(parquet.schema_arrow.names, file)
+            if not 0 <= count <= MOST_SAMPLES:
+                problems.append(f"{file} must have at most {MOST_SAMPLES} samples; it has {count}")
             if problems:
                 raise InputError(problems)
-            table = parquet.read(columns=found)
-            columns = {name: _as_floats(table[name].combine_chunks()) for name in found}
-            units = {name: _read_unit(schema.field(name)) for name in found}
+            yield parquet
     except InputError:
         raise
     except (pa.ArrowException, OSError, ValueError, TypeError, KeyError, OverflowError) as error:
         raise InputError(f"{file} must be a Parquet file of numbers; {shorten(error)}") from None
-    return columns, {name: unit for name, unit in units.items() if unit is not None}
+
+
+def find_name_bounds(names: Sequence[str], file: str) -> list[str]:
+    """Return the problems of a table with more columns, or a longer name of one, than a recording has.
+
+    Parameters
+    ----------
+    names : of its columns
+    file : its name, for the sentences
+    """
+    problems = []
+    if len(names) > MOST_COLUMNS:
+        problems.append(f"{file} must have at most {MOST_COLUMNS} columns; it has {len(names)}")
+    if (longest := max(map(len, names), default=0)) > LONGEST_COLUMN:
+        problems.append(
+            f"{file} must have names of at most {LONGEST_COLUMN} characters; one has {longest}: rename that column"
+        )
+    return problems
 
 
 def find_unit_problems(units: Mapping[str, str], wanted: Mapping[str, str], file: str) -> list[str]:
@@ -189,7 +236,7 @@ def find_unit_problems(units: Mapping[str, str], wanted: Mapping[str, str], file
     ]
 
 
-def _find_column_problems(schema: pa.Schema, found: Sequence[str], count: int, file: str) -> list[str]:
+def _find_column_problems(schema: pa.Schema, found: Sequence[str], file: str) -> list[str]:
     problems = [
         f"{file} must have distinct columns; {name} stands there twice"
         for name in dict.fromkeys(found)
@@ -197,14 +244,11 @@ def _find_column_problems(schema: pa.Schema, found: Sequence[str], count: int, f
     ]
     if problems:
         return problems
-    problems = [
+    return [
         f"channel {name} must be of numbers; {file} has it as {shorten(schema.field(name).type, 60)}"
         for name in found
         if not (pa.types.is_integer(schema.field(name).type) or pa.types.is_floating(schema.field(name).type))
     ]
-    if not 0 <= count <= MOST_SAMPLES:
-        problems.append(f"{file} must have at most {MOST_SAMPLES} samples; it has {count}")
-    return problems
 
 
 def _as_floats(column: pa.Array) -> NDArray[np.float64]:
@@ -213,6 +257,7 @@ def _as_floats(column: pa.Array) -> NDArray[np.float64]:
     return np.array(numbers, dtype=np.float64)
 
 
-def _read_unit(field: pa.Field) -> str | None:
+def read_unit(field: pa.Field) -> str | None:
+    """Return the unit that a field's metadata states; None if it states none."""
     metadata = field.metadata or {}
     return metadata[b"units"].decode("utf-8", "replace") if b"units" in metadata else None

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import AfterValidator, Field, ValidationError, ValidationInfo, field_validator
 
 from catalogs.channel_maps.conditions import Conditions, find_condition_problems
+from catalogs.channel_maps.text_files import CsvEntry
 from catalogs.channel_maps.tolerances import Tolerances
 from catalogs.documents import read_yaml
 from catalogs.entries import find_entry
@@ -53,15 +54,20 @@ class GainEntry(CatalogueEntry):
 
 
 class ChannelEntry(CatalogueEntry):
-    """Where one channel comes from; the meanings are given by ``ChannelRule``."""
+    """Where one channel comes from; the meanings are given by ``ChannelRule``.
+
+    Without ``unit`` the file's is taken. ``values`` says for what number a logged text or number stands, None for no
+    value.
+    """
 
     source: Text | Annotated[tuple[Text, ...], Field(min_length=1)]
-    unit: Text
+    unit: Text | None = None
     sign: Literal[1, -1] = 1
     scale: Factor = 1.0
     offset: Number = 0.0
     delay_s: Annotated[Number, AfterValidator(_check_delay)] = 0.0
     gain: GainEntry | None = None
+    values: dict[str, Number | None] = Field(default_factory=dict)
     note: str = ""
 
     def rule(self, channel: str) -> ChannelRule:
@@ -69,9 +75,9 @@ class ChannelEntry(CatalogueEntry):
         sources = (self.source,) if isinstance(self.source, str) else self.source
         gain = None
         if self.gain is not None:
-            gain = Gain(value=self.gain.value, source_unit=self.unit, target_unit=self.gain.unit)
+            gain = Gain(value=self.gain.value, source_unit=self.unit or "", target_unit=self.gain.unit)
         return ChannelRule(
-            channel=channel, sources=sources, unit=self.unit, sign=self.sign, scale=self.scale,
+            channel=channel, sources=sources, unit=self.unit or "", sign=self.sign, scale=self.scale,
             offset=self.offset, delay=self.delay_s, gain=gain,
         )  # fmt: skip
 
@@ -126,15 +132,6 @@ class SegmentEntry(CatalogueEntry):
     held_out_every: Annotated[int, Field(strict=True, ge=2)]
 
 
-class CsvEntry(CatalogueEntry):
-    """How text files are written: rows above the names, and whether a row of units stands below them."""
-
-    separator: Text = ","
-    decimal: Literal[".", ","] = "."
-    skip_rows: Annotated[int, Field(strict=True, ge=0)] = 0
-    units_row: Annotated[bool, Field(strict=True)] = False
-
-
 class ChannelMap(CatalogueEntry):
     """Content of a channel map file. Without ``runs`` and ``segment`` every file is one run."""
 
@@ -158,6 +155,15 @@ class ChannelMap(CatalogueEntry):
         """The channels for the science floor, in the map's order."""
         return tuple(entry.rule(name) for name, entry in self.channels.items())
 
+    def meanings_of(self, signal: str) -> dict[str, float | None]:
+        """Return for what number each text or number of a signal stands, None for no value."""
+        return {
+            word: number
+            for channel, entry in self.channels.items()
+            if signal in entry.rule(channel).sources
+            for word, number in entry.values.items()
+        }
+
     def conditions_of(self, run: RunEntry) -> Conditions:
         """The common conditions with the run's own laid over them."""
         return _lay_over(self.conditions, run)
@@ -167,7 +173,7 @@ class ChannelMap(CatalogueEntry):
     def _channels_exist_in_their_unit(cls, channels: dict[str, ChannelEntry]) -> dict[str, ChannelEntry]:
         problems = _unknown_channels(channels)
         for name, entry in channels.items():
-            if name in CHANNELS_BY_NAME:
+            if name in CHANNELS_BY_NAME and entry.unit is not None:
                 try:
                     _ = entry.rule(name).factor
                 except InputError as error:

@@ -25,6 +25,7 @@ from catalogs.recordings.forms import (
     SignalSummary,
     describe_missing,
     import_package,
+    number_names,
     signal_names,
 )
 from catalogs.sentences import shorten
@@ -70,7 +71,7 @@ def read_bag(path: Path, channel_map: ChannelMap) -> dict[str, Signal]:
     names = signal_names(channel_map)
     columns = {name: (array("d"), array("d")) for name in names}
     with _open_readers(path) as readers:
-        topics = {connection.topic for reader in readers for connection in reader.connections}
+        topics = {name for reader in readers for pair in _number_writers(reader).values() for name in pair}
         wanted = _group_by_topic(names, topics)
         for sample in _decode_messages(path, readers, wanted):
             for name, steps in wanted[sample.topic]:
@@ -84,7 +85,8 @@ def read_bag(path: Path, channel_map: ChannelMap) -> dict[str, Signal]:
                         )
         found = [name for name, (_, values) in columns.items() if values]
         if len(found) < len(names):
-            raise InputError(describe_missing(path, names, found, _list_first_names(path, readers, topics)))
+            plain = {connection.topic for reader in readers for connection in reader.connections}
+            raise InputError(describe_missing(path, names, found, _list_first_names(path, readers, plain)))
     return {
         name: Signal(time=np.array(times), values=np.array(values))
         for name, (times, values) in columns.items()
@@ -184,8 +186,9 @@ def _decode_messages(path: Path, readers: list[Any], topics: Collection[str] | N
     stamped: dict[str, bool] = {}
     for reader in readers:
         kept = []
+        writers, turns = _number_writers(reader), dict[str, list[int]]()
         for connection in reader.connections:
-            if topics is not None and connection.topic not in topics:
+            if topics is not None and not {*writers[connection.id]} & {*topics}:
                 continue
             key = connection.msgtype, connection.msgdef
             if key not in stores:
@@ -198,13 +201,32 @@ def _decode_messages(path: Path, readers: list[Any], topics: Collection[str] | N
                     " nor ROS 2 defines: convert the bag to MCAP where the type is known"
                 )
         for connection, log_time, content in reader.messages(connections=kept) if kept else ():
+            topic, numbered = writers[connection.id]
+            if topics is not None and topic not in topics:
+                topic = numbered
+            order = turns.setdefault(topic, [])
+            if topics is not None and connection.id in order[:-1]:
+                raise InputError(
+                    f"{path.name}: topic {topic} is written by several publishers in turns: name one of them in the"
+                    f" source, as {numbered}"
+                )
+            order += [] if order[-1:] == [connection.id] else [connection.id]
             store = stores[connection.msgtype, connection.msgdef]
             decode = store.deserialize_ros1 if path.suffix.lower() == ".bag" else store.deserialize_cdr
             message = decode(content, connection.msgtype)
             stamp = _read_stamp(message)
             # a driver that does not fill in the header leaves a stamp of 0
-            time = stamp if stamped.setdefault(connection.topic, bool(stamp)) else log_time
-            yield _Sample(topic=connection.topic, time=(time - start) * 1e-9, message=message, store=store)
+            time = stamp if stamped.setdefault(topic, bool(stamp)) else log_time
+            yield _Sample(topic=topic, time=(time - start) * 1e-9, message=message, store=store)
+
+
+def _number_writers(reader: Any) -> dict[int, tuple[str, str]]:
+    """Return the topic of each connection by its id, and its name where several publishers have it: /topic#2."""
+    connections = list(reader.connections)
+    names = number_names([connection.topic for connection in connections])
+    return {
+        connection.id: (connection.topic, name) for connection, name in zip(connections, names, strict=True)
+    }
 
 
 def _read_stamp(message: Any) -> int:

@@ -1,10 +1,11 @@
-"""Signals as A2D2 stores a car's bus: JSON with a unit and [time, value] pairs for each name."""
+"""Signals of a car's bus in JSON: as A2D2 has them, a unit and [time, value] pairs for each name, or as nuScenes."""
 
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from catalogs.campaign_files import find_name_bounds
 from catalogs.channel_maps import ChannelMap
 from catalogs.documents import parse_json, read_content
 from catalogs.recordings.forms import (
@@ -15,6 +16,7 @@ from catalogs.recordings.forms import (
     signal_names,
     summarise_signal,
 )
+from catalogs.recordings.nuscenes_bus import is_list_of_messages, read_scene, summarise_scene
 from tasks.campaign.signals import Signal
 from tasks.campaign.time_of_day import convert_to_seconds
 from tasks.errors import InputError
@@ -29,6 +31,8 @@ def read_bus(path: Path, channel_map: ChannelMap) -> dict[str, Signal]:
         With one sentence per problem.
     """
     content, names = _load_content(path), signal_names(channel_map)
+    if not isinstance(content, dict):
+        return read_scene(path, channel_map)
     problems = describe_missing(path, names, content, content)
     found = {
         name: _take_signal(content[name], _find_time_unit(channel_map)) for name in names if name in content
@@ -51,20 +55,28 @@ def summarise_bus(path: Path, channel_map: ChannelMap | None) -> list[SignalSumm
     InputError
         If the file cannot be read.
     """
-    time_unit = _find_time_unit(channel_map)
+    time_unit, content = _find_time_unit(channel_map), _load_content(path)
+    if not isinstance(content, dict):
+        return summarise_scene(path, channel_map)
     return [
         summarise_signal(name, signal)
-        for name, entry in _load_content(path).items()
+        for name, entry in content.items()
         if (signal := _take_signal(entry, time_unit)) is not None
     ]
 
 
-def _load_content(path: Path) -> dict[str, Any]:
+def _load_content(path: Path) -> dict[str, Any] | list[Any]:
+    """Return a table of signals, or a list of messages as nuScenes has them."""
     content = parse_json(
         read_content(path, "recording", LARGEST_FILE), path, "recording", large_integers=True
     )
-    if not isinstance(content, dict):
-        raise InputError(f"{path}: must be a table of signals, each with values of [time, value]")
+    if not isinstance(content, dict) and not is_list_of_messages(content):
+        raise InputError(
+            f"{path}: must be a table of signals, each with values of [time, value], or a list of messages, each with"
+            " its utime"
+        )
+    if isinstance(content, dict) and (problems := find_name_bounds(list(content), path.name)):
+        raise InputError(problems)
     return content
 
 

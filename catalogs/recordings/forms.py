@@ -1,6 +1,7 @@
 """Helpers shared by the readers of all forms: names, clocks, summaries, limits and optional packages."""
 
-from collections.abc import Callable, Collection, Iterable
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from importlib import import_module
@@ -12,9 +13,10 @@ from numpy.typing import NDArray
 
 from catalogs.channel_maps import ChannelMap, TimeEntry
 from catalogs.sentences import shorten
-from tasks.campaign.channels import ALIASES, UNITS
+from tasks.campaign.channels import UNITS
 from tasks.campaign.signals import Signal
-from tasks.campaign.time_of_day import TIME_OF_DAY, convert_to_seconds, has_digits_of_day
+from tasks.campaign.stated_units import parse_unit, read_unit_of_name
+from tasks.campaign.time_of_day import TIME_OF_DAY, has_digits_of_day
 from tasks.errors import InputError
 
 LARGEST_FILE = 2**30
@@ -83,7 +85,7 @@ def require_clock(path: Path, channel_map: ChannelMap) -> TimeEntry:
     return channel_map.time
 
 
-def describe_clock_unit(path: Path, clock: TimeEntry, stated: str, stamps: NDArray[np.float64]) -> str:
+def find_clock_problem(path: Path, clock: TimeEntry, stated: str, stamps: NDArray[np.float64] | None) -> str:
     """Return the problem of a clock whose unit in the map is not that of the file; empty if there is none.
 
     Parameters
@@ -91,34 +93,36 @@ def describe_clock_unit(path: Path, clock: TimeEntry, stated: str, stamps: NDArr
     path : of the recording
     clock : from the channel map
     stated : unit that the file states; empty if it states none
-    stamps : float64 [N] [the clock's unit]
+    stamps : float64 [N] [the clock's unit]; None where the file has dates
     """
     if clock.unit == TIME_OF_DAY:
-        if has_digits_of_day(stamps):
+        if stamps is None or has_digits_of_day(stamps):
             return ""
         return (
             f"{path.name}: clock {clock.source} must be in {TIME_OF_DAY}, with minutes and seconds below 60; it reads"
             f" {np.nanmin(stamps):g} to {np.nanmax(stamps):g}: correct its unit in the map"
         )
-    unit = ALIASES.get(stated, stated)
-    if UNITS.get(unit, ("",))[0] != "time" or unit == clock.unit:
-        return ""
-    return f"{path.name}: clock {clock.source} is in {unit} by its file, in {clock.unit} by the map: correct the map"
+    for unit in (parse_unit(stated), read_unit_of_name(clock.source, "time")):
+        if unit and UNITS[unit][0] == "time" and unit != clock.unit and stamps is not None:
+            return (
+                f"{path.name}: clock {clock.source} is in {unit} by its file, in {clock.unit} by the map: correct the"
+                " map"
+            )
+    return ""
 
 
 def sample_column(
-    stamps: NDArray[np.float64], values: NDArray[np.float64], clock: TimeEntry, unit: str = ""
+    time: NDArray[np.float64], values: NDArray[np.float64], clock: TimeEntry, unit: str = ""
 ) -> Signal:
     """Return a column on its clock, without the rows that hold no time or no value.
 
     Parameters
     ----------
-    stamps : float64 [N] [the clock's unit]
+    time : float64 [N] [s]
     values : float64 [N] [unit]; NaN where a table of several rates has no sample
     clock : from the channel map
     unit : unit that the file states
     """
-    time = convert_to_seconds(stamps, clock.unit)
     usable = np.isfinite(time) & ~np.isnan(values)
     time, values = time[usable], values[usable]
     if clock.repeats == "keep_first":
@@ -151,6 +155,38 @@ def summarise_signal(name: str, signal: Signal, note: str = "") -> SignalSummary
         lowest=float(finite.min()) if len(finite) else None,
         highest=float(finite.max()) if len(finite) else None,
         note=note,
+    )
+
+
+def number_names(names: Sequence[str]) -> list[str]:
+    """Return names by which a map takes columns: as they stand, and numbered, such as speed#2, where one stands twice.
+
+    Parameters
+    ----------
+    names : of all columns
+    """
+    seen: dict[str, int] = {}
+    numbered = []
+    twice = {name for name, count in Counter(names).items() if count > 1}
+    for name in names:
+        seen[name] = seen.get(name, 0) + 1
+        numbered.append(f"{name}#{seen[name]}" if name in twice else name)
+    return numbered
+
+
+def describe_twice(path: Path, name: str, choices: Mapping[str, str]) -> str:
+    """Return the problem of a name that several columns have, with the name of each in a map.
+
+    Parameters
+    ----------
+    path : of the recording
+    name : in the map
+    choices : name by which a map takes a column, and where it stands; two or more
+    """
+    places = ", ".join(f"{choice} ({where})" if where else choice for choice, where in choices.items())
+    return (
+        f"{path.name}: signal {shorten(name, 60)} stands {len(choices)} times: name one of them as its source, which"
+        f" are {shorten(places)}"
     )
 
 

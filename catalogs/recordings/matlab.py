@@ -28,6 +28,7 @@ from catalogs.recordings.matlab_v5 import load_v5_variables
 from catalogs.recordings.matlab_values import Array, Refused, Struct
 from catalogs.sentences import shorten
 from tasks.campaign.signals import Signal
+from tasks.campaign.time_of_day import convert_to_seconds
 from tasks.errors import InputError
 
 UNIT_NAMES = ("Units", "units", "Unit", "unit")
@@ -95,7 +96,9 @@ def read_matlab(path: Path, channel_map: ChannelMap) -> dict[str, Signal]:
                     problems.append(stamps)
                 else:
                     column = columns[name]
-                    signals[name] = sample_column(stamps.read(), column.read(), clock, column.unit)
+                    signals[name] = sample_column(
+                        convert_to_seconds(stamps.read(), clock.unit), column.read(), clock, column.unit
+                    )
     if problems:
         raise InputError(problems)
     return signals
@@ -115,7 +118,9 @@ def summarise_matlab(path: Path, channel_map: ChannelMap | None) -> list[SignalS
         for name, column in _collect_columns(path, variables)[0].items():
             stamps = None if clock is None else _find_clock(path, name, column, clock)
             if clock is not None and isinstance(stamps, Column):
-                signal = sample_column(stamps.read(), column.read(), clock, column.unit)
+                signal = sample_column(
+                    convert_to_seconds(stamps.read(), clock.unit), column.read(), clock, column.unit
+                )
             else:
                 signal = Signal(time=np.empty(0), values=column.read(), unit=column.unit)
             rows.append(summarise_signal(name, signal))

@@ -20,6 +20,8 @@ from catalogs.recordings.matlab_values import (
     spread_elements,
     squeeze_shape,
 )
+from catalogs.sentences import shorten
+from tasks.errors import InputError
 
 
 def load_v5_variables(content: bytes) -> Struct:
@@ -35,9 +37,14 @@ def load_v5_variables(content: bytes) -> Struct:
         If its elements break the format, or are too large when unpacked.
     """
     check_elements(content, LARGEST_FILE)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # names that stand twice, and objects, which are refused below
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
         loaded = loadmat(io.BytesIO(content), struct_as_record=False, squeeze_me=False, chars_as_strings=True)
+    twice = [str(warning.message) for warning in told if "Duplicate variable name" in str(warning.message)]
+    if twice:
+        raise InputError(
+            f"must have distinct variables; {shorten(twice[0].split(' in stream')[0])}: save each under its own name"
+        )
     return spread_elements(
         (name, _convert_value(value, 0)) for name, value in loaded.items() if not name.startswith("__")
     )

@@ -1,237 +1,270 @@
 """Recordings as tables: CSV and Parquet, a column for each signal and one for the clock."""
 
-import io
-import json
-import re
-import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from catalogs.campaign_files import parse_columns
-from catalogs.channel_maps import ChannelMap, CsvEntry
+from catalogs.campaign_files import open_parquet, read_unit
+from catalogs.channel_maps import ChannelMap, CsvEntry, TimeEntry
 from catalogs.documents import read_content
+from catalogs.recordings.columns import Spelling, convert_values, make_series, read_clock, replace_numbers
 from catalogs.recordings.forms import (
     LARGEST_FILE,
     Form,
     SignalSummary,
-    describe_clock_unit,
     describe_missing,
+    describe_twice,
+    find_clock_problem,
+    number_names,
     require_clock,
     sample_column,
     signal_names,
     summarise_signal,
 )
-from catalogs.sentences import shorten, shorten_value
+from catalogs.recordings.text_rows import find_row_of_names, read_text_table
+from catalogs.sentences import shorten_value
+from tasks.campaign.clocks import describe_restarts
 from tasks.campaign.signals import Signal
+from tasks.campaign.stated_units import parse_unit
 from tasks.errors import InputError
 
 Columns = dict[str, NDArray[np.float64]]
-Take = Callable[[Path, tuple[str, ...], CsvEntry], tuple[Columns, dict[str, str]]]
-ListColumns = Callable[[Path, CsvEntry], tuple[Columns, dict[str, str], dict[str, str]]]
-SEPARATORS = (";", ",", "\t", "|")
-UNITS_REMEDY = "give csv: {units_row: true} in the map"
-NUMBER = re.compile(r"[+-]?\d*[.,]?\d+([eE][+-]?\d+)?")
-DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 
 
-def _read_with(take: Take) -> Callable[[Path, ChannelMap], dict[str, Signal]]:
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """A file of columns.
+
+    Parameters
+    ----------
+    path : of the file
+    names : of all columns, by which a map takes them
+    load : returns columns by name, or why one cannot be of numbers; its rows are numbered below the names
+    units : that the file states, by name
+    places : where a column stands, and what is written with its name, by name
+    csv : how text is written; None of a file that is no text
+    """
+
+    path: Path
+    names: list[str]
+    load: Callable[[Iterable[str]], Mapping[str, pd.Series | str]]
+    units: Mapping[str, str]
+    places: Mapping[str, str] = field(default_factory=dict)
+    csv: CsvEntry | None = None
+
+    def spell(self, channel_map: ChannelMap | None, name: str) -> Spelling:
+        """Return how a column writes its values."""
+        meanings = {} if channel_map is None else channel_map.meanings_of(name)
+        if self.csv is None:
+            return Spelling(meanings=meanings)
+        return Spelling(
+            meanings=self.missing | meanings, decimal=self.csv.decimal, thousands=self.csv.thousands
+        )
+
+    @property
+    def missing(self) -> dict[str, float | None]:
+        """What stands for no value in every column but the clock's."""
+        return {} if self.csv is None else {str(word): None for word in self.csv.missing}
+
+
+Open = Callable[[Path, CsvEntry], Table]
+
+
+def _read_with(open_table: Open) -> Callable[[Path, ChannelMap], dict[str, Signal]]:
     def read(path: Path, channel_map: ChannelMap) -> dict[str, Signal]:
         clock, names = require_clock(path, channel_map), signal_names(channel_map)
-        columns, units = take(path, tuple(dict.fromkeys((clock.source, *names))), channel_map.csv)
-        stamps = columns[clock.source]
-        if problem := describe_clock_unit(path, clock, units.get(clock.source, ""), stamps):
-            raise InputError(problem)
-        return {name: sample_column(stamps, columns[name], clock, units.get(name, "")) for name in names}
+        table = open_table(path, channel_map.csv)
+        wanted = tuple(dict.fromkeys((clock.source, *names)))
+        if problems := _find_name_problems(table, wanted):
+            raise InputError(problems)
+        series = table.load(wanted)
+        columns, notes = _convert_columns(table, names, series, channel_map)
+        problems = [f"{path.name}: signal {name} must be of numbers; {note}" for name, note in notes.items()]
+        try:
+            time = _read_times(table, clock, series[clock.source])
+        except InputError as error:
+            time, problems = np.full(0, np.nan), [*error.problems, *problems]
+        if problems:
+            told = _describe_rows_of_text(table, series, [time, *columns.values()])
+            raise InputError(told or problems)
+        if restarts := describe_restarts(
+            time, table_row=1 + len(channel_map.csv.rows_below) * bool(table.csv)
+        ):
+            raise InputError(f"{path.name}: clock {clock.source} {restarts}")
+        return {
+            name: sample_column(time, values, clock, table.units.get(name, ""))
+            for name, values in columns.items()
+        }
 
     return read
 
 
-def _summarise_with(take_all: ListColumns) -> Callable[[Path, ChannelMap | None], list[SignalSummary]]:
+def _summarise_with(open_table: Open) -> Callable[[Path, ChannelMap | None], list[SignalSummary]]:
     def summarise(path: Path, channel_map: ChannelMap | None) -> list[SignalSummary]:
-        columns, units, notes = take_all(path, CsvEntry() if channel_map is None else channel_map.csv)
+        table = open_table(path, CsvEntry() if channel_map is None else channel_map.csv)
+        series = table.load(table.names)
+        columns, notes = _convert_columns(table, table.names, series, channel_map)
         clock = None if channel_map is None else channel_map.time
+        time = None
+        if clock is not None and clock.source in series:
+            try:
+                time = _read_times(table, clock, series[clock.source])
+                columns[clock.source] = time if clock.source in notes else columns[clock.source]
+                notes.pop(clock.source, None)
+            except InputError as error:
+                notes[clock.source] = error.problems[0]
         rows = []
         for name, values in columns.items():
-            if clock is None or clock.source not in columns:
-                signal = Signal(time=np.empty(0), values=values, unit=units.get(name, ""))
+            unit = table.units.get(name, "")
+            if clock is None or time is None:
+                signal = Signal(time=np.empty(0), values=values, unit=unit)
             else:
-                signal = sample_column(columns[clock.source], values, clock, units.get(name, ""))
+                signal = sample_column(time, values, clock, unit)
             rows.append(summarise_signal(name, signal, notes.get(name, "")))
         return rows
 
     return summarise
 
 
-def _take_parquet(path: Path, wanted: tuple[str, ...], _: CsvEntry) -> tuple[Columns, dict[str, str]]:
-    content = read_content(path, "recording", LARGEST_FILE)
-    columns, units = parse_columns(content, path.name, wanted)
-    if problems := describe_missing(path, wanted, columns, pq.read_schema(pa.BufferReader(content)).names):
-        raise InputError(problems)
-    return columns, units
+def _find_name_problems(table: Table, wanted: tuple[str, ...]) -> list[str]:
+    """Return the problems of names that a table does not have, or has twice."""
+    missing = [name for name in wanted if name not in table.names]
+    problems = []
+    for name in list(missing):
+        if twice := [known for known in table.names if known.rpartition("#")[0] == name]:
+            missing.remove(name)
+            problems.append(describe_twice(table.path, name, {k: table.places.get(k, "") for k in twice}))
+    if missing:
+        plain = tuple(name.split("#")[0] for name in wanted)
+        row = None if table.csv is None else find_row_of_names(table.path, table.csv, plain)
+        if row is not None and table.csv is not None and row != table.csv.skip_rows:
+            return [
+                f"{table.path.name}: the names of the signals stand in row {row + 1}: give csv: {{skip_rows: {row}}} in"
+                " the map"
+            ]
+        problems += describe_missing(table.path, tuple(missing), table.names, table.names)
+    return problems
 
 
-def _take_all_parquet(path: Path, _: CsvEntry) -> tuple[Columns, dict[str, str], dict[str, str]]:
-    content = read_content(path, "recording", LARGEST_FILE)
-    try:
-        schema = pq.read_schema(pa.BufferReader(content))
-    except (pa.ArrowException, OSError, ValueError) as error:
-        raise InputError(f"{path.name} must be a Parquet file of numbers; {shorten(error)}") from None
-    numbers = {f.name for f in schema if pa.types.is_integer(f.type) or pa.types.is_floating(f.type)}
-    columns, units = parse_columns(content, path.name, numbers)
-    notes = {f.name: f"not of numbers, but of {f.type}" for f in schema if f.name not in numbers}
-    rows = pq.read_metadata(pa.BufferReader(content)).num_rows
-    return columns | {name: np.full(rows, np.nan) for name in notes}, units, notes
+def _convert_columns(
+    table: Table, names: Iterable[str], series: Mapping[str, pd.Series | str], channel_map: ChannelMap | None
+) -> tuple[Columns, dict[str, str]]:
+    """Return columns as numbers, and why some are none."""
+    columns, notes = Columns(), dict[str, str]()
+    rows = max((len(column) for column in series.values() if not isinstance(column, str)), default=0)
+    for name in names:
+        column, spelling = series[name], table.spell(channel_map, name)
+        if isinstance(column, str):
+            columns[name], notes[name] = np.full(rows, np.nan), column
+            continue
+        values, note = convert_values(column, spelling)
+        columns[name] = replace_numbers(values, table.missing)
+        if note:
+            notes[name] = note
+    return columns, notes
 
 
-def _find_encoding(path: Path, content: bytes) -> str:
-    """Return how a text is written: UTF-8, else Latin-1, in which loggers write the signs of degree and square.
-
-    Raises
-    ------
-    InputError
-        If it holds zero bytes, as UTF-16 does, and files that are no text.
-    """
-    if b"\0" in content:
-        raise InputError(f"{path}: must be UTF-8 or Latin-1 text; it holds zero bytes: save it as UTF-8")
-    try:
-        content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return "latin-1"
-    return "utf-8-sig"
+def _read_times(table: Table, clock: TimeEntry, column: pd.Series | str) -> NDArray[np.float64]:
+    """Return the times of a table's rows, NaN where one holds none, float64 [N] [s]."""
+    if isinstance(column, str):
+        raise InputError(
+            f"{table.path.name}: clock {clock.source} must be of numbers, dates or times; {column}"
+        )
+    spelling = table.spell(None, clock.source)
+    values, note = convert_values(column, spelling)
+    stated = table.units.get(clock.source, "")
+    if problem := find_clock_problem(table.path, clock, stated, None if note else values):
+        raise InputError(problem)
+    return read_clock(table.path.name, clock, column, spelling)
 
 
-def _load_frame(path: Path, options: CsvEntry) -> tuple[pd.DataFrame, list[str]]:
-    """Return a table below its names, and the unit of each column, none without a row of units."""
-    content = read_content(path, "recording", LARGEST_FILE)
-    encoding = _find_encoding(path, content)
-    filled = (
-        (number, line)
-        for number, line in enumerate(io.BytesIO(content))
-        if number >= options.skip_rows and line.strip()
+def _describe_rows_of_text(
+    table: Table, series: Mapping[str, pd.Series | str], columns: list[NDArray[np.float64]]
+) -> str:
+    """Return what to declare where the first rows hold a number in no column, and later ones do; empty elsewhere."""
+    known = np.any([np.isfinite(values) for values in columns if len(values)], axis=0)
+    first = int(np.argmax(known)) if np.ndim(known) and known.any() else 0
+    if not first or table.csv is None:
+        return ""
+    kinds = list(table.csv.rows_below)
+    shown = []
+    for row in range(first):
+        cells = [str(column.iloc[row]) for column in series.values() if not isinstance(column, str)]
+        cells = [cell for cell in cells if cell not in ("nan", "None", "")]
+        shown.append(", ".join(shorten_value(cell) for cell in cells))
+        kinds.append(
+            "units" if "units" not in kinds and any(parse_unit(cell) for cell in cells) else "sources"
+        )
+    remedy = "units_row: true" if kinds == ["units"] else f"below_names: [{', '.join(kinds)}]"
+    instead = (
+        f" in place of {'units_row' if table.csv.units_row else 'what it says'}"
+        if table.csv.rows_below
+        else ""
     )
-    names = next(filled, (0, b""))[1].decode(encoding, "replace").strip()
-    found = [separator for separator in SEPARATORS if separator in names]
-    if found and len(options.separator) == 1 and options.separator not in names:
-        raise InputError(
-            f"{path}: names of signals must be separated by {shorten_value(options.separator)}; the first line is"
-            f" {shorten_value(names)}: give csv: {{separator: {json.dumps(found[0])}}} in the map"
-        )
-    skipped: int | list[int] = options.skip_rows
-    row = next(filled, None) if options.units_row else None
-    if row is not None:
-        skipped = [*range(options.skip_rows), row[0]]
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", pd.errors.ParserWarning)
-            frame = pd.read_csv(
-                io.BytesIO(content),
-                sep=options.separator,
-                decimal=options.decimal,
-                skiprows=skipped,
-                encoding=encoding,
-                index_col=False,  # else rows that end in a separator move every value to its neighbour's name
-            )
-    except pd.errors.ParserWarning:
-        raise InputError(
-            f"{path}: rows must have a name for each value; they have more values than the first line has names:"
-            " add the missing names"
-        ) from None
-    except (ValueError, TypeError, OverflowError, re.error) as error:
-        raise InputError(f"{path}: must be a table of text; {shorten(error)}") from None
-    return frame, [] if row is None else _split_units(path, row[1].decode(encoding), options)
+    looks = (
+        "looks like a row of units"
+        if kinds[-first:] == ["units"]
+        else f"looks like {' and '.join(kinds[-first:])}"
+    )
+    number = 1 + len(table.csv.rows_below)
+    return (
+        f"{table.path.name}: row {number} below the names must hold numbers; it holds {shown[0]}, which {looks}:"
+        f" give csv: {{{remedy}}} in the map{instead}"
+    )
 
 
-def _split_units(path: Path, row: str, options: CsvEntry) -> list[str]:
-    """Return the units of a row, without brackets.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, or holds numbers, and so is a row of samples.
-    """
-    try:
-        cells = pd.read_csv(
-            io.StringIO(row), sep=options.separator, header=None, dtype=str, keep_default_na=False
-        )
-    except pd.errors.ParserError as error:
-        raise InputError(f"{path}: the row of units must be a row of text; {shorten(error)}") from None
-    units = [str(cell).strip().strip("[]()") for cell in cells.iloc[0]]
-    if any(NUMBER.fullmatch(unit) and unit != "1" for unit in units):
-        raise InputError(
-            f"{path}: with csv: {{units_row: true}} the row below the names must hold units; it is"
-            f" {shorten_value(row.strip())}: leave units_row away"
-        )
-    return units
+def _open_csv(path: Path, options: CsvEntry) -> Table:
+    text = read_text_table(path, options)
+    written = [name or f"column {k + 1}" for k, name in enumerate(text.names)]
+    names = number_names(written)
+    cells = [[row[k] for row in text.below if k < len(row) and row[k]] for k in range(len(names))]
+    units = [
+        row[k].strip("[]()") if k < len(row) else ""
+        for row, kind in zip(text.below, options.rows_below, strict=True)
+        if kind == "units"
+        for k in range(len(names))
+    ]
+    return Table(
+        path=path,
+        names=names,
+        load=lambda wanted: {name: text.samples[names.index(name)] for name in wanted},
+        units=dict(zip(names, units, strict=False)),
+        places={n: ", ".join([f"column {k + 1}", *cells[k]]) for k, n in enumerate(names)},
+        csv=options,
+    )
 
 
-def _take_csv(path: Path, wanted: tuple[str, ...], options: CsvEntry) -> tuple[Columns, dict[str, str]]:
-    frame, units = _load_frame(path, options)
-    names = [str(name).strip() for name in frame.columns]
-    problems = describe_missing(path, wanted, names, names)
-    columns: Columns = {}
-    notes: dict[str, str] = {}
-    for name in wanted:
-        if names.count(name) > 1:
-            problems.append(
-                f"{path.name}: signal {name} must stand once; {names.count(name)} columns have its name"
-            )
-        elif name in names:
-            columns[name], notes[name] = _convert_column(frame.iloc[:, names.index(name)])
-    if any(notes.values()) and _is_first_row_of_units(columns):
-        first = ", ".join(
-            shorten_value(str(frame.iloc[0, names.index(name)])) for name in columns if notes[name]
-        )
-        problems.append(
-            f"{path.name}: row 1 below the names must hold numbers; it holds {first}, which looks like a row of units:"
-            f" {UNITS_REMEDY}"
-        )
-    else:
-        problems += [
-            f"{path.name}: signal {name} must be of numbers; {note}" for name, note in notes.items() if note
-        ]
-    if problems:
-        raise InputError(problems)
-    return columns, dict(zip(names, units, strict=False))
+def _open_parquet(path: Path, _: CsvEntry) -> Table:
+    content = read_content(path, "recording", LARGEST_FILE)
+    with open_parquet(content, path.name) as parquet:
+        fields = list(parquet.schema_arrow)
+    names = number_names([column.name for column in fields])
+
+    def load(wanted: Iterable[str]) -> dict[str, pd.Series | str]:
+        places = [names.index(name) for name in wanted]
+        with open_parquet(content, path.name) as parquet:
+            table = parquet.read(columns=list({fields[k].name for k in places}), use_threads=False)
+            read = dict(zip(number_names(table.column_names), table.columns, strict=True))
+            columns = {names[k]: make_series(read[names[k]]) for k in places}
+        return {
+            name: f"it is of {fields[names.index(name)].type}"
+            if column is None
+            else column.set_axis(range(1, len(column) + 1))
+            for name, column in columns.items()
+        }
+
+    return Table(
+        path=path,
+        names=names,
+        load=load,
+        units={name: read_unit(column) or "" for name, column in zip(names, fields, strict=True)},
+        places={name: f"column {k + 1}, {fields[k].type}" for k, name in enumerate(names)},
+    )
 
 
-def _is_first_row_of_units(columns: Columns) -> bool:
-    """Return whether the first row has a number in no column, while later rows have some."""
-    table = np.isfinite(np.column_stack(list(columns.values())))
-    return not table[:1].any() and bool(table[1:].any())
-
-
-def _take_all_csv(path: Path, options: CsvEntry) -> tuple[Columns, dict[str, str], dict[str, str]]:
-    frame, units = _load_frame(path, options)
-    read = {str(name).strip(): _convert_column(frame.iloc[:, k]) for k, name in enumerate(frame.columns)}
-    notes = {name: note for name, (_, note) in read.items() if note}
-    columns = {name: values for name, (values, _) in read.items()}
-    return columns, dict(zip(read, units, strict=False)), notes
-
-
-def _convert_column(column: pd.Series) -> tuple[NDArray[np.float64], str]:
-    """Return a column as numbers, NaN in place of text; and its first text with what to do, empty if there is none."""
-    try:
-        return np.asarray(column, dtype=np.float64), ""
-    except (TypeError, ValueError):
-        values = pd.to_numeric(column, errors="coerce").to_numpy(np.float64)
-    wrong = np.isnan(values) & column.notna().to_numpy()
-    row, text = int(np.argmax(wrong)), str(column.iloc[int(np.argmax(wrong))])
-    if DECIMAL_COMMA.fullmatch(text.strip()):
-        remedy = "give csv: {decimal: ','} in the map"
-    elif re.search(r"\d[:-]\d", text):
-        remedy = "write times as a number of seconds"
-    elif row == 0 and np.count_nonzero(wrong) == 1:
-        remedy = f"if this is a row of units, {UNITS_REMEDY}; else correct it"
-    else:
-        remedy = "correct it, or leave it empty"
-    return values, f"row {row + 1} below the names has {shorten_value(text)}: {remedy}"
-
-
-CSV = Form(read=_read_with(_take_csv), summarise=_summarise_with(_take_all_csv))
-PARQUET = Form(read=_read_with(_take_parquet), summarise=_summarise_with(_take_all_parquet))
+CSV = Form(read=_read_with(_open_csv), summarise=_summarise_with(_open_csv))
+PARQUET = Form(read=_read_with(_open_parquet), summarise=_summarise_with(_open_parquet))

@@ -33,7 +33,8 @@ COMMANDS = (
             define_argument(
                 "source",
                 str,
-                "CSV, Parquet, MDF4, MATLAB, ROS bag, MCAP or bus-JSON file, ROS 2 bag folder, or a folder of them.",
+                "CSV, Parquet, MDF4, MATLAB, VBOX, ROS bag, MCAP or bus-JSON file, folder of a ROS 2 bag or a KITTI"
+                " drive, or a folder of them.",
             ),
             define_option(
                 "map",
@@ -51,6 +52,7 @@ COMMANDS = (
             ),
         ),
         brief=shorten_import,
+        passed=lambda result: not result.get("faulty"),
     ),
     Command(
         name="brake-protocol",

@@ -3,10 +3,8 @@
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
-from catalogs.campaign_files import find_unit_problems, parse_columns
+from catalogs.campaign_files import find_unit_problems, open_parquet, parse_columns
 from catalogs.documents import read_content
 from catalogs.sentences import shorten
 from tasks.errors import InputError
@@ -39,7 +37,8 @@ def read_claim(path: Path) -> VideoClaim:
     problems = find_unit_problems(units, CLAIMED, str(path))
     lacks = [name for name, wanted in NEEDED.items() if not columns.keys() & wanted]
     if lacks:
-        there = ", ".join(pq.read_schema(pa.BufferReader(content)).names)
+        with open_parquet(content, f"{path}: the claim") as file:
+            there = ", ".join(file.schema_arrow.names)
         problems.append(
             f"{path}: the claim lacks {', '.join(lacks)}; its columns are {shorten(there) or 'none'}."
         )
@@ -63,11 +62,9 @@ def read_claim(path: Path) -> VideoClaim:
 
 def _clip_count(path: Path, content: bytes) -> int:
     """How many clips a claim's rows name; 0 where they name none."""
-    try:
-        if "clip_id" not in pq.read_schema(pa.BufferReader(content)).names:
+    with open_parquet(content, f"{path}: the claim") as file:
+        if "clip_id" not in file.schema_arrow.names:
             return 0
-        # as a dictionary a long name that every row repeats takes its place once
-        with pq.ParquetFile(pa.BufferReader(content), read_dictionary=["clip_id"]) as file:
-            return len(file.read(columns=["clip_id"])["clip_id"].unique())
-    except (pa.ArrowException, OSError, KeyError) as error:
-        raise InputError(f"{path}: the claim's clip_id must be text; {shorten(error)}") from None
+    # as a dictionary a long name that every row repeats takes its place once
+    with open_parquet(content, f"{path}: the claim", read_dictionary=["clip_id"]) as file:
+        return len(file.read(columns=["clip_id"], use_threads=False)["clip_id"].unique())

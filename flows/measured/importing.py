@@ -13,10 +13,11 @@ import yaml
 from catalogs.campaigns import HEAT_COLUMN, SLOPE_COLUMN
 from catalogs.channel_maps import ChannelMap, FaultyMap, load_channel_map
 from catalogs.channel_maps.conditions import Conditions
-from catalogs.recordings import read_signals, recording_files, recording_root, stored_files
+from catalogs.recordings import recording_files, recording_root, stored_files
+from catalogs.recordings.limits import load_recording_limits
 from flows.measured.import_warnings import has_stand_in, list_warnings
+from flows.measured.readable_recordings import find_signal_problems, leave_out_faulty, read_recordings
 from flows.measured.run_plan import PlannedRun, find_run_problems, plan_runs
-from flows.measured.shared_problems import PlacedProblem, join_shared_problems, place_in_file
 from flows.measured.signal_listing import list_recorded_signals
 from flows.store.layout import write_atomically, write_json
 from flows.store.missing import null_missing
@@ -26,9 +27,10 @@ from tasks.campaign.assembly import Assembled, assemble_run
 from tasks.campaign.brake_gain import find_gain_problems
 from tasks.campaign.braking_heat import measure_braking_heat
 from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME
-from tasks.campaign.run_validation import find_motion_problem
+from tasks.campaign.deceleration import find_deceleration_problems
 from tasks.campaign.signals import Signal
 from tasks.campaign.slow_channels import measure_slow_rates
+from tasks.campaign.stated_units import find_unknown_units
 from tasks.campaign.unmapped_slope import estimate_slopes
 from tasks.errors import InputError
 from tasks.surface.weather import DRY
@@ -50,8 +52,8 @@ def import_measurements(
     -------
     Report on what was made: ``campaign``, ``runs[]``, ``channels``, ``slow_channels_hz`` (of the channels slower than
     their runs), ``not_measured``, ``assumed_tolerances_1sigma`` (what the map leaves open), ``sources``, and
-    ``warnings[]`` (what may be wrong, or was left out), ``left_out[]`` (why) where segments are no runs; or
-    ``signals``, a row for each in every recording.
+    ``warnings[]`` (what may be wrong, or was left out), ``left_out[]`` (why) where segments are no runs, or runs and
+    recordings are faulty, and ``faulty[]``, the names of these; or ``signals``, a row for each in every recording.
 
     Raises
     ------
@@ -72,10 +74,13 @@ def import_measurements(
     try:
         channel_map, map_file = load_channel_map(map)
     except FaultyMap as faults:
-        raise InputError([*faults.problems, *_find_signal_problems(Path(source), faults.readable)]) from None
+        raise InputError([*faults.problems, *find_signal_problems(Path(source), faults.readable)]) from None
     root = recording_root(Path(source))
-    recordings = _read_all(recording_files(Path(source), channel_map), channel_map)
-    planned, left_out = plan_runs(channel_map, root, recordings)
+    channel_map, recordings, left_out, lost = read_recordings(
+        recording_files(Path(source), channel_map), channel_map
+    )
+    planned, unused = plan_runs(channel_map, root, recordings)
+    left_out += unused
     if problems := find_run_problems(planned, recordings, channel_map.sample_rate_hz):
         raise InputError(problems)
     made = [
@@ -87,31 +92,26 @@ def import_measurements(
         )
         for run in planned
     ]
-    problems = join_shared_problems(
-        [_place_problem(run, problem) for run, found in made for problem in found.problems],
-        len(made),
-        "runs",
-    )
     interval = 1.0 / channel_map.sample_rate_hz
+    made, faults = leave_out_faulty(made, interval)
+    left_out += faults
+    lost += [run.name for run in planned if run.name not in {kept.name for kept, _ in made}]
     readable = {run.name: found.readable for run, found in made}
+    limit, rules = load_recording_limits().deceleration.value, {r.channel: r for r in channel_map.rules}
+    problems = find_deceleration_problems(
+        readable, interval, limit, rules["speed"].unit if "speed" in rules else "m/s"
+    )
     if not has_stand_in(channel_map):
         slippery = [run.name for run, _ in made if run.conditions.weather != DRY]
         problems += find_gain_problems(readable, interval, slippery=slippery)
-    still = [
-        _place_problem(run, problem)
-        for run, found in made
-        if "speed" in found.readable
-        and (
-            problem := find_motion_problem(
-                found.readable["speed"], interval, run.conditions.hazard_length_m > 0.0
-            )
-        )
-    ]
-    problems += join_shared_problems(still, len(made), "runs")
     if problems:
         raise InputError(problems)
     computed = any(found.computed for _, found in made)
     warnings = list_warnings(channel_map, readable, list(recordings.values()), computed=computed)
+    unknown = [
+        found for signals in recordings.values() for found in find_unknown_units(channel_map.rules, signals)
+    ]
+    warnings += dict.fromkeys(unknown)
     if computed:
         channel_map, made = _leave_out_acceleration(channel_map, made)
     sources = {
@@ -124,6 +124,8 @@ def import_measurements(
         beside["warnings"] = warnings
     if left_out:
         beside["left_out"] = left_out
+    if lost:
+        beside["faulty"] = lost
     heat = _estimate_heat(channel_map, made, recordings)
     return write_campaign(folder, root, channel_map, made, heat, sources, sha256_of_file(map_file), beside)
 
@@ -250,31 +252,3 @@ def run_table(columns: dict[str, np.ndarray], rate: float) -> pa.Table:
     ]
     arrays = [pa.array(np.arange(count) / rate)] + [pa.array(values) for values in columns.values()]
     return null_missing(pa.Table.from_arrays(arrays, schema=pa.schema(fields)))
-
-
-def _find_signal_problems(source: Path, channel_map: ChannelMap | None) -> list[str]:
-    """Faults of the signals that a faulty map names, as far as it can be read."""
-    if channel_map is None:
-        return []
-    try:
-        _read_all(recording_files(source, channel_map), channel_map)
-    except InputError as error:
-        return list(error.problems)
-    return []
-
-
-def _read_all(files: tuple[Path, ...], channel_map: ChannelMap) -> dict[Path, dict[str, Signal]]:
-    recordings: dict[Path, dict[str, Signal]] = {}
-    problems: list[PlacedProblem] = []
-    for file in files:
-        try:
-            recordings[file] = read_signals(file, channel_map)
-        except InputError as error:
-            problems += [place_in_file(file, problem) for problem in error.problems]
-    if problems:
-        raise InputError(join_shared_problems(problems, len(files), "files", exact=True))
-    return recordings
-
-
-def _place_problem(run: PlannedRun, problem: str) -> PlacedProblem:
-    return PlacedProblem(name=run.name, place=f"{run.name} ({run.file.name})", sentence=problem)

@@ -10,10 +10,10 @@ from tasks.campaign.campaign import LEAST_SAMPLES
 from tasks.campaign.channel_validation import (
     DIGITS_OF_DAY,
     find_frozen_problem,
+    find_outliers,
     find_plausibility_problems,
     find_signal_problems,
 )
-from tasks.campaign.channels import ALIASES, UNITS
 from tasks.campaign.dead_sources import find_dead_sources
 from tasks.campaign.derived_acceleration import is_rate_of_speed
 from tasks.campaign.held_inputs import take_samples
@@ -45,6 +45,7 @@ class Assembled:
     readable : channels that can be read, each float64 [N], in campaign units, with values between the
         samples of a slow channel too: for the checks that need all runs
     problems : one sentence each
+    of_map : one of them is told by the channels together, so that the map may be wrong for every run
     computed : the logger computed the acceleration from the speed
     """
 
@@ -52,6 +53,7 @@ class Assembled:
     columns: dict[str, NDArray[np.float64]]
     readable: dict[str, NDArray[np.float64]]
     problems: tuple[str, ...]
+    of_map: bool = False
     computed: bool = False
 
 
@@ -73,11 +75,11 @@ def assemble_run(
         first, last = start + rule.delay, end + rule.delay
         logged = [take_samples(rule.channel, signals[name]).cut_window(first, last) for name in rule.sources]
         for signal in logged:
-            stated = ALIASES.get(signal.unit, signal.unit)
-            if stated in UNITS and stated != rule.unit:
-                found.append((rule.channel, _describe_stated_unit(stated, rule.unit)))
             found += [(rule.channel, problem) for problem in find_signal_problems(signal)]
         parts[rule.channel] = [convert_to_channel(signal, rule) for signal in logged]
+        if rule.gain is None:
+            pairs = zip(logged, parts[rule.channel], strict=True)
+            found += [(rule.channel, told) for pair in pairs for told in find_outliers(rule.channel, *pair)]
         found += [(rule.channel, problem) for problem in find_dead_sources(rule, parts[rule.channel])]
     if not any(problem == DIGITS_OF_DAY for _, problem in found):
         found += _find_frozen_channels(parts)
@@ -103,24 +105,20 @@ def assemble_run(
     units = {rule.channel: rule.unit for rule in rules}
     if any(rule.channel == "brake_pressure" and rule.gain is not None for rule in rules):
         units["brake_pressure"] = "1"  # what stands for it has a scale that nobody knows
-    problems += find_plausibility_problems(whole, 1.0 / rate, units)
-    if problems:
-        return Assembled(start=float(clock[0]), columns={}, readable=whole, problems=tuple(problems))
+    of_map = find_plausibility_problems(whole, 1.0 / rate, units)
+    if problems or of_map:
+        return Assembled(
+            start=float(clock[0]),
+            columns={},
+            readable=whole,
+            problems=(*problems, *of_map),
+            of_map=bool(of_map),
+        )
     cleared = {
         name: clear_between_samples(name, values, usable[name], clock) for name, values in columns.items()
     }
     computed = _is_acceleration_computed(parts, rules)
     return Assembled(start=float(clock[0]), columns=cleared, readable=whole, problems=(), computed=computed)
-
-
-def _describe_stated_unit(stated: str, mapped: str) -> str:
-    """Return the problem of a unit of the map that is not the file's, and what to do where the file's is wrong."""
-    (dimension, size), (wanted, wanted_size) = UNITS[stated], UNITS[mapped]
-    wrong = f"; where the file is wrong, keep its unit and give scale: {wanted_size / size:.6g}"
-    return (
-        f"is in {stated} by its file, in {mapped} by the map: give the file's unit"
-        f"{wrong if dimension == wanted else ''}"
-    )
 
 
 def _write_sentences(found: list[tuple[str, str]]) -> list[str]:

@@ -6,7 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.brake_validation import MOVING, find_brake_problems
-from tasks.campaign.channels import CHANNELS_BY_NAME, UNITS, guess_unit
+from tasks.campaign.channels import CHANNELS_BY_NAME, UNITS
+from tasks.campaign.pair_validation import (
+    HALF_GRAVITY,
+    find_axis_problems,
+    find_pair_problems,
+    find_pitch_problems,
+)
 from tasks.campaign.signals import Signal
 from tasks.campaign.time_of_day import TIME_OF_DAY, looks_like_time_of_day
 from tasks.campaign.torque_validation import find_torque_problems
@@ -17,6 +23,8 @@ DIGITS_OF_DAY = (
     f" give unit: {TIME_OF_DAY} under time in the map"
 )
 """Problem of a time of day that is taken for seconds."""
+FEW = 0.05
+"""Share of samples beyond what a road car does up to which they are faults of their own, and not of the unit [1]."""
 GAP_STEPS = 5.0
 """A step between samples longer than this many median steps is a gap."""
 FROZEN_SECONDS = 0.5
@@ -28,10 +36,6 @@ ROUNDING_STEP = 1e-6
 """Share of the largest value below which a step is rounding of a resampled value, and no step of the sensor [1]."""
 SMOOTHING = 0.2
 """Width of the mean over which two channels are compared [s]."""
-DIVE_PER_DECELERATION = (0.02, 2.0)
-"""Pitch that a road car's body gives per deceleration; the paper's vehicle has 0.4 [deg per m/s^2]."""
-HALF_GRAVITY = 4.9
-"""Mean from which an acceleration holds gravity: no road is so steep, and no offset so large [m/s^2]."""
 LARGEST_ACCELERATION, LARGEST_CORRECTION = 20.0, 0.5
 """Rate [m/s^2] and correction [m/s] by which speed changes at once at most, besides ten usual steps of its sensor."""
 
@@ -89,6 +93,28 @@ def _say_what_to_do(back: NDArray[np.float64]) -> str:
     if np.any(back < 0):
         return "cut the run there"
     return "give repeats: keep_first under time in the map if the logger stamps samples twice, else cut the run there"
+
+
+def find_outliers(name: str, logged: Signal, converted: Signal) -> list[str]:
+    """Return the problem of a few samples beyond what a road car does, as a logger's number for no value is.
+
+    Parameters
+    ----------
+    name : channel
+    logged : as the logger wrote it
+    converted : the same in the channel's unit
+    """
+    channel = CHANNELS_BY_NAME[name]
+    beyond = (converted.values > channel.limit) | (converted.values < min(channel.lowest, -channel.limit))
+    beyond &= np.isfinite(converted.values)
+    if not 0 < np.count_nonzero(beyond) <= FEW * len(beyond):
+        return []
+    at = int(np.argmax(beyond))
+    return [
+        f"has {np.count_nonzero(beyond)} samples beyond what a road car does (limit {channel.limit:g} {channel.unit}),"
+        f" the first at {logged.time[at]:.3f} s of {logged.values[at]:.10g}: cut the run there; where the logger writes"
+        f' it for no value, give values: {{"{logged.values[at]:.10g}": null}} of the channel'
+    ]
 
 
 def find_frozen_problem(name: str, signal: Signal, speed: Signal | None) -> str | None:
@@ -183,15 +209,15 @@ def find_plausibility_problems(
         rate = np.gradient(smooth["speed"], interval)
         if "longitudinal_acceleration" in smooth:
             felt = smooth["longitudinal_acceleration"]
-            unit = units["longitudinal_acceleration"]
-            problems += _find_pair_problems(
-                "longitudinal_acceleration", felt, "the rate of speed", rate, 0.8, unit
-            ) or _find_axis_problems(felt, rate)
+            taken = units["longitudinal_acceleration"], units.get("speed", "m/s")
+            problems += find_pair_problems(
+                "longitudinal_acceleration", felt, "the rate of speed", rate, 0.8, *taken
+            ) or find_axis_problems(felt, rate)
         if "pitch" in smooth:
-            problems += _find_pitch_problems(smooth, rate, interval)
+            problems += find_pitch_problems(smooth, rate, interval)
     if "pitch" in smooth and "pitch_rate" in smooth:
         slope = np.gradient(smooth["pitch"], interval)
-        problems += _find_pair_problems(
+        problems += find_pair_problems(
             "pitch_rate", smooth["pitch_rate"], "the slope of pitch", slope, 0.8, units["pitch_rate"]
         )
     if "vertical_acceleration" in smooth:
@@ -217,77 +243,6 @@ def _find_step_problems(columns: Mapping[str, NDArray[np.float64]], interval: fl
     return [
         f"channel speed must not jump; {wrong.size} steps do, the largest by {steps[at]:.3g} m/s at sample {at + 1}"
         f" ({(at + 1) * interval:.3f} s into the run): samples are lost or its clock jumps, cut the run there"
-    ]
-
-
-def _find_pair_problems(
-    name: str,
-    values: NDArray[np.float64],
-    other_name: str,
-    other: NDArray[np.float64],
-    correlation: float,
-    mapped_unit: str | None,
-) -> list[str]:
-    """Check the sign of one channel by another, and its size where both must be equal, so that a unit is given."""
-    x, y = other - other.mean(), values - values.mean()
-    spread = float(np.sqrt((x @ x) * (y @ y)))
-    if spread <= 0 or abs(float(x @ y)) < correlation * spread:
-        return []
-    slope = float(x @ y) / float(x @ x)
-    if slope < 0:
-        return [
-            f"channel {name} runs against {other_name} (correlation {float(x @ y) / spread:.2f}): turn its sign over"
-        ]
-    if 0.4 < slope < 2.5 or mapped_unit is None:
-        return []
-    guess = guess_unit(mapped_unit, slope)
-    hint = f"; taken as {mapped_unit}, it looks like {guess}" if guess else ""
-    return [
-        f"channel {name} is {slope:.3g} times {other_name}: the unit or scale of one of them is wrong{hint}"
-    ]
-
-
-def _find_axis_problems(felt: NDArray[np.float64], rate: NDArray[np.float64]) -> list[str]:
-    """Return the problem of a forward acceleration that holds gravity, as that of an axis which points down does."""
-    apart = float(np.mean(felt - rate))
-    if abs(apart) <= HALF_GRAVITY:
-        return []
-    return [
-        f"channel longitudinal_acceleration must follow the rate of speed; it is {apart:.2f} m/s^2 off on average,"
-        " which no road's slope explains: map the axis that points forward, or correct its offset"
-    ]
-
-
-def _find_pitch_problems(
-    columns: Mapping[str, NDArray[np.float64]], rate: NDArray[np.float64], interval: float
-) -> list[str]:
-    """Check the sign and the size of the pitch of a car that brakes."""
-    moving = columns["speed"] > MOVING
-    braking = moving & (rate < -1.0)
-    if "brake_pressure" in columns:
-        braking &= columns["brake_pressure"] > 0.1 * float(np.max(columns["brake_pressure"]))
-    if np.count_nonzero(braking) < 20:
-        return []
-    # changes over half a second: the body's response to the brake, without the slow slope of the road
-    lag = max(round(0.5 / interval), 1)
-    dive, less = columns["pitch"][lag:] - columns["pitch"][:-lag], rate[:-lag] - rate[lag:]
-    return _find_pair_problems("pitch", dive, "the deceleration", less, 0.5, None) or _find_dive_problems(
-        dive, less
-    )
-
-
-def _find_dive_problems(dive: NDArray[np.float64], less: NDArray[np.float64]) -> list[str]:
-    """Check the size of the body's pitch response to the brake, where there is one."""
-    x, y = less - less.mean(), dive - dive.mean()
-    if float(x @ y) < 0.5 * float(np.sqrt((x @ x) * (y @ y))) or not x.any():
-        return []
-    slope = float(x @ y) / float(x @ x)
-    low, high = DIVE_PER_DECELERATION
-    if low < slope < high:
-        return []
-    return [
-        f"channel pitch gives {slope:.3g} deg per m/s^2 of deceleration, which must lie in {low:g} to {high:g}: correct"
-        f" the unit or scale of it{' (it looks like rad)' if slope < low else ''} and of pitch_rate"
     ]
 
 

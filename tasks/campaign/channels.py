@@ -1,7 +1,7 @@
 """The channels a measured run may have, and the units a logger may give them in."""
 
 from dataclasses import dataclass
-from math import pi
+from math import log, pi
 from typing import Literal
 
 from tasks.errors import InputError
@@ -12,20 +12,33 @@ GRAVITY = 9.80665
 """Standard gravity [m/s^2]."""
 UNITS: dict[str, tuple[str, float]] = {
     "s": ("time", 1.0), "ms": ("time", 1e-3), "us": ("time", 1e-6), "ns": ("time", 1e-9),
+    "ks": ("time", 1e3), "min": ("time", 60.0), "h": ("time", 3600.0), "d": ("time", 86400.0),
     "m/s": ("speed", 1.0), "km/h": ("speed", 1 / 3.6), "mph": ("speed", 0.44704), "kn": ("speed", 1852 / 3600),
     "m/s^2": ("acceleration", 1.0), "g": ("acceleration", GRAVITY),
     "rad": ("angle", 1.0), "deg": ("angle", pi / 180),
     "rad/s": ("angular speed", 1.0), "deg/s": ("angular speed", pi / 180), "rpm": ("angular speed", pi / 30),
     "MPa": ("pressure", 1e6), "bar": ("pressure", 1e5), "kPa": ("pressure", 1e3), "Pa": ("pressure", 1.0),
-    "psi": ("pressure", 6894.757293168),
+    "psi": ("pressure", 6894.757293168), "mbar": ("pressure", 1e2),
     "N": ("force", 1.0), "kN": ("force", 1e3),
     "N m": ("torque", 1.0), "kN m": ("torque", 1e3),
     "1": ("ratio", 1.0), "%": ("ratio", 1e-2),
 }  # fmt: skip
 """Unit to its dimension and its size in the dimension's SI unit."""
+SPEED_UNITS = ("km/h", "mph", "kn", "m/s")
+"""Units in which loggers write the speed of a car, the most usual first."""
 ALIASES = {
-    "kmh": "km/h", "kph": "km/h", "mps": "m/s", "m/s²": "m/s^2", "m/s2": "m/s^2", "Nm": "N m", "N.m": "N m",
-    "G": "g", "sec": "s", "°": "deg", "°/s": "deg/s", "1/min": "rpm", "-": "1",
+    "kmh": "km/h", "kph": "km/h", "kmph": "km/h", "km/hr": "km/h", "kilometers/hour": "km/h",
+    "mps": "m/s", "m/sec": "m/s",
+    "mi/h": "mph", "miles/h": "mph", "miles/hour": "mph", "knot": "kn", "knots": "kn", "kt": "kn", "kts": "kn",
+    "m/s/s": "m/s^2", "m/s**2": "m/s^2", "mps2": "m/s^2", "m/sec2": "m/s^2", "m/s-2": "m/s^2",
+    "G's": "g", "gs": "g", "g-force": "g",
+    "sec": "s", "secs": "s", "second": "s", "seconds": "s", "msec": "ms", "millis": "ms", "milliseconds": "ms",
+    "usec": "us", "µs": "us", "μs": "us", "microseconds": "us", "nsec": "ns", "nanoseconds": "ns",
+    "minutes": "min", "hours": "h", "days": "d",
+    "°": "deg", "degree": "deg", "degrees": "deg", "radians": "rad",
+    "°/s": "deg/s", "dps": "deg/s", "deg/sec": "deg/s", "degrees/s": "deg/s", "degrees/second": "deg/s",
+    "rad/sec": "rad/s", "1/min": "rpm", "rev/min": "rpm", "r/min": "rpm",
+    "bars": "bar", "megapascal": "MPa", "newton": "N", "newtons": "N", "pct": "%", "percent": "%", "-": "1",
     "Unit_Bar": "bar", "Unit_KiloMeterPerHour": "km/h", "Unit_DegreOfArc": "deg", "Unit_DegreOfArcPerSecon": "deg/s",
     "Unit_MeterPerSeconSquar": "m/s^2",
 }  # fmt: skip
@@ -132,9 +145,10 @@ def guess_unit(taken: str, ratio: float) -> str | None:
     ratio : size found over size expected [1]
     """
     dimension, size = UNITS[taken]
-    near = [
-        unit
+    apart = {
+        unit: abs(log(ratio * other / size))
         for unit, (kind, other) in UNITS.items()
-        if kind == dimension and unit != taken and 0.8 < ratio * other / size < 1.25
-    ]
-    return near[0] if near else None
+        if kind == dimension and unit != taken
+    }
+    near = min(apart, key=apart.__getitem__, default=None)
+    return near if near is not None and apart[near] < log(1.25) else None

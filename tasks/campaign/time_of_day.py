@@ -17,8 +17,11 @@ def convert_to_seconds(stamps: NDArray[np.float64], unit: str) -> NDArray[np.flo
     Parameters
     ----------
     stamps : float64 [N] [``unit``]
-    unit : of time, or `TIME_OF_DAY`
+    unit : of time, or `TIME_OF_DAY`; days, as of a spreadsheet or MATLAB's datenum, count from the first one's midnight
     """
+    if unit == "d":
+        told = stamps[np.isfinite(stamps)]
+        return (stamps - np.floor(told[0] if told.size else 0.0)) * DAY
     return read_time_of_day(stamps) if unit == TIME_OF_DAY else stamps * unit_factor(unit, "s")
 
 
@@ -30,10 +33,21 @@ def read_time_of_day(stamps: NDArray[np.float64]) -> NDArray[np.float64]:
     stamps : float64 [N] digits of hours, minutes and seconds [1]; NaN where a row holds no time
     """
     hours, minutes = np.floor(stamps / 1e4), np.floor(stamps / 1e2) % 100.0
-    time = np.asarray(3600.0 * hours + 60.0 * minutes + stamps % 100.0)
+    return pass_midnight(np.asarray(3600.0 * hours + 60.0 * minutes + stamps % 100.0))
+
+
+def pass_midnight(time: NDArray[np.float64], period: float = DAY) -> NDArray[np.float64]:
+    """Return times of a clock that begins again after each period, as they go on, float64 [N] [s].
+
+    Parameters
+    ----------
+    time : float64 [N]; NaN where a row holds no time [s]
+    period : [s]
+    """
+    passed = time.copy()
     told = np.isfinite(time)
-    time[told] += DAY * np.cumsum(np.diff(time[told], prepend=time[told][:1]) < -0.5 * DAY)
-    return time
+    passed[told] += period * np.cumsum(np.diff(time[told], prepend=time[told][:1]) < -0.5 * period)
+    return passed
 
 
 def has_digits_of_day(stamps: NDArray[np.float64]) -> bool:

@@ -83,7 +83,9 @@ def test_a_gentle_stop_gives_up_its_dive_before_it_stands_and_more_of_it_than_a_
     for effects in ({}, STICKING):
         for pressure in (1.6, 2.3):
             car = replace(vehicle, effects=effects)
-            columns = drive("dry", 0.82, mode="coupled", car=car, brake=command(pressure), duration=7.0).columns
+            columns = drive(
+                "dry", 0.82, mode="coupled", car=car, brake=command(pressure), duration=7.0
+            ).columns
             speed, pitch = columns["speed"], columns["pitch"] - vehicle.static_pitch
             rolling, standing = np.argmax((speed < 3.5)), np.argmax(speed < 0.1)
             held = columns["longitudinal_acceleration"][[rolling, standing]]

@@ -209,7 +209,13 @@ def compute_rolling_axle(
 
 @register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_standing_axle(
-    ground: Ground, strut: Strut, memory: AxleMemory, wheels: Wheels, pull: float, effects: EffectValues, tyre: Tyre
+    ground: Ground,
+    strut: Strut,
+    memory: AxleMemory,
+    wheels: Wheels,
+    pull: float,
+    effects: EffectValues,
+    tyre: Tyre,
 ) -> AxlePorts:
     """Return the ports of an axle at rest: the tyre holds the vehicle on the slope, the brake holds the wheel.
 

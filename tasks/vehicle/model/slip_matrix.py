@@ -78,7 +78,12 @@ def compute_axle_slope(
     if abs(ports.slip) < 1.0:
         share = compute_stick_share(motion.speed, chassis.effects)
         load = ports.ground.load
-        force = compute_effective_slope(abs(ports.force_slip), load, share, tyre, chassis.effects, ports.hold.wound) * load
+        force = (
+            compute_effective_slope(
+                abs(ports.force_slip), load, share, tyre, chassis.effects, ports.hold.wound
+            )
+            * load
+        )
         if ports.hold.wound != 0.0 and ports.slip * (ports.slip + slip_per_wheel * change) < 0.0:
             force = max(force, ports.tyre_force / ports.slip)
         width = wheels.release_width * tyre.target_slip

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rosbags import rosbag1
 from rosbags.interfaces import MessageDefinition, MessageDefinitionFormat
 
 from catalogs.recordings import bag_types, read_signals, recording_files, stored_files, summarise_signals
@@ -205,3 +206,20 @@ def test_without_rosbags_the_reader_says_what_to_install(tmp_path, monkeypatch):
         'reading ROS bags and MCAP needs the package rosbags: install it with pip install "musync-gs[ros]"'
         in read_refusal(tmp_path / "log.mcap", "/car.speed")
     )
+
+
+def test_a_topic_of_two_publishers_in_turns_is_given_by_the_publisher(tmp_path: Path) -> None:
+    store = make_store()
+    path = tmp_path / "log.bag"
+    with rosbag1.Writer(path) as bag:
+        writers = [
+            bag.add_connection("/car", "cars/msg/Car", typestore=store, callerid=name)
+            for name in ("/a", "/b")
+        ]
+        for k in range(4):
+            stamp = (k + 1) * 10**8
+            message = make_car(store, stamp, 10.0 + k)
+            bag.write(writers[k % 2], stamp, store.serialize_ros1(message, message.__msgtype__))
+    with pytest.raises(InputError, match=r"/car is written by several publishers in turns.* as /car#"):
+        read_signals(path, take_speed("/car.speed"))
+    assert read_signals(path, take_speed("/car#2.speed"))["/car#2.speed"].values.tolist() == [11.0, 13.0]

@@ -65,8 +65,7 @@ def test_the_first_sample_of_a_time_is_the_first_that_has_a_value(tmp_path: Path
         (b't,v\ns,"m\n0,1\n1,2\n', "csv: {units_row: true}", "the row of units must be a row of text"),
         (b"t,v\nms,m/s\n0,10\n1,11\n", "csv: {units_row: true}", "clock t is in ms by its file, in s by the map"),
         (b"t,v\n0,10\n1,Err\n", "", "v must be of numbers; row 2 .* 'Err': correct it, or leave it empty"),
-        (b"t,v\n12:00:01,10\n12:00:02,11\n", "", "t must be of numbers; row 1 .* write times as a number of seconds"),
-        (b"t,v\n2026-01-01,10\n", "", "t must be of numbers; row 1 .* write times as a number of seconds"),
+        (b"t,v\n12:00:01,10\nnoon,11\n", "", "t must be of numbers, dates or times of day; row 2 .* 'noon': write"),
         ("t,v\n0,10\n".encode("utf-16"), "", "must be UTF-8 or Latin-1 text; it holds zero bytes: save it as UTF-8"),
     ],
 )  # fmt: skip
@@ -137,7 +136,10 @@ def test_a_list_of_signals_of_parquet_shows_the_type_that_is_none_of_numbers(
         str(tmp_path / "log.parquet"), map=str(tmp_path / "map.yaml"), list_signals=True
     )
     rows = {row["signal"]: row for row in listed["signals"]["log.parquet"]}
-    assert rows[column]["samples"] == 0 and "not of numbers, but of timestamp" in rows[column]["note"]
+    if column == "t":  # a clock
+        assert rows["v"]["rate_hz"] == 1.0 and not rows["t"]["note"]
+    else:
+        assert rows["v"]["samples"] == 0 and "it is of dates or times" in rows["v"]["note"]
 
 
 def test_a_map_that_says_only_how_the_text_is_written_lists_the_signals(tmp_path: Path) -> None:

@@ -1,0 +1,156 @@
+"""Recordings and runs that can be used, and the few among many that cannot, with why."""
+
+from pathlib import Path
+
+from catalogs.channel_maps import ChannelMap
+from catalogs.recordings import read_signals, recording_files
+from catalogs.recordings.limits import load_recording_limits
+from flows.measured.run_plan import PlannedRun
+from flows.measured.shared_problems import PlacedProblem, join_shared_problems, place_in_file
+from tasks.campaign.assembly import Assembled
+from tasks.campaign.channels import UNITS
+from tasks.campaign.clocks import describe_clock_scale
+from tasks.campaign.run_validation import find_motion_problem
+from tasks.campaign.signals import Signal, average_sources
+from tasks.campaign.stated_units import choose_unit, find_unit_problems
+from tasks.errors import InputError
+
+Recordings = dict[Path, dict[str, Signal]]
+MOST_FAULTY = 1 / 3
+"""Share of recordings, or of runs, that may be left out for their faults; more are a fault of the map [1]."""
+
+
+def read_recordings(
+    files: tuple[Path, ...], channel_map: ChannelMap
+) -> tuple[ChannelMap, Recordings, list[str], list[str]]:
+    """Return the map with every unit, the signals of each recording, and why some are left out, with their names.
+
+    Parameters
+    ----------
+    files : recordings
+    channel_map : names their signals
+
+    Raises
+    ------
+    InputError
+        Listing the problems of all, where more are faulty than may be left out.
+    """
+    recordings: Recordings = {}
+    problems: list[PlacedProblem] = []
+    for file in files:
+        try:
+            recordings[file] = read_signals(file, channel_map)
+        except InputError as error:
+            problems += [place_in_file(file, problem) for problem in error.problems]
+    if not recordings or len(files) - len(recordings) > MOST_FAULTY * len(files):
+        raise InputError(join_shared_problems(problems, len(files), "files", exact=True))
+    channel_map = _fill_units(channel_map, recordings)
+    for file in list(recordings):
+        if found := _find_recording_problems(recordings[file], channel_map):
+            problems += [
+                PlacedProblem(name=file.name, place=file.name, sentence=problem) for problem in found
+            ]
+            del recordings[file]
+    told = join_shared_problems(problems, len(files), "files", exact=True)
+    lost = [file.name for file in files if file not in recordings]
+    if len(lost) > MOST_FAULTY * len(files):
+        raise InputError(told)
+    return channel_map, recordings, told, lost
+
+
+def find_signal_problems(source: Path, channel_map: ChannelMap | None) -> list[str]:
+    """Return the faults of the signals that a faulty map names, as far as it can be read.
+
+    Parameters
+    ----------
+    source : recording, or folder of recordings
+    channel_map : what can be read of the map; None if nothing
+    """
+    if channel_map is None:
+        return []
+    problems: list[PlacedProblem] = []
+    try:
+        files = recording_files(source, channel_map)
+    except InputError as error:
+        return list(error.problems)
+    for file in files:
+        try:
+            read_signals(file, channel_map)
+        except InputError as error:
+            problems += [place_in_file(file, problem) for problem in error.problems]
+    return join_shared_problems(problems, len(files), "files", exact=True)
+
+
+def leave_out_faulty(
+    made: list[tuple[PlannedRun, Assembled]], interval: float
+) -> tuple[list[tuple[PlannedRun, Assembled]], list[str]]:
+    """Return the runs without those whose own samples are faulty, and the faults of these.
+
+    Parameters
+    ----------
+    made : runs on their clocks
+    interval : of the clocks [s]
+
+    Raises
+    ------
+    InputError
+        Listing all problems, where one may be the map's, where more runs are faulty than may be left out, or where a
+        part of the split keeps none.
+    """
+    placed = [
+        PlacedProblem(name=run.name, place=f"{run.name} ({run.file.name})", sentence=problem)
+        for run, found in made
+        for problem in (*found.problems, *_find_still(run, found, interval))
+    ]
+    told = join_shared_problems(placed, len(made), "runs")
+    faulty = {problem.name for problem in placed}
+    kept = [(run, found) for run, found in made if run.name not in faulty]
+    parts = {run.part for run, _ in made} - {run.part for run, _ in kept}
+    if parts or len(faulty) > MOST_FAULTY * len(made) or any(found.of_map for _, found in made):
+        raise InputError(told)
+    return kept, told
+
+
+def _find_still(run: PlannedRun, found: Assembled, interval: float) -> list[str]:
+    if "speed" not in found.readable:
+        return []
+    problem = find_motion_problem(found.readable["speed"], interval, run.conditions.hazard_length_m > 0.0)
+    return [] if problem is None else [problem]
+
+
+def _fill_units(channel_map: ChannelMap, recordings: Recordings) -> ChannelMap:
+    """Return a map in which each channel without a unit has that which the recordings state."""
+    problems, channels = [], dict(channel_map.channels)
+    for name, entry in channel_map.channels.items():
+        if entry.unit is not None:
+            continue
+        unit = choose_unit(entry.rule(name), list(recordings.values()))
+        if isinstance(unit, list):
+            problems += unit
+            continue
+        channels[name] = entry.model_copy(update={"unit": unit})
+        try:
+            _ = channels[name].rule(name).factor
+        except InputError as error:
+            problems += [f"channel {name}: {problem}" for problem in error.problems]
+    if problems:
+        raise InputError(problems)
+    return channel_map.model_copy(update={"channels": channels})
+
+
+def _find_recording_problems(signals: dict[str, Signal], channel_map: ChannelMap) -> list[str]:
+    """Return units that are not the map's, and a clock whose unit it is not, before runs are looked for."""
+    problems = find_unit_problems(channel_map.rules, signals)
+    limits, clock = load_recording_limits(), channel_map.time
+    taken = clock.unit if clock is not None and clock.unit in UNITS else "s"
+    speed = next(
+        (average_sources(signals, rule) for rule in channel_map.rules if rule.channel == "speed"), None
+    )
+    scale = describe_clock_scale(
+        list(signals.values()),
+        speed,
+        taken,
+        deceleration=limits.deceleration.value,
+        shortest=limits.sampling_step.value,
+    )
+    return [*problems, scale] if scale else problems
