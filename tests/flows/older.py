@@ -40,6 +40,7 @@ def make_older(
         write_parquet(pa.Table.from_arrays(list(columns.values()), schema=schema), path)
 
     def forget(manifest: dict[str, Any]) -> None:
+        manifest["made_with"]["code"] = {"version": "0.0.1", "source_sha256": "0" * 64}
         for clip in manifest["clips"]:
             for record, prefix in (("figures", ""), ("verdict", "check_")):
                 clip[record] = {k: v for k, v in clip[record].items() if f"{prefix}{k}" not in lacking}
