@@ -148,9 +148,9 @@ def _clip_row(
     if "ticks" in changed:
         ours, theirs = _read_ticks(old, a), _read_ticks(new, b)
         moves |= compare_ticks(ours, theirs)
-        names = [channel.name for channel in TICK_CHANNELS if channel.name in ours.keys() | theirs.keys()]
-        shared = [name for name in names if name in ours.keys() & theirs.keys()]
-        first = find_row_difference(ours, theirs, shared) or find_row_difference(ours, theirs, names)
+        channels = [channel.name for channel in TICK_CHANNELS if channel.name in ours.keys() | theirs.keys()]
+        shared = [channel for channel in channels if channel in ours.keys() & theirs.keys()]
+        first = find_row_difference(ours, theirs, shared) or find_row_difference(ours, theirs, channels)
         row["first"] = first and {
             "channel": first["channel"], "tick": first["tick"], "a": first["recorded"], "b": first["remade"]
         }  # fmt: skip

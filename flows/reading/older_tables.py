@@ -8,7 +8,7 @@ from pyarrow import dataset
 from flows.store.missing import null_missing
 
 
-class OlderTable(dataset.FileSystemDataset):  # type: ignore[misc]
+class OlderTable(dataset.FileSystemDataset):
     """A lazy pyarrow dataset whose rows have NULL in place of NaN before a filter sees them.
 
     The files' statistics leave NaN out, so no filter is handed down to them.
