@@ -29,11 +29,9 @@ _FIELDS: dict[str, Any] = {field.name: (_choose_type(field.name), ...) for field
 
 StreetEntry = create_model("StreetEntry", __base__=CatalogueEntry, **_FIELDS)
 """Content of the street's file: every field of `StreetLayout`."""
-StreetChanges = create_model(
-    "StreetChanges",
-    __base__=CatalogueEntry,
-    **{name: (kind | None, None) for name, (kind, _) in _FIELDS.items()},
-)
+_CHANGED: dict[str, Any] = {name: (kind | None, None) for name, (kind, _) in _FIELDS.items()}
+
+StreetChanges = create_model("StreetChanges", __base__=CatalogueEntry, **_CHANGED)
 """Content of the file of another street: the fields that differ."""
 
 

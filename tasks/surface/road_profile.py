@@ -42,11 +42,6 @@ class RoadHazard:
         if problems:
             raise InputError(problems)
 
-    @property
-    def steepest_slope(self) -> float:
-        """Largest slope of its flanks, pi A_g / L_g [1]."""
-        return float(np.pi * abs(self.height_m) / self.length_m) if self.height_m != 0 else 0.0
-
 
 FLAT_ROAD = RoadHazard(center_m=0.0, length_m=0.0, height_m=0.0)
 
@@ -73,11 +68,9 @@ class RoadGrade:
     spacing_m: float = 1.0
 
     def __post_init__(self) -> None:
-        problems = [
-            f"the grade of a road must be above -1 and below 1; it is {one:g}"
-            for one in self.rise
-            if not -1 < one < 1
-        ]
+        problems = []
+        if beyond := [one for one in self.rise if not -1 < one < 1]:
+            problems.append(f"the grade of a road must be above -1 and below 1; it is {beyond[0]:g}")
         if not self.rise:
             problems.append("the grade of a road needs one value or more; it has none")
         if not (isfinite(self.spacing_m) and self.spacing_m > 0):
@@ -85,7 +78,7 @@ class RoadGrade:
                 f"the stations of a grade must lie spacing_m above 0 apart; it is {self.spacing_m:g}"
             )
         if problems:
-            raise InputError(problems[:1] + problems[-1:] if len(problems) > 2 else problems)
+            raise InputError(problems)
 
     @property
     def is_level(self) -> bool:

@@ -19,7 +19,7 @@ _ROUTE_STEP = 0.5
 class Course:
     """The route's line, straight and level at first, then bending left and climbing.
 
-    Walls stand upright on a hill: points are lifted by the road's rise, and only directions along the road tilt.
+    On a hill points are lifted by the road's rise, so that walls stand upright, and directions tilt with the road.
 
     Parameters
     ----------
