@@ -113,10 +113,9 @@ def _find_encoding(path: Path, content: bytes) -> str:
 def _read_rows(raw: io.BytesIO, encoding: str, options: CsvEntry) -> Iterator[list[str]]:
     """Yield the cells of each row, of which one may go over several lines, and read no line beyond it."""
     lines = (line.decode(encoding).removeprefix("\ufeff") for line in raw)
+    rows: Iterator[list[str]] = (re.split(options.separator, line.strip()) for line in lines)
     if len(options.separator) == 1:
         rows = csv.reader(lines, delimiter=options.separator)
-    else:
-        rows = (re.split(options.separator, line.strip()) for line in lines)
     return ([cell.strip() for cell in cells] for cells in rows)
 
 

@@ -93,8 +93,8 @@ def import_measurements(
         for run in planned
     ]
     interval = 1.0 / channel_map.sample_rate_hz
-    made, faults = leave_out_faulty(made, interval)
-    left_out += faults
+    made, told = leave_out_faulty(made, interval)
+    left_out += told
     lost += [run.name for run in planned if run.name not in {kept.name for kept, _ in made}]
     readable = {run.name: found.readable for run, found in made}
     limit, rules = load_recording_limits().deceleration.value, {r.channel: r for r in channel_map.rules}

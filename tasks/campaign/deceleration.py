@@ -23,7 +23,7 @@ def find_deceleration_problems(
     unit : in which the speed was taken to be
     """
     falls = {
-        run: measure_fall(interval * np.arange(len(columns["speed"])), columns["speed"])
+        run: measure_fall(interval * np.arange(len(columns["speed"]), dtype=np.float64), columns["speed"])
         for run, columns in runs.items()
         if "speed" in columns
     }

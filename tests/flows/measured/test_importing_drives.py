@@ -46,6 +46,7 @@ def test_one_run_per_brake_application_every_third_held_out(tmp_path: Path) -> N
 def test_no_heat_is_estimated_for_a_run_whose_disc_temperature_is_declared(tmp_path: Path) -> None:
     columns = braking_columns(14.0)
     columns["speed"] = 20.0 - np.cumsum(columns["brake_pressure"]) / 100
+    columns["longitudinal_acceleration"] /= 1.5  # as the speed says
     for name in ("wheel_speed_front", "wheel_speed_rear"):
         columns[name] = columns["speed"] / 0.32
     write_csv(tmp_path / "log.csv", log_signal(columns))
