@@ -127,7 +127,7 @@ def _read_dataparser(path: Path, found: PoseFile) -> Floats:
         problems.append(f"{path}: transform must be 3x4 numbers, a rotation and a translation; it is not")
     if not isinstance(scale, int | float) or isinstance(scale, bool) or not 1e-9 < scale < 1e9:
         problems.append(f"{path}: scale must be a positive number; it is {shorten_value(scale)}")
-    if problems or transform is None:
+    if problems or transform is None or scale is None:
         raise InputError(problems)
     # it leads on from the frame before nerfstudio's preparation of the pictures, whose scale stands in both files
     unit = scale / found.applied_scale

@@ -49,7 +49,7 @@ def read_cameras(poses: Floats, form: str, base: str) -> Floats:
     if form == ANY_HEADING:
         return _face_the_way(read_cameras(poses, base, base))
     if form == "world-to-camera":
-        return np.linalg.inv(poses)
+        return np.linalg.inv(poses).astype(np.float64)
     cameras = poses.copy()
     R = poses[:, :3, :3]
     match form:
