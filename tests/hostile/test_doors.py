@@ -32,7 +32,7 @@ from tests.hostile.other_user import run_as_other
 GRID = "name: tiny\nframes: 2\npictures: false\ncamera: dashcam-480x320\naxes: {weather: {dry: {weather: dry}}}\n"
 TRAP = "open({!r}, 'w').write('run')\n"
 ADDRESS = re.compile(r"(http://\S+) \(their password is in (.*)\)")
-START_S = 300
+START_S = 600
 
 
 @dataclass(frozen=True)
