@@ -54,7 +54,7 @@ def remove_oldest(grid: str, root: str, keep: int) -> tuple[list[str], list[str]
 def _made_in_folder(root: str, grid: str) -> Iterator[str]:
     for left in Path(root).glob(f"{REMOVED}*"):  # of a run that was killed while it removed them
         if dated(grid).fullmatch(left.name.removeprefix(REMOVED)) and left.is_dir() and not left.is_symlink():
-            shutil.rmtree(left, ignore_errors=True)
+            _remove_renamed(left, Path(root) / record_name(left.name.removeprefix(REMOVED)))
     for folder in Path(root).iterdir():
         if not dated(grid).fullmatch(folder.name) or folder.is_symlink() or not folder.is_dir():
             continue
@@ -90,9 +90,14 @@ def _remove_folder(root: str, name: str) -> bool:
             folder.rename(gone)  # at once, so that nobody meets a half of it
     except (InputError, OSError):
         return False
-    shutil.rmtree(gone, ignore_errors=True)
-    (Path(root) / record_name(name)).unlink(missing_ok=True)
+    _remove_renamed(gone, Path(root) / record_name(name))
     return True
+
+
+def _remove_renamed(gone: Path, record: Path) -> None:
+    """Remove a dataset that has been renamed, its record before it: while a folder is left, the next time ends this."""
+    record.unlink(missing_ok=True)
+    shutil.rmtree(gone, ignore_errors=True)
 
 
 def _remove_objects(root: str, name: str) -> bool:
