@@ -6,6 +6,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+from benchmarks.crashes.commands import kill_commands
 from benchmarks.crashes.full_disk import full_disk_study
 from benchmarks.crashes.kills import GRID, kill_study
 from benchmarks.crashes.rot import flip_study
@@ -21,11 +22,13 @@ if __name__ == "__main__":
         killed = kill_study(place / "grid.yaml", place, asked.kills, asked.seed)
         flipped = flip_study(place / "whole", asked.flips)
         filled = full_disk_study(place / "grid.yaml", place, place / "whole", asked.disks)
-    print(json.dumps({"killed": killed, "flipped": flipped, "filled": filled}))
+        commands = kill_commands(place / "commands")
+    print(json.dumps({"killed": killed, "flipped": flipped, "filled": filled, "commands": commands}))
     good = (
         killed["equal"] == killed["runs_finished"] > 0
         and killed["half_clips"] == 0
         and flipped["named"] == flipped["flips"]
         and filled["told"] == filled["equal"] == filled["disks"]
+        and all(row["equal"] == row["kills"] > 0 for row in commands.values())
     )
     sys.exit(0 if good else 1)

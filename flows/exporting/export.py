@@ -1,9 +1,7 @@
 """``musync export``: a finished dataset in another format, written whole or not at all."""
 
 import os
-import shutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,7 +15,7 @@ from flows.reading.previews import select_clips
 from flows.reading.suggestions import suggest_names
 from flows.running.progress import progress_bar
 from flows.store.address import is_address, open_for_reading
-from flows.store.layout import PARTIAL, list_abandoned, write_json
+from flows.store.layout import write_folder, write_json
 from flows.store.outputs import find_dataset_problems
 from flows.store.sealed import read_manifest, refuse_changed_content
 from manifests.manifest import is_quarantined
@@ -140,26 +138,6 @@ def choose_folder(dataset: str, to: str, out: str | None) -> Path:
     if os.path.lexists(folder) and (folder.is_symlink() or not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"--out {folder}: must be new or an empty folder; name another one or remove it")
     return folder
-
-
-@contextmanager
-def write_folder(folder: Path) -> Iterator[Path]:
-    """Yield a folder to fill beside the final one, which takes its place when all is written.
-
-    Parameters
-    ----------
-    folder : final place, new or empty
-    """
-    for left in list_abandoned(folder.absolute().parent, {folder.absolute().name}):
-        if left.is_dir() and not left.is_symlink():
-            shutil.rmtree(left)
-    partial = folder.absolute().with_name(f"{folder.absolute().name}.{os.getpid()}{PARTIAL}")
-    partial.mkdir(parents=True)
-    try:
-        yield partial
-        partial.replace(folder)  # takes the place of an empty folder too, and of nothing else
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)
 
 
 def _find_picture_problems(chosen: ExportFormat, manifest: Mapping[str, Any], dataset: str) -> list[str]:

@@ -19,7 +19,7 @@ from flows.measured.import_warnings import has_stand_in, list_warnings
 from flows.measured.readable_recordings import find_signal_problems, leave_out_faulty, read_recordings
 from flows.measured.run_plan import PlannedRun, find_run_problems, plan_runs
 from flows.measured.signal_listing import list_recorded_signals
-from flows.store.layout import write_atomically, write_json
+from flows.store.layout import write_atomically, write_folder, write_json
 from flows.store.missing import null_missing
 from flows.store.telemetry import write_parquet
 from manifests.canonical import sha256_of_file
@@ -140,7 +140,22 @@ def write_campaign(
     map_hash: str,
     beside: dict[str, Any],
 ) -> dict[str, Any]:
-    """Write the folder and say what is in it; campaign.yaml comes last, so that it marks a whole campaign."""
+    """Write the folder, whole or not at all, and say what is in it."""
+    with write_folder(folder) as partial:
+        made_from = {"channel_map_sha256": map_hash, "files_sha256": sources}
+        return _fill_folder(partial, str(folder), root, channel_map, made, heat, made_from, beside)
+
+
+def _fill_folder(
+    folder: Path,
+    name: str,
+    root: Path,
+    channel_map: ChannelMap,
+    made: list[tuple[PlannedRun, Assembled]],
+    heat: dict[str, float],
+    made_from: dict[str, Any],
+    beside: dict[str, Any],
+) -> dict[str, Any]:
     rate = channel_map.sample_rate_hz
     felt = "longitudinal_acceleration" in channel_map.channels
     slopes = estimate_slopes({run.name: found.readable for run, found in made}, 1.0 / rate) if felt else {}
@@ -172,12 +187,12 @@ def write_campaign(
         "not_measured": list(channel_map.not_measured),
         **_brake_facts(channel_map),
         **({} if channel_map.speed_from == "ground" else {"speed_from": channel_map.speed_from}),
-        "made_from": {"channel_map_sha256": map_hash, "files_sha256": sources},
+        "made_from": made_from,
     }
     text = yaml.safe_dump(header, sort_keys=False, allow_unicode=True)
     write_atomically(folder / "campaign.yaml", text.encode())
     report = {
-        "campaign": str(folder),
+        "campaign": name,
         "runs": [
             {
                 "run": run.name,
@@ -192,7 +207,7 @@ def write_campaign(
         "slow_channels_hz": measure_slow_rates([found.columns for _, found in made], rate),
         "not_measured": list(channel_map.not_measured),
         "assumed_tolerances_1sigma": channel_map.tolerances_1sigma.list_assumed(),
-        "sources": sources,
+        "sources": made_from["files_sha256"],
         **beside,
     }
     write_json(folder / "import.json", report)

@@ -3,7 +3,9 @@
 import json
 import os
 import re
-from collections.abc import Container, Iterable
+import shutil
+from collections.abc import Container, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from threading import get_native_id
@@ -143,6 +145,26 @@ def read_json(path: Path) -> Any:
         If it is missing, no regular file, or not JSON.
     """
     return read_json_document(path, RECORD)
+
+
+@contextmanager
+def write_folder(folder: Path) -> Iterator[Path]:
+    """Yield a folder to fill beside the final one, which takes its place when all is written.
+
+    Parameters
+    ----------
+    folder : final place, new or empty
+    """
+    for left in list_abandoned(folder.absolute().parent, {folder.absolute().name}):
+        if left.is_dir() and not left.is_symlink():
+            shutil.rmtree(left)
+    partial = folder.absolute().with_name(f"{folder.absolute().name}.{os.getpid()}{PARTIAL}")
+    partial.mkdir(parents=True)
+    try:
+        yield partial
+        partial.replace(folder)  # takes the place of an empty folder too, and of nothing else
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
 
 
 def list_abandoned(folder: Path, names: Container[str]) -> list[Path]:

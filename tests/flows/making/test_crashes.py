@@ -2,6 +2,7 @@
 
 import time
 
+from benchmarks.crashes.commands import kill_commands
 from benchmarks.crashes.kills import files_of, half_clips
 from benchmarks.crashes.processes import start_run
 from flows.making.generate import generate_dataset
@@ -19,3 +20,11 @@ def test_a_killed_run_resumes_to_the_same_bytes_and_commits_no_half_clip(toy_dat
     assert halves == 0 and committed >= 1 and not layout.manifest.exists()
     generate_dataset(str(grid), str(layout.root), runner="threads")
     assert files_of(layout.root) == files_of(toy_dataset.root)
+
+
+def test_a_command_that_is_killed_before_any_change_of_the_disk_ends_the_second_time_with_nothing_left(
+    tmp_path,
+):
+    found = kill_commands(tmp_path, ("sign", "export --to croissant"))
+    assert [row["first"] for row in found.values()] == [None, None]
+    assert all(row["equal"] == row["kills"] > 9 for row in found.values())
