@@ -59,6 +59,7 @@ def _require_keys(keys: tuple[str, ...]) -> AfterValidator:
     return AfterValidator(check)
 
 
+_FIGURE_NAMES = {channel.name for channel in CLIP_CHANNELS}
 STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
 Inputs = Annotated[dict[InputName, Sha256], _require_keys(EVERY_INPUT)]
@@ -72,7 +73,7 @@ else:
     ScenarioRecord = with_config(STRICT)(
         TypedDict("ScenarioRecord", get_type_hints(Scenario, include_extras=True))
     )
-    # a record decides what it has: a figure that came later is not represented
+    # a dataset decides what it has: a figure that came later is not represented
     _figures = {c.name: NotRequired[float | None] for c in CLIP_CHANNELS if c.name not in SCENARIO_FIELDS}
     FiguresRecord = with_config(STRICT)(
         TypedDict("FiguresRecord", {**_figures, "calibration_extrapolated": bool})
@@ -220,9 +221,10 @@ def check_record(form: type[Record], value: Any, place: object) -> Record:
     try:
         record: Record = _ADAPTERS[form].validate_python(value)
     except ValidationError as error:
-        raise InputError(cap_problems(describe_rules(error, place))) from None
+        uneven = [f"{place}: {problem}" for problem in _find_uneven_figures(value)]
+        raise InputError(cap_problems(uneven + describe_rules(error, place))) from None
     problems = _find_clip_problems(value.get("clips", [])) + _find_input_problems(value)
-    if problems:
+    if problems := cap_problems(problems + _find_uneven_figures(value)):
         raise InputError([f"{place}: {problem}" for problem in problems])
     return record
 
@@ -230,6 +232,22 @@ def check_record(form: type[Record], value: Any, place: object) -> Record:
 _ADAPTERS: dict[Any, TypeAdapter[Any]] = {
     form: TypeAdapter(form) for form in (Receipt, PlanRecord, ManifestHead, Manifest, FrozenRun)
 }
+
+
+def _find_uneven_figures(value: Any) -> list[str]:
+    """Figures that some clips of one record have and others lack: one version makes all of its clips alike."""
+    clips = value.get("clips") if isinstance(value, Mapping) else None
+    held = {
+        place: clip["figures"].keys() & _FIGURE_NAMES
+        for place, clip in enumerate(clips if isinstance(clips, list) else [])
+        if isinstance(clip, Mapping) and isinstance(clip.get("figures"), Mapping)
+    }
+    every: set[str] = set().union(*held.values())
+    return [
+        f"clips.{place}.figures.{name} is missing: other clips have it"
+        for place, names in held.items()
+        for name in sorted(every - names)
+    ]
 
 
 def _find_clip_problems(clips: Sequence[Mapping[str, Any]]) -> list[str]:

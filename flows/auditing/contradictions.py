@@ -17,7 +17,7 @@ from flows.making.gathering import table_parts
 from flows.making.identity import identify_clip, identify_run, list_deciding
 from flows.making.plan import Plan
 from flows.making.seal import SHEET
-from flows.making.summaries import PAIRS, SUMMARIES, summarise_clips
+from flows.making.summaries import SUMMARIES, summarise_clips
 from flows.store.arrays import arrays_of
 from flows.store.layout import STAGED_TABLES, Layout, encode_json
 from flows.store.links import require_file
@@ -240,8 +240,8 @@ def _compare_summaries(
         except InputError as error:
             yield from error.problems
             continue
-        if path == PAIRS:  # no record says which columns an older table of pairs has
-            wanted = {name: values for name, values in wanted.items() if name in found or name in ESSENTIAL}
+        # the table of an older dataset decides which columns it has
+        wanted = {name: values for name, values in wanted.items() if name in found or name in ESSENTIAL}
         row = find_row_difference(found, wanted, list(dict.fromkeys([*wanted, *found])))
         if row is not None:
             yield (

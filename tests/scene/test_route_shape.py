@@ -1,12 +1,14 @@
 """Grade and curvature of a route: those of its poses, over a length that no dent and no noise of a survey reaches."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from catalogs.scenes.street import load_street_layout
 from tasks.scene.route import Route, route_from_positions
 from tasks.scene.route_shape import find_lateral_demand, sample_curvature, sample_grade
 from tasks.scene.street.bend import integrate_course, lay_route
-from tasks.scene.street.layout import StreetLayout
 from tests.toy_street import toy_street
 
 
@@ -45,7 +47,7 @@ def test_a_bend_asks_for_speed_squared_over_its_radius_and_for_nothing_beyond_th
 
 
 def test_the_street_s_grade_is_a_field_of_its_layout():
-    layout = StreetLayout(grade=0.08)
+    layout = replace(load_street_layout(), grade=0.08)
     route = lay_route(layout, integrate_course(layout))
     grade = sample_grade(route)
     assert np.allclose(grade.rise[:2], 0) and grade.rise[-1] == pytest.approx(0.08, abs=1e-9)
