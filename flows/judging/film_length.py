@@ -26,7 +26,8 @@ def measure_missing_end(path: Path) -> float:
     try:
         with av.open(f"file:{path}", options=dict(READ_ONLY)) as container:
             stream = container.streams.video[0]
-            own = stream.duration is not None
+            length, clock = stream.duration, stream.time_base
+            own = length is not None and clock is not None
             ends, count = [0.0], 0
             for packet in _list_packets(container):
                 count += packet.stream_index == stream.index and packet.size > 0
@@ -34,8 +35,8 @@ def measure_missing_end(path: Path) -> float:
                     ends.append(float((packet.pts + (packet.duration or 0)) * packet.time_base))
             if container.format.name == "avi" and stream.average_rate:  # its times are numbers of frames
                 return float((stream.frames - count) / stream.average_rate)
-            if own:
-                return float((stream.duration + (stream.start_time or 0)) * stream.time_base) - max(ends)
+            if length is not None and clock is not None:
+                return float((length + (stream.start_time or 0)) * clock) - max(ends)
             if container.duration is None or container.format.name in WITHOUT_LENGTH:
                 return 0.0
             return container.duration / av.time_base - max(ends)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from catalogs.documents import read_json_document
+from catalogs.documents import parse_json, read_content
 from catalogs.scenes import load_scene, write_scene
 from catalogs.scenes.folder import must_be_new
 from catalogs.scenes.gaussian_files import read_gaussians
@@ -27,6 +27,9 @@ from tasks.scene.classify import (
 )
 from tasks.scene.scene import Scene, find_sun_problems
 from tasks.scene.transform import transform_gaussians
+
+LARGEST_POSE = 2**20
+"""Bytes of a pose file [1]: 26 numbers take 1,000."""
 
 
 def scene_import(
@@ -142,7 +145,7 @@ def render_pose(scene: str, pose: str, out: str, *, backend: str = "auto") -> di
 
 
 def _read_pose(pose: str) -> tuple[np.ndarray, np.ndarray, int, int]:
-    content = read_json_document(Path(pose), "pose")
+    content = parse_json(read_content(Path(pose), "pose", LARGEST_POSE), pose, "pose")
     if not isinstance(content, dict):
         raise InputError(f"{pose}: a pose must be a JSON object with viewmat, K, width and height")
     problems = [

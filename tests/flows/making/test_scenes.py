@@ -65,3 +65,9 @@ def test_every_fault_of_a_pose_file_is_listed(pose):
     for key in ("viewmat", "K", "width", "height"):
         assert key in str(caught.value)
     assert not (pose / "out").exists()
+
+
+def test_a_pose_file_is_bounded_before_it_is_read(pose):
+    (pose / "pose.json").write_text(" " * 2**20 + "{}")
+    with pytest.raises(InputError, match="a pose must have at most 1048576 bytes"):
+        render_pose(str(pose / "scene"), str(pose / "pose.json"), str(pose / "out"))
