@@ -66,7 +66,8 @@ def find_contradictions(
         list(_compare_summaries(layout, manifest, plan, damaged)),
     ]
     told = {sentence.partition(": ")[0] for kind in found for sentence in kind}
-    known, others = {*damaged, *told}, []
+    known = {*damaged, *told}
+    others: list[str] = []
     for path, lies in chain(
         _compare_json(layout, manifest, plan, known),
         compare_tables(layout, manifest, plan, known, is_same_writer),

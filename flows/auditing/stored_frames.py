@@ -37,7 +37,11 @@ def compare_frame_metadata(
     """
     if not plan.settings.pictures or "inputs/camera.yaml" in damaged:
         return
-    arguments = describe_frame_arrays(layout, plan)
+    try:
+        arguments = describe_frame_arrays(layout, plan)
+    except InputError as error:
+        yield "inputs/camera.yaml", list(error.problems)
+        return
     for name, wanted in encode_arrays(**arguments).items():
         path = f"{layout.frames.name}/{name}"
         if path in damaged:
@@ -46,16 +50,13 @@ def compare_frame_metadata(
             content = require_file(layout.root / path).read_bytes()
             if content == wanted:
                 continue
-            lies = list(
-                _compare_values(
-                    *(parse_json(text, path, "metadata") for text in (wanted, content)), is_same_writer
-                )
-            )
             if not is_same_writer:
                 members = [place.name for place in layout.frames.iterdir() if place.is_dir()]
                 check_frames(
                     read_local_metadata(layout.frames), members, layout.frames.name, *arguments["shape"][:2]
                 )
+            values = (parse_json(text, path, "metadata") for text in (wanted, content))
+            lies = list(_compare_values(*values, is_same_writer))
         except InputError as error:
             lies = list(error.problems)
         yield path, [lie if lie.startswith(path) else f"{path}: {lie}" for lie in cap_problems(lies, _SHOWN)]

@@ -164,11 +164,11 @@ class _Part:
     def _find_lies(self, clip: Receipt, columns: Columns) -> list[str]:
         """Where the rows of a clip contradict its record, their own count, or the rows of the other table."""
         settings, of_clip = self.plan.settings, f"of clip {clip['label']}"
+        lies: list[str] = []
         ticks = frame_ticks(settings.frames, settings.frame_rate_hz)
         if self.table == "frames":
             self.shown[clip["clip_id"]] = columns
             names, counted = sorted(columns), {"frame": np.arange(settings.frames), "tick": ticks}
-            lies = []
         else:
             names = [name for name in _TICKS if name in columns]
             counted = {"t_ns": np.arange(self.plan.ticks_per_clip) * (10**9 // TICK_RATE_HZ)}
@@ -184,7 +184,7 @@ class _Part:
             for name, values in counted.items()
             if not np.array_equal(columns[name], values)
         ]
-        if content_hash(self.table, columns) != clip["content"][self.table]:  # type: ignore[literal-required]
+        if content_hash(self.table, columns) != clip["content"][self.table]:
             lies.append(
                 f"the rows {of_clip} must have the hash that manifest.json records; they have another"
             )
