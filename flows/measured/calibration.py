@@ -199,8 +199,12 @@ def _frozen(
             {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(stage).items()}
             for stage in procedure.stages
         ],
-        # effects of the base keep the bounds of their own fit
-        "bounds": {effect: limits for effect, limits in before["bounds"].items() if effect in fitted.effects}
+        # numbers of the base keep the bounds of their own fit
+        "bounds": {
+            group: limits
+            for group, limits in before["bounds"].items()
+            if group in fitted.effects or group not in EFFECT_UNITS
+        }
         | {
             group: {"unit": bounds.unit, "lower": bounds.lower, "upper": bounds.upper}
             for group, bounds in procedure.bounds.items()

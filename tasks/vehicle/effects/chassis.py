@@ -99,7 +99,7 @@ def compute_stick_friction(tyre: Tyre, effects: EffectValues) -> float:
 
 @register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_effective_friction(
-    slip: float, load: float, share: float, tyre: Tyre, effects: EffectValues, wound: float = 0.0
+    slip: float, load: float, share: float, tyre: Tyre, effects: EffectValues
 ) -> float:
     """Return the friction of a tyre of which a share sticks, at a braking slip [1].
 
@@ -110,21 +110,17 @@ def compute_effective_friction(
     share : share of the tyre that sticks [1]
     tyre : the tyre on the surface
     effects : numbers of the vehicle's effects
-    wound : lateral force of the sticking tyre over its friction, before braking takes its part [1]
     """
     rolling = compute_rolling_friction(slip, load, tyre, effects)
     if share == 0.0:
         return rolling
     u = slip / STICK_SLIP
-    sticking = share * compute_stick_friction(tyre, effects) * u / sqrt(1.0 + u * u)
-    if wound != 0.0:
-        sticking /= max(sqrt(u * u / (1.0 + u * u) + wound * wound), 1.0)
-    return (1.0 - share) * rolling + sticking
+    return (1.0 - share) * rolling + share * compute_stick_friction(tyre, effects) * u / sqrt(1.0 + u * u)
 
 
 @register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_effective_slope(
-    slip: float, load: float, share: float, tyre: Tyre, effects: EffectValues, wound: float = 0.0
+    slip: float, load: float, share: float, tyre: Tyre, effects: EffectValues
 ) -> float:
     """Return the derivative of ``compute_effective_friction`` by slip [1].
 
@@ -135,17 +131,14 @@ def compute_effective_slope(
     share : share of the tyre that sticks [1]
     tyre : the tyre on the surface
     effects : numbers of the vehicle's effects
-    wound : lateral force of the sticking tyre over its friction, before braking takes its part [1]
     """
     rolling = compute_rolling_slope(slip, load, tyre, effects)
     if share == 0.0:
         return rolling
     u = slip / STICK_SLIP
-    sticking = share * compute_stick_friction(tyre, effects) / STICK_SLIP / (1.0 + u * u) ** 1.5
-    square = u * u / (1.0 + u * u) + wound * wound
-    if square > 1.0:
-        sticking *= wound * wound / square**1.5
-    return (1.0 - share) * rolling + sticking
+    return (1.0 - share) * rolling + share * compute_stick_friction(tyre, effects) / STICK_SLIP / (
+        1.0 + u * u
+    ) ** 1.5
 
 
 @register_jitable(cache=True, error_model="numpy", forceinline=True)

@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 from numba.extending import register_jitable
 
-from tasks.vehicle.effects.chassis import STICK_SLIP
 from tasks.vehicle.effects.table import EffectValues
 
 LEAST_REACH = 0.002
@@ -23,18 +22,16 @@ class LateralHold(NamedTuple):
 
     Parameters
     ----------
-    wound : lateral force over friction, before braking takes its part, in [-1, 1] [1]
     link_force : vertical force that the links make of the lateral force; it pulls body and wheel together where
         positive [N]
     rate : rate of the lateral deflection [m/s]
     """
 
-    wound: float
     link_force: float
     rate: float
 
 
-NO_HOLD = LateralHold(0.0, 0.0, 0.0)
+NO_HOLD = LateralHold(0.0, 0.0)
 """Hold of tyres without a lateral stiffness."""
 
 
@@ -54,7 +51,7 @@ def compute_lateral_deflection_rate(deflection: float, speed: float, reach: floa
 @register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_lateral_hold(
     deflection: float,
-    slip: float,
+    brake_force: float,
     travel: float,
     rate: float,
     speed: float,
@@ -64,29 +61,26 @@ def compute_lateral_hold(
 ) -> LateralHold:
     """Return how the tyres of an axle hold the road sideways.
 
-    The lateral force acts on the body by virtual work: force times the contact's lateral travel per suspension travel.
+    Braking comes first: the lateral force gets what the friction circle leaves. It acts on the body by virtual work, as
+    the force times the contact's lateral travel per suspension travel.
 
     Parameters
     ----------
     deflection : lateral deflection of the axle's tyres [m]
-    slip : signed braking slip [1]
+    brake_force : braking force of the axle [N]
     travel, rate : extension of the strut and its rate, rebound positive [m, m/s]
     speed : speed of the vehicle [m/s]
-    limit : friction of the axle's tyres where they stick [N]
+    limit : friction of the axle's tyres [N]
     share : share of the tyres that sticks [1]
     effects : numbers of the vehicle's effects
     """
     if effects.lateral_stiffness <= 0.0:
         return NO_HOLD
-    wound = 0.0
-    if limit > 0.0:
-        wound = min(max(effects.lateral_stiffness * deflection / limit, -1.0), 1.0)
-    u = slip / STICK_SLIP
-    force = limit * wound / max(sqrt(u * u / (1.0 + u * u) + wound * wound), 1.0)
+    left = sqrt(max(limit * limit - brake_force * brake_force, 0.0))
+    force = min(max(effects.lateral_stiffness * deflection, -left), left)
     incline = effects.track_change + effects.track_change_by_travel * travel
     sideways = speed * effects.bump_steer * travel + incline * rate
     return LateralHold(
-        wound,
         share * force * incline,
         compute_lateral_deflection_rate(deflection, sideways, limit / effects.lateral_stiffness),
     )

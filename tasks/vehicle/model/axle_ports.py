@@ -10,7 +10,6 @@ from tasks.vehicle.effects.brake_line import compute_acting_pressure
 from tasks.vehicle.effects.chassis import (
     compute_effective_friction,
     compute_lateral_reserve,
-    compute_stick_friction,
     compute_stick_share,
 )
 from tasks.vehicle.effects.equations import compute_friction_factor
@@ -75,7 +74,7 @@ def compute_signed_slip(speed: float, rim_speed: float, speed_floor: float) -> f
 
 @register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_signed_friction(
-    slip: float, load: float, share: float, tyre: Tyre, effects: EffectValues, wound: float = 0.0
+    slip: float, load: float, share: float, tyre: Tyre, effects: EffectValues
 ) -> float:
     """Return the friction of the tyre, continued as an odd function to driving slip [1].
 
@@ -86,9 +85,8 @@ def compute_signed_friction(
     share : share of the tyre that sticks [1]
     tyre : the tyre on the surface
     effects : numbers of the vehicle's effects
-    wound : lateral force of the sticking tyre over its friction, before braking takes its part [1]
     """
-    friction = compute_effective_friction(abs(slip), load, share, tyre, effects, wound)
+    friction = compute_effective_friction(abs(slip), load, share, tyre, effects)
     return friction if slip >= 0.0 else -friction
 
 
@@ -179,14 +177,12 @@ def compute_rolling_axle(
     pressure = compute_acting_pressure(instant.pressure, speed, memory.disc_rise, effects)
     pressure *= max(1.0 + forms.brake_torque, 0.0)
     sticking = compute_stick_share(speed, effects)
-    limit = compute_stick_friction(tyre, effects) * grip * ground.load
-    hold = compute_lateral_hold(
-        memory.lateral, force_slip, strut.travel, strut.rate, speed, limit, sticking, effects
-    )
     tyre_force = (
-        compute_signed_friction(force_slip, ground.load, sticking, tyre, effects, hold.wound)
-        * grip
-        * ground.load
+        compute_signed_friction(force_slip, ground.load, sticking, tyre, effects) * grip * ground.load
+    )
+    limit = tyre.peak * grip * ground.load
+    hold = compute_lateral_hold(
+        memory.lateral, tyre_force, strut.travel, strut.rate, speed, limit, sticking, effects
     )
     wanted = (
         compute_abs_command(slip, tyre.target_slip, wheels.release_width)
@@ -229,8 +225,9 @@ def compute_standing_axle(
     tyre : the tyre on the surface
     """
     tyre_force = -ground.load * ground.slope - pull
-    limit = compute_stick_friction(tyre, effects) * ground.load
-    hold = compute_lateral_hold(memory.lateral, 0.0, strut.travel, strut.rate, 0.0, limit, 1.0, effects)
+    hold = compute_lateral_hold(
+        memory.lateral, tyre_force, strut.travel, strut.rate, 0.0, tyre.peak * ground.load, 1.0, effects
+    )
     return AxlePorts(
         ground,
         0.0,

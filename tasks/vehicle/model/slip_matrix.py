@@ -54,9 +54,8 @@ def compute_axle_slope(
 ) -> AxleSlope:
     """Return the derivatives of speed and wheel rate through the slip of one axle.
 
-    What is stiff counts as soon as the wheel can reach it within the step: the pad friction of a locked wheel, the
-    anti-lock brake, which takes all torque away within a few percent of slip, and the grip of a sticking tyre, whose
-    force changes its sign within some tenths of a percent. A wheel that is only met there after a
+    What is stiff counts as soon as the wheel can reach it within the step: the pad friction of a locked wheel, and the
+    anti-lock brake, which takes all torque away within a few percent of slip. A wheel that is only met there after a
     step has swung through it, and swings on; its motion then hangs on rounding.
 
     Parameters
@@ -78,14 +77,7 @@ def compute_axle_slope(
     if abs(ports.slip) < 1.0:
         share = compute_stick_share(motion.speed, chassis.effects)
         load = ports.ground.load
-        force = (
-            compute_effective_slope(
-                abs(ports.force_slip), load, share, tyre, chassis.effects, ports.hold.wound
-            )
-            * load
-        )
-        if ports.hold.wound != 0.0 and ports.slip * (ports.slip + slip_per_wheel * change) < 0.0:
-            force = max(force, ports.tyre_force / ports.slip)
+        force = compute_effective_slope(abs(ports.force_slip), load, share, tyre, chassis.effects) * load
         width = wheels.release_width * tyre.target_slip
         ahead = ports.slip + slip_per_wheel * change
         enters = (

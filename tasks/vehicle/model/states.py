@@ -123,7 +123,8 @@ def unpack_state(row: NDArray[np.float64]) -> VehicleState:
     """
     v = row
     return VehicleState(
-        v[0], Motion(v[1], v[2], v[3], v[4]), Memory(AxleMemory(v[5], v[6], v[7], v[27]), AxleMemory(v[8], v[9], v[10], v[28])),
+        v[0], Motion(v[1], v[2], v[3], v[4]),
+        Memory(AxleMemory(v[5], v[6], v[7], v[27]), AxleMemory(v[8], v[9], v[10], v[28])),
         (v[11], v[12], v[13], v[14], v[15], v[16], v[17], v[18]), v[19], v[20], v[21], v[22], bool(v[23]), v[24],
         v[25], v[26],
     )  # fmt: skip
