@@ -1,5 +1,7 @@
 """The physics audit: a dataset's stored telemetry compared with the physical laws that it must follow."""
 
+import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +11,7 @@ from catalogs.documents import read_yaml
 from catalogs.low_speed import load_kept_low_speed
 from catalogs.studies.ablation import cut_coupling, load_kept_families
 from catalogs.surfaces import load_surface
+from catalogs.tyres import VERSIONS, tyre_entries
 from catalogs.variants import warn_of_variant
 from catalogs.vehicles import load_vehicle
 from flows.making.driving import collect_surface_depths, surface_of
@@ -30,8 +33,15 @@ from tasks.conventions import (
 )
 from tasks.errors import InputError
 from tasks.eval.physics.audit import PhysicsVerdict, audit_clip
-from tasks.eval.physics.constants import DT, Constants, TyreTables
+from tasks.eval.physics.constants import DT, Constants, TyreNumbers, TyreTables
 from tasks.eval.physics.laws import finite_rows
+from tasks.eval.physics.tyres import read_tyre_numbers
+from tasks.surface.state import SurfaceParameters
+from tasks.vehicle.paper.low_speed import SteadyStop
+from tasks.vehicle.parameters import TyreFamily
+
+NUMBER = r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"
+"""A number of a tyre property file."""
 
 DEPTHS = ("film_depth_mm", "snow_depth_mm", "snow_coverage")
 """Columns of what lies on the road that is seen."""
@@ -59,12 +69,6 @@ def audit_physics(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     refuse_traced(plan.inputs, dataset, "audit-physics")
     constants = read_constants(root)
     clips = clip_facts(root)
-    held = [facts["label"] for facts in clips if facts["hold_speed"]]
-    if held:
-        raise InputError(
-            f"{dataset}: {len(held)} clips hold their speed until the brake ({held[0]} first), by a force that no"
-            " column records: the physics audit knows coasting cars only"
-        )
     driven = drive_facts(root, plan)
     rows = [
         run_as_stage(_clip_row)(root, facts, driven.get(facts["clip_id"], {}), constants) for facts in clips
@@ -174,25 +178,64 @@ def read_constants(root: Path) -> Constants:
     car = read_yaml(files["vehicle"], "catalogue entry")
     settings = recorded_grid(read_plan_record(layout)["grid"], layout.plan)
     mode, steady = settings.vehicle_mode, load_kept_low_speed(layout.inputs)
-    if mode != "paper" or car.get("effects"):
-        raise InputError(
-            f"{root}: the physics audit knows the laws of the paper's vehicle; this dataset was made in {mode} mode"
-            f"{' with effects' if car.get('effects') else ''}, whose inner steps the stored ticks do not fix."
-        )
-    if car.get("tyre"):
-        raise InputError(
-            f"{root}: the physics audit knows Burckhardt's tyre; this dataset's vehicle drives on {car['tyre']}"
-        )
-    families = {**vehicle.shared_families, **vehicle.families}
-    tyres = {kind: TyreTables(**vars(family)) for kind, family in families.items()}
-    surface = {name: value for name, value in vars(pavement).items() if isinstance(value, float)}
+    return make_constants(
+        _convert_numbers(car), {**vehicle.shared_families, **vehicle.families}, pavement, mode=mode,
+        ticks_per_frame=TICK_RATE_HZ / settings.frame_rate_hz, steady=steady, magic=_read_tyre(car, layout.inputs),
+        effects=vehicle.effects, forms=[(form.port, form.variable) for form in vehicle.forms],
+    )  # fmt: skip
+
+
+def make_constants(
+    car: Mapping[str, float], families: Mapping[str, TyreFamily], pavement: SurfaceParameters, *, mode: str,
+    ticks_per_frame: float, steady: SteadyStop | None, magic: TyreNumbers | None = None,
+    effects: Mapping[str, float] | None = None, forms: Sequence[tuple[str, str]] = (),
+) -> Constants:  # fmt: skip
+    """Return what the judge takes as given.
+
+    Parameters
+    ----------
+    car : mechanical numbers of the vehicle, in SI
+    families : tyre families by kind of weather
+    pavement : the road's surface
+    mode : paper or coupled
+    ticks_per_frame : ticks from one frame to the next [1]
+    steady : how the end of a stop is kept steady; None takes the published rule literally
+    magic : the Magic Formula of the tyre; None for Burckhardt's curves
+    effects : numbers that the vehicle adds to the plain laws [units of the table of effects]
+    forms : port and variable of each form that it adds
+    """
     return Constants(
-        car=_convert_numbers(car), surface=surface, tyres=tyres, mode=mode,
-        ticks_per_frame=TICK_RATE_HZ / settings.frame_rate_hz,
+        car=car,
+        surface={name: value for name, value in vars(pavement).items() if isinstance(value, float)},
+        tyres={kind: TyreTables(**vars(family)) for kind, family in families.items()},
+        mode=mode, ticks_per_frame=ticks_per_frame,
         steady_limit=0.0 if steady is None else steady.explicit_limit,
         held_share=0.0 if steady is None else steady.held_share,
         low_speed_rule=steady is None or steady.pitch_rule,
+        magic=magic,
+        # the paper's mode knows no effect
+        effects={k: v for k, v in (effects or {}).items() if v} if mode == "coupled" else {},
+        forms=tuple(forms) if mode == "coupled" else (),
     )  # fmt: skip
+
+
+def _read_tyre(car: Mapping[str, Any], inputs: Path) -> TyreNumbers | None:
+    """Return the kept tyre property file's numbers; None where the vehicle names no tyre."""
+    if not car.get("tyre"):
+        return None
+    return read_property_file((inputs / f"{car['tyre']}.tir").read_bytes())
+
+
+def read_property_file(content: bytes) -> TyreNumbers:
+    """Return the numbers of a tyre property file as the judge takes them.
+
+    Parameters
+    ----------
+    content : of the file
+    """
+    entries = tyre_entries(content)
+    numbers = {name: float(value) for name, value in entries.items() if re.fullmatch(NUMBER, value)}
+    return read_tyre_numbers(numbers, newer=VERSIONS[entries["FITTYP"]] == "MF 6.1")
 
 
 def _convert_numbers(entry: dict[str, Any]) -> dict[str, float]:

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from tasks.eval.physics.body import body_laws, outcome_laws, surface_laws
 from tasks.eval.physics.constants import Constants
+from tasks.eval.physics.coupled_laws import coupled_laws
 from tasks.eval.physics.frames import frame_laws, pose_laws
 from tasks.eval.physics.half_step import follow_half_step
-from tasks.eval.physics.laws import Law, command_laws, motion_laws, wheel_laws
+from tasks.eval.physics.laws import Law, command_laws, motion_laws, road_height_laws, wheel_laws
 from tasks.eval.physics.pose_check import pose_check_laws
 
 COPIED = "frame rows are ticks: "
@@ -90,13 +91,20 @@ def evaluate_laws(
     ----------
     ticks, frames, facts, constants : as in ``audit_clip``
     """
-    half = follow_half_step(ticks, facts, constants)
+    if constants.mode == "paper":
+        half = follow_half_step(ticks, facts, constants)
+        moving = [
+            *wheel_laws(ticks, facts, "f", constants, half),
+            *wheel_laws(ticks, facts, "r", constants, half),
+            *motion_laws(ticks, facts, constants, half),
+            *road_height_laws(ticks, facts, constants),
+            *body_laws(ticks, facts, constants, half),
+        ]
+    else:
+        moving = coupled_laws(ticks, facts, constants)
     found = [
-        *wheel_laws(ticks, facts, "f", constants, half),
-        *wheel_laws(ticks, facts, "r", constants, half),
-        *motion_laws(ticks, facts, constants, half),
-        *command_laws(ticks, facts, constants),
-        *body_laws(ticks, facts, constants, half),
+        *moving,
+        *command_laws(ticks, facts),
         *surface_laws(facts, constants),
         *frame_laws(ticks, frames, facts, constants),
         *pose_laws(frames, constants),

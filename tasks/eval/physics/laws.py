@@ -5,7 +5,7 @@ rounding. No tolerance is tuned to the size of a fault.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,12 +14,17 @@ from numpy.typing import NDArray
 from tasks.eval.physics.constants import (
     Constants,
     Floats,
-    compute_burckhardt_friction,
-    peak_slip,
     pressure_at,
     raised_cosine,
 )
-from tasks.eval.physics.half_step import INNER_STEP, HalfStep, find_brake_onset, pressure_shape
+from tasks.eval.physics.half_step import (
+    INNER_STEP,
+    HalfStep,
+    find_brake_onset,
+    find_held_rows,
+    pressure_shape,
+)
+from tasks.eval.physics.tyres import find_curve
 
 ROUNDING = 1e-9
 """Relative error that double-precision sums of a run may carry [1]."""
@@ -44,17 +49,30 @@ class Law:
     columns : the columns that it relates, as table.column
     excess : largest residual over its tolerance; above 1 the law is broken [1]
     at : row of the largest excess [1]
+    size : the residual there, in the unit of ``of`` [any]
+    of : the column that the residual is one of
     """
 
     name: str
     columns: frozenset[str]
     excess: float
     at: int
+    size: float
+    of: str
 
     @property
     def broken(self) -> bool:
         """Whether the telemetry breaks it; a law that cannot be evaluated is broken."""
         return not self.excess <= 1.0
+
+    def moved_to(self, rows: NDArray[np.int64]) -> "Law":
+        """Return the law with its row counted in the table.
+
+        Parameters
+        ----------
+        rows : rows of the table that were judged [1]
+        """
+        return replace(self, at=int(rows[self.at]))
 
 
 def evaluate_law(
@@ -65,8 +83,8 @@ def evaluate_law(
     Parameters
     ----------
     name : what it says
-    columns : names, separated by blanks; those without a table are of ``table``
-    residual, tolerance : [N], in one unit; NaN residuals of masked rows must be left out before [any]
+    columns : names, separated by blanks; those without a table are of ``table``; the residual is one of the first
+    residual, tolerance : [N], in its unit; NaN residuals of masked rows must be left out before [any]
     table : default table
     """
     residual = np.atleast_1d(residual)
@@ -74,9 +92,12 @@ def evaluate_law(
         return None
     excess = np.abs(residual) / tolerance
     worst = int(np.argmax(np.where(np.isfinite(excess), excess, np.inf)))
-    names = frozenset(c if "." in c else f"{table}.{c}" for c in columns.split())
+    names = [c if "." in c else f"{table}.{c}" for c in columns.split()]
     value = float(excess[worst])
-    return Law(name=name, columns=names, excess=value if np.isfinite(value) else np.inf, at=worst)
+    return Law(
+        name=name, columns=frozenset(names), excess=value if np.isfinite(value) else np.inf, at=worst,
+        size=abs(float(residual[worst])), of=names[0],
+    )  # fmt: skip
 
 
 def rounding_tolerance(*terms: Floats) -> Floats:
@@ -103,18 +124,15 @@ def wheel_laws(
     constants : car and pavement
     half : state half a tick after each tick
     """
-    car, tyre = constants.car, constants.tyres[facts["weather"]]
+    car, curve = constants.car, find_curve(facts, constants)
     v, omega = ticks["speed"], ticks[f"wheel_speed_{axle}"]
     kappa, force = ticks[f"braking_slip_{axle}"], ticks[f"tyre_force_{axle}"]
     torque, q, load = (ticks[f"{c}_{axle}"] for c in ("brake_torque", "abs_scale", "tyre_load"))
     radius, inertia = car["wheel_radius"], car[f"wheel_inertia_{axle}"]
-    beta = tyre.at(tyre.slip_stiffness, facts["surface_friction"])
-    top = peak_slip(tyre.burckhardt)
-    target, width = top / beta, car["abs_release_width"]
+    target, width = curve.target_slip, car["abs_release_width"]
 
     slip = np.clip((v - radius * omega) / np.maximum(v, car["slip_speed_floor"]), 0.0, 1.0)
-    grip = facts["tyre_peak"] * compute_burckhardt_friction(beta * kappa, tyre.burckhardt)
-    grip = grip / compute_burckhardt_friction(np.array(top), tyre.burckhardt)
+    grip = curve.friction(kappa, load)
     asked = np.clip((target * (1 + width) - kappa) / (width * target), 0.0, 1.0)
     gain = constants.brake_share(axle) * car["brake_gain"]
 
@@ -169,8 +187,9 @@ def motion_laws(
     both = np.flatnonzero(moves[1:] & moves[:-1]) + 1
     h = INNER_STEP
     coast = np.where(moves, car["coast_deceleration"], 0.0)
-    net = np.where(moves, (road - force) / m, 0.0) - coast
     time = ticks["t_ns"]
+    held = find_held_rows(1e-3 * np.arange(len(s)), facts, find_brake_onset(ticks, facts))
+    net = np.where(held, 0.0, np.where(moves, (road - force) / m, 0.0) - coast)
 
     later = half.acceleration
     uncertainty = (half.load_uncertainty["f"] + half.load_uncertainty["r"])[both - 1] / m
@@ -228,19 +247,15 @@ def motion_laws(
     return laws
 
 
-def command_laws(
-    ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants
-) -> list[Law | None]:
-    """Return the laws of brake pressure and road heights as the scenario commands them.
+def command_laws(ticks: Mapping[str, Floats], facts: Mapping[str, Any]) -> list[Law | None]:
+    """Return the law of the brake pressure as the scenario commands it.
 
     Parameters
     ----------
     ticks : columns of the tick table
     facts : the clip's row
-    constants : car and pavement
     """
-    s, v = ticks["station"], ticks["speed"]
-    time: Floats = 1e-3 * np.arange(len(s), dtype=np.float64)
+    time: Floats = 1e-3 * np.arange(len(ticks["speed"]), dtype=np.float64)
     onset = find_brake_onset(ticks, facts)
     peak, ramp, hold, lasting = pressure_shape(facts)
     pressure = ticks["brake_pressure_mpa"]
@@ -255,7 +270,22 @@ def command_laws(
     columns = f"brake_pressure_mpa clips.peak_pressure_mpa clips.ramp_s clips.brake_onset_s{release}"
     if by_place:
         columns = columns.replace("brake_onset_s", "brake_onset_m")
-    laws = [evaluate_law("brake pressure as commanded", columns, pressure - wanted, slack)]
+    return [evaluate_law("brake pressure as commanded", columns, pressure - wanted, slack)]
+
+
+def road_height_laws(
+    ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants
+) -> list[Law | None]:
+    """Return the laws of the road heights under both axles.
+
+    Parameters
+    ----------
+    ticks : columns of the tick table
+    facts : the clip's row
+    constants : car and pavement
+    """
+    s, v = ticks["station"], ticks["speed"]
+    laws = []
     hump = facts["hazard_center_m"], facts["hazard_length_m"], facts["hazard_height_m"]
     moves = v > 0
     for axle, behind in (("f", 0.0), ("r", constants.wheelbase)):
