@@ -26,6 +26,8 @@ WET = ("rain",)
 """Kinds of weather in which water lies on the road."""
 
 
+HIT = 0.2
+"""Change of an axle's load within a tick, over its load at rest, that no hop of the wheel makes [1]."""
 NEAR = 1e-4
 """Slip by which a slope of the tyre's curve is taken [1]."""
 
@@ -45,6 +47,8 @@ class AxleForces:
     spin : acceleration of the wheel [rad/s2]
     stiffness : share of a wheel speed's deviation that is gone each second [1/s]
     turns : the wheel's acceleration would carry its slip through 0, or through the ABS's band, within half a tick [N]
+    flips : acceleration that the ABS may give between ticks, where the slip meets an edge of its band [rad/s2]
+    pull : what tyre and brake together could give the wheel [rad/s2]
     hidden : largest change of the tyre force that a tick can hide [N]
     linked : the same of the force that links and a tilted tyre force pass on [N]
     strut : force of spring, damper and links [N]
@@ -63,6 +67,8 @@ class AxleForces:
     spin: Floats
     stiffness: Floats
     turns: NDArray[np.bool_]
+    flips: Floats
+    pull: Floats
     hidden: Floats
     linked: Floats
     strut: Floats
@@ -75,7 +81,7 @@ class Forces:
 
     Parameters
     ----------
-    moves, held : the car rolls; the driver holds its speed [N]
+    moves, held, hits : the car rolls; the driver holds its speed; a wheel leaves the road or meets it [N]
     axles : by f and r
     road : force of the road's slope, forward positive [N] [N]
     acceleration : dv/dt [N] [m/s2]
@@ -85,6 +91,7 @@ class Forces:
 
     moves: NDArray[np.bool_]
     held: NDArray[np.bool_]
+    hits: NDArray[np.bool_]
     axles: Mapping[str, AxleForces]
     road: Floats
     acceleration: Floats
@@ -138,7 +145,7 @@ def compute_forces(ticks: Mapping[str, Floats], facts: Mapping[str, Any], consta
         for axle in "fr"
     )  # fmt: skip
     return Forces(
-        moves=moves, held=held, axles=axles, road=road, acceleration=acceleration,
+        moves=moves, held=held, hits=find_hits(ticks, constants), axles=axles, road=road, acceleration=acceleration,
         heave=(e("aero_lift", 0.0) * v**2 - strut_f - strut_r) / car["sprung_mass"],
         hidden=np.asarray(hidden + met),
         pitch=(car["cg_to_front_axle"] * strut_f - car["cg_to_rear_axle"] * strut_r + moment) / car["pitch_inertia"],
@@ -183,6 +190,10 @@ def _compute_axle(
     slow = np.where(np.abs(omega) < car["lock_speed"], gain * line / car["lock_speed"], 0.0)
     stiffness = ((steepest * radius + gain * line / band) / per_slip + slow) / inertia
     room = np.where(spread((q < 1.0).astype(float), 2) > 0, np.minimum(np.abs(kappa), band), np.abs(kappa))
+    sways = 3.0 * spread(np.abs(np.diff(kappa, prepend=kappa[:1])), 2)
+    sways = np.maximum(sways, 0.1 * band)
+    meets = [np.abs(kappa - edge) < sways for edge in (curve.target_slip, curve.target_slip + band)]
+    flips = np.where(meets[0] | meets[1], gain * line / inertia * np.minimum(sways / band, 1.0), 0.0)
     turns = spread((np.abs(spin) * DT >= 0.5 * room * per_slip).astype(float), 2) > 0
     arm = -car["cg_to_front_axle"] if axle == "f" else car["cg_to_rear_axle"]
     travel = ticks["heave"] - u + arm * ticks["pitch"]
@@ -192,6 +203,7 @@ def _compute_axle(
     links = compute_links(force, load, travel, v, axle, curve, constants)
     dry, tilt = e("coulomb_friction", 0.0) / 0.01, e("force_tilt", 0.0)
     hidden = np.where(turns, 2.0 * np.abs(force), inertia / radius * spread(np.abs(spin), 2))
+    hidden = hidden + flips * inertia / radius
     name = "anti_dive" if axle == "f" else "anti_lift"
     passes = abs(e(name, 0.0)) + abs(e(f"stick_{name}", 0.0))
     return AxleForces(
@@ -201,7 +213,8 @@ def _compute_axle(
         tyre_force=np.where(moves, grip(kappa), rest),
         torque=np.where(moves, torque, radius * force),
         torque_error=_doubt_line(line, facts, constants) * gain,
-        spin=spin, stiffness=stiffness, turns=turns & moves,
+        spin=spin, stiffness=stiffness, turns=turns & moves, flips=flips,
+        pull=(np.abs(radius * force) + np.abs(ticks[f"brake_torque_{axle}"])) / inertia,
         hidden=hidden, linked=hidden * (passes * car["cg_height"] / constants.wheelbase + tilt * np.abs(slope)),
         strut=strut - links if axle == "f" else strut + links,
         strut_error=(damper * (1.0 + abs(e("damper_asymmetry", 0.0))) + dry) * rate_error,
@@ -244,6 +257,22 @@ def differentiate(values: Floats) -> tuple[Floats, Floats]:
     wide, near = np.gradient(values, DT), np.gradient(values, DT)
     wide[2:-2] = (values[:-4] - 8 * values[1:-3] + 8 * values[3:-1] - values[4:]) / (12 * DT)
     return wide, spread(np.abs(wide - near), 2)
+
+
+def find_hits(ticks: Mapping[str, Floats], constants: Constants) -> NDArray[np.bool_]:
+    """Return the ticks about which a wheel leaves the road or meets it within a tick, [N].
+
+    Parameters
+    ----------
+    ticks : columns of the tick table
+    constants : car and pavement
+    """
+    jumps = [
+        np.abs(np.diff(ticks[f"axle_load_{axle}"], prepend=ticks[f"axle_load_{axle}"][:1]))
+        > HIT * constants.static_load(axle)
+        for axle in "fr"
+    ]
+    return spread((jumps[0] | jumps[1]).astype(float), 3) > 0
 
 
 def spread(values: Floats, ticks: int) -> Floats:
