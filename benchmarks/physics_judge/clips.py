@@ -130,7 +130,9 @@ def make_route(length: float) -> Route:
 
 
 def _read_constants(vehicle: Vehicle, mode: Mode) -> Constants:
-    car = {f.name: value for f in fields(vehicle) if isinstance(value := getattr(vehicle, f.name), float | int)}
+    car = {
+        f.name: value for f in fields(vehicle) if isinstance(value := getattr(vehicle, f.name), float | int)
+    }
     steady = load_low_speed()
     magic = None if vehicle.tyre is None else read_property_file(find_entry("tyre", TYRE).read_bytes())
     return make_constants(

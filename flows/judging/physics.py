@@ -9,6 +9,7 @@ import numpy as np
 
 from catalogs.documents import read_yaml
 from catalogs.low_speed import load_kept_low_speed
+from catalogs.scenes import load_scene
 from catalogs.studies.ablation import cut_coupling, load_kept_families
 from catalogs.surfaces import load_surface
 from catalogs.tyres import VERSIONS, tyre_entries
@@ -16,15 +17,18 @@ from catalogs.variants import warn_of_variant
 from catalogs.vehicles import load_vehicle
 from flows.making.driving import collect_surface_depths, surface_of
 from flows.making.input_changes import refuse_changed_records
+from flows.making.places import find_scene, refuse_changed_scene
 from flows.making.plan import TICK_RATE_HZ, Plan
 from flows.making.traced import refuse_traced
 from flows.running.orchestration import run_as_stage
+from flows.running.progress import progress_bar
 from flows.store.address import open_for_reading, want_telemetry
 from flows.store.layout import Layout
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest, read_plan_record, recorded_grid
 from flows.store.telemetry import read_columns, read_table
 from tasks.conventions import (
+    CHANNELS_BY_NAME,
     CLIP_CHANNELS,
     FRAME_CHANNELS,
     IDENTITY_CHANNELS,
@@ -34,7 +38,8 @@ from tasks.conventions import (
 from tasks.errors import InputError
 from tasks.eval.physics.audit import PhysicsVerdict, audit_clip
 from tasks.eval.physics.constants import DT, Constants, TyreNumbers, TyreTables
-from tasks.eval.physics.laws import finite_rows
+from tasks.eval.physics.laws import Law, finite_rows
+from tasks.eval.physics.route import RouteLine
 from tasks.eval.physics.tyres import read_tyre_numbers
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.paper.low_speed import SteadyStop
@@ -50,18 +55,22 @@ DEPTHS = ("film_depth_mm", "snow_depth_mm", "snow_coverage")
 def audit_physics(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     """Work every stored column out again from the others, and name the column of a clip that breaks a law.
 
+    Both vehicle modes, held speeds, any tyre and any calibrated or grown vehicle are judged. A law that an effect, a form
+    or a steep road feature makes depend on what no column holds stands under ``not_judged``. Where the scene is at
+    hand, every frame's pose is held against its route.
+
     Where a coupling is cut on purpose, the motion is held against the scenario that its variant drives, and the result
     says so; the depths of film and snow are then the picture's, and are held against nothing.
 
     Parameters
     ----------
-    dataset : a finished dataset in the paper's vehicle mode
+    dataset : a finished dataset
     out : folder for physics.json
 
     Raises
     ------
     InputError
-        If the folder is no finished dataset, a table lacks columns, or its mode's laws are not known here.
+        If the folder is no finished dataset, or a table lacks columns.
     """
     results = Outputs(out, "audit-physics", "physics.json")
     root = open_for_reading(dataset, want_telemetry).root
@@ -70,15 +79,20 @@ def audit_physics(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     constants = read_constants(root)
     clips = clip_facts(root)
     driven = drive_facts(root, plan)
-    rows = [
-        run_as_stage(_clip_row)(root, facts, driven.get(facts["clip_id"], {}), constants) for facts in clips
-    ]
+    route = find_route(plan.scene)
+    rows = []
+    with progress_bar("laws of clip", len(clips)) as advance:
+        for facts in clips:
+            row = run_as_stage(_clip_row)(root, facts, driven.get(facts["clip_id"], {}), constants, route)
+            advance(facts["label"], failed=not row["passed"])
+            rows.append(row)
     broken = [row for row in rows if not row["passed"]]
     result = {
         "verified": not broken,
         "variant": plan.settings.variant,
         **({"warning": warning} if (warning := warn_of_variant(plan.settings.variant)) else {}),
         "clips_checked": len(rows),
+        "poses_checked": route is not None,
         "laws_checked": sum(row["laws"] for row in rows),
         "wheels_lifted": [row["label"] for row in rows if not row["superposition_holds"]],
         "clips": rows,
@@ -161,7 +175,7 @@ def read_constants(root: Path) -> Constants:
     Raises
     ------
     InputError
-        If a file is missing, or the dataset was made in another mode or with effects.
+        If a file is missing or has a wrong form.
     """
     layout = Layout(root)
     files = {name: layout.inputs / f"{name}.yaml" for name in ("vehicle", "surface")}
@@ -249,31 +263,62 @@ def _convert_numbers(entry: dict[str, Any]) -> dict[str, float]:
 
 
 def _clip_row(
-    root: Path, seen: dict[str, Any], driven: dict[str, Any], constants: Constants
+    root: Path, seen: dict[str, Any], driven: dict[str, Any], constants: Constants, route: RouteLine | None
 ) -> dict[str, Any]:
     ticks, frames = clip_columns(root, "ticks", seen), clip_columns(root, "frames", seen)
     facts = seen | driven
     frames |= {name: np.full(len(frames["t_ns"]), driven[name]) for name in DEPTHS if name in driven}
     holes = [f"ticks.{c}" for c in finite_rows(ticks)]
     with np.errstate(all="ignore"):  # stored values may be infinite; a law that infinity enters is broken
-        verdict = audit_clip(ticks, frames, facts, constants)
+        verdict = audit_clip(ticks, frames, facts, constants, route)
     lifted = {
         f"wheel_lift_time_{axle}": float(np.sum(~ticks[f"contact_{axle}"].astype(bool))) * DT for axle in "fr"
     }
     contact = lifted | {"superposition_holds": not any(lifted.values())}
-    row = {"clip_id": facts["clip_id"], "label": facts["label"], **_as_row(verdict), "not_finite": holes}
+    row = {
+        "clip_id": facts["clip_id"],
+        "label": facts["label"],
+        **_as_row(verdict, frames["tick"]),
+        "not_finite": holes,
+    }
     return row | contact
 
 
-def _as_row(verdict: PhysicsVerdict) -> dict[str, Any]:
+def find_route(scene: Mapping[str, Any]) -> RouteLine | None:
+    """Return the route of the recorded scene; None where that is not at hand, or is another one by now.
+
+    Parameters
+    ----------
+    scene : ``name`` and ``sha256``, of a plan
+    """
+    try:
+        refuse_changed_scene(scene)
+        route = load_scene(find_scene(scene)).route
+    except InputError:
+        return None
+    return RouteLine(station=route.station, T_world_rig=route.T_world_rig)
+
+
+def _as_row(verdict: PhysicsVerdict, frame_ticks: np.ndarray) -> dict[str, Any]:
     return {
         "passed": verdict.passed,
         "laws": len(verdict.laws),
         "column": verdict.column,
         "also": list(verdict.also),
-        "broken": [
-            {"law": x.name, "excess": min(x.excess, 1e300), "row": x.at, "columns": sorted(x.columns)}
-            for x in verdict.broken
-        ],
+        "broken": [_describe_break(law, frame_ticks) for law in verdict.broken],
+        "not_judged": dict(verdict.not_judged),
         "tightest": max((x.excess for x in verdict.laws if not x.broken), default=0.0),
     }
+
+
+def _describe_break(law: Law, frame_ticks: np.ndarray) -> dict[str, Any]:
+    """Law, place and size of a break; ``tick`` is null where a law is of the clip's row."""
+    table, _, name = law.of.partition(".")
+    tick = {"ticks": law.at, "frames": int(frame_ticks[law.at]) if law.at < len(frame_ticks) else None}.get(
+        table
+    )
+    channel = CHANNELS_BY_NAME.get(name)
+    return {
+        "law": law.name, "excess": min(law.excess, 1e300), "row": law.at, "tick": tick,
+        "size": min(law.size, 1e300), "unit": channel.unit if channel else "", "columns": sorted(law.columns),
+    }  # fmt: skip

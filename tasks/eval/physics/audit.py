@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from tasks.eval.physics.body import body_laws, outcome_laws, surface_laws
 from tasks.eval.physics.constants import Constants
 from tasks.eval.physics.coupled_laws import coupled_laws
+from tasks.eval.physics.effects import find_unjudged
 from tasks.eval.physics.frames import frame_laws, pose_laws
 from tasks.eval.physics.half_step import follow_half_step
 from tasks.eval.physics.laws import Law, command_laws, motion_laws, road_height_laws, wheel_laws
 from tasks.eval.physics.pose_check import pose_check_laws
+from tasks.eval.physics.route import RouteLine, route_laws
 
 COPIED = "frame rows are ticks: "
 """Prefix of the names of the laws that relate the two tables."""
@@ -39,12 +41,14 @@ class PhysicsVerdict:
     laws : all that could be evaluated
     column : the column that explains the broken laws best, as table.column; empty if none is broken
     also : columns that explain the broken laws as well
+    not_judged : laws that this car or road takes away, each with the reason
     """
 
     passed: bool
     laws: tuple[Law, ...]
     column: str
     also: tuple[str, ...]
+    not_judged: Mapping[str, str]
 
     @property
     def broken(self) -> tuple[Law, ...]:
@@ -57,6 +61,7 @@ def audit_clip(
     frames: Mapping[str, NDArray[Any]],
     facts: Mapping[str, Any],
     constants: Constants,
+    route: RouteLine | None = None,
 ) -> PhysicsVerdict:
     """Check one clip's stored columns by every law.
 
@@ -66,8 +71,9 @@ def audit_clip(
     frames : columns of the frame table
     facts : the clip's row: scenario, surface, outcome and check
     constants : frozen car and pavement
+    route : the scene's route; None where it is not at hand, and no pose is held against it
     """
-    laws = evaluate_laws(ticks, frames, facts, constants)
+    laws = evaluate_laws(ticks, frames, facts, constants, route)
     suspects = rank_suspects(laws)
     if len(suspects) > 1:
         suspects = _rank_by_pattern(suspects, laws, ticks, frames, facts, constants)
@@ -76,6 +82,7 @@ def audit_clip(
         laws=laws,
         column=suspects[0] if suspects else "",
         also=tuple(suspects[1:]),
+        not_judged=find_unjudged(facts, constants),
     )
 
 
@@ -84,12 +91,13 @@ def evaluate_laws(
     frames: Mapping[str, NDArray[Any]],
     facts: Mapping[str, Any],
     constants: Constants,
+    route: RouteLine | None = None,
 ) -> tuple[Law, ...]:
     """Evaluate every law that can be evaluated on one clip.
 
     Parameters
     ----------
-    ticks, frames, facts, constants : as in ``audit_clip``
+    ticks, frames, facts, constants, route : as in ``audit_clip``
     """
     if constants.mode == "paper":
         half = follow_half_step(ticks, facts, constants)
@@ -108,10 +116,12 @@ def evaluate_laws(
         *surface_laws(facts, constants),
         *frame_laws(ticks, frames, facts, constants),
         *pose_laws(frames, constants),
+        *route_laws(frames, route, constants),
         *outcome_laws(ticks, facts, constants),
         *pose_check_laws(frames, facts),
     ]
-    return tuple(x for x in found if x is not None)
+    unjudged = find_unjudged(facts, constants)
+    return tuple(x for x in found if x is not None and x.name.split(", ")[0] not in unjudged)
 
 
 def rank_suspects(laws: tuple[Law, ...]) -> list[str]:

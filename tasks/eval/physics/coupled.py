@@ -185,7 +185,9 @@ def _compute_axle(
     inertia, band = car[f"wheel_inertia_{axle}"], car["abs_release_width"] * curve.target_slip
     torque_at_wheel = lever * force - ticks[f"brake_torque_{axle}"] - offset - shaft
     spin = np.where(moves, torque_at_wheel / inertia, 0.0)
-    steepest = np.maximum(grip(np.full(len(v), NEAR)) / NEAR, np.abs(grip(kappa + NEAR) - grip(kappa - NEAR)) / 2 / NEAR)
+    steepest = np.maximum(
+        grip(np.full(len(v), NEAR)) / NEAR, np.abs(grip(kappa + NEAR) - grip(kappa - NEAR)) / 2 / NEAR
+    )
     per_slip = np.maximum(v, car["slip_speed_floor"]) / radius
     slow = np.where(np.abs(omega) < car["lock_speed"], gain * line / car["lock_speed"], 0.0)
     stiffness = ((steepest * radius + gain * line / band) / per_slip + slow) / inertia

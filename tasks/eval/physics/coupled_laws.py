@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tasks.eval.physics.constants import DT, Constants, Floats
 from tasks.eval.physics.coupled import AxleForces, Forces, compute_forces, spread
-from tasks.eval.physics.effects import AXLE, FORCE, HEAVE, PITCH, SUM, TORQUE, find_unjudged
+from tasks.eval.physics.effects import AXLE, FORCE, HEAVE, PITCH, SUM, TORQUE
 from tasks.eval.physics.half_step import INNER_STEP
 from tasks.eval.physics.laws import Law, evaluate_law, rounding_tolerance
 from tasks.eval.physics.tyres import find_curve
@@ -23,7 +23,7 @@ SWING = 20.0
 """Accelerations by which a wheel may swing within a tick that is as long as its time constant or longer [1]."""
 AROUND = 20
 """Ticks about a row whose largest force an error of second order of the inner step follows: a quarter of a hop [1]."""
-SLIGHT = 2e-4
+SLIGHT = 5e-4
 """Share of the clip's largest force that is always in doubt [1]."""
 EDGE = 4
 """Ticks at either end where differences know the axle's rate less well [1]."""
@@ -45,14 +45,12 @@ def coupled_laws(
     constants : car and pavement
     """
     forces = compute_forces(ticks, facts, constants)
-    unjudged = find_unjudged(constants.effects, constants.forms)
-    found = [
+    return [
         *_axle_laws(ticks, facts, forces, "f", constants),
         *_axle_laws(ticks, facts, forces, "r", constants),
         *_motion_laws(ticks, facts, forces, constants),
         *_body_laws(ticks, forces, constants),
     ]
-    return [law for law in found if law is not None and law.name.split(", ")[0] not in unjudged]
 
 
 def integral_law(
@@ -202,7 +200,9 @@ def _body_laws(ticks: Mapping[str, Floats], forces: Forces, constants: Constants
     unsure_heave = error / car["sprung_mass"] + hops * spread(np.abs(forces.heave), AROUND)
     unsure_heave = unsure_heave + SLIGHT * np.abs(forces.heave).max()
     unsure_pitch = (arm * error + 2 * car["cg_height"] * forces.hidden) / car["pitch_inertia"]
-    unsure_pitch = unsure_pitch + hops * spread(np.abs(forces.pitch), AROUND) + SLIGHT * np.abs(forces.pitch).max()
+    unsure_pitch = (
+        unsure_pitch + hops * spread(np.abs(forces.pitch), AROUND) + SLIGHT * np.abs(forces.pitch).max()
+    )
     z, theta, dz, dtheta = (ticks[name] for name in ("heave", "pitch", "heave_rate", "pitch_rate"))
     laws = [
         integral_law("heave is the integral of its rate", "heave heave_rate", z, dz, hits,

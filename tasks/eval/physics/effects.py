@@ -3,7 +3,8 @@
 What an effect remembers (heat, a slip that lags) no column holds: `find_unjudged` names the laws that it takes away.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from scipy.signal import lfilter
@@ -38,19 +39,34 @@ FORMS: Mapping[str, tuple[str, ...]] = {
 """Laws that a form takes away, by its port."""
 
 
-def find_unjudged(effects: Iterable[str], forms: Iterable[tuple[str, str]]) -> dict[str, str]:
-    """Return the laws that are not judged for a car, each with what takes it away.
+STEEP = 1.0
+"""Slope of a road feature above which wheels leave the road and meet it within ticks [1]."""
+STEEP_LAWS = (HEAVE, PITCH, AXLE, "wheel torque balance", "speed is the integral of acceleration",
+              "kinetic energy falls by the work done", "road height as commanded")  # fmt: skip
+"""Laws over a tick that such a feature takes away; those at a tick stay."""
+
+
+def find_unjudged(facts: Mapping[str, Any], constants: Constants) -> dict[str, str]:
+    """Return the laws that are not judged for a clip, each with what takes it away.
 
     Parameters
     ----------
-    effects : names of its effects
-    forms : port and variable of its forms
+    facts : the clip's row
+    constants : car and pavement
     """
-    found = {law: f"effect {name}" for name in effects for law in REMEMBERED.get(name, ())}
-    return found | {law: f"form of {variable} at {port}" for port, variable in forms for law in FORMS[port]}
+    found = {}
+    if facts["hazard_height_m"] and np.pi * abs(facts["hazard_height_m"]) > STEEP * facts["hazard_length_m"]:
+        kept = ("road height as commanded",) if constants.mode == "coupled" else ()
+        found = {law: f"road feature steeper than {STEEP:g}" for law in STEEP_LAWS if law not in kept}
+    found |= {law: f"effect {name}" for name in constants.effects for law in REMEMBERED.get(name, ())}
+    return found | {
+        law: f"form of {variable} at {port}" for port, variable in constants.forms for law in FORMS[port]
+    }
 
 
-def feel_road(station: Floats, hump: tuple[float, float, float], effects: Mapping[str, float]) -> tuple[Floats, Floats]:
+def feel_road(
+    station: Floats, hump: tuple[float, float, float], effects: Mapping[str, float]
+) -> tuple[Floats, Floats]:
     """Return road height [m] and slope [1] that a wheel feels: of its footprint, and where a disc touches.
 
     Parameters
@@ -182,7 +198,7 @@ def compute_pad_pressure(line: Floats, speed: Floats, effects: Mapping[str, floa
     effects : of the car
     """
     e = effects.get
-    factor = (1.0 + e("pressure_curve", 0.0) * line)
+    factor = 1.0 + e("pressure_curve", 0.0) * line
     factor = factor * (1.0 - e("pad_speed", 0.0) * (speed - e("pad_speed_reference", 0.0)))
     return np.maximum(line - e("push_out", 0.0), 0.0) * np.maximum(factor, 0.0)
 
@@ -199,7 +215,9 @@ def compute_strut_force(
     effects : of the car
     """
     e = effects.get
-    force = stiffness * travel + damping * rate * (1.0 + e("damper_asymmetry", 0.0) * np.where(rate > 0.0, 1.0, -1.0))
+    force = stiffness * travel + damping * rate * (
+        1.0 + e("damper_asymmetry", 0.0) * np.where(rate > 0.0, 1.0, -1.0)
+    )
     if e("coulomb_friction", 0.0):
         force = force + e("coulomb_friction", 0.0) * np.tanh(np.clip(rate / COULOMB_SPEED, -20.0, 20.0))
     force = force + e("progressive_rate", 0.0) * travel**3
@@ -209,7 +227,13 @@ def compute_strut_force(
 
 
 def compute_links(
-    tyre_force: Floats, load: Floats, travel: Floats, speed: Floats, axle: str, curve: TyreCurve, constants: Constants
+    tyre_force: Floats,
+    load: Floats,
+    travel: Floats,
+    speed: Floats,
+    axle: str,
+    curve: TyreCurve,
+    constants: Constants,
 ) -> Floats:
     """Return the vertical force of an axle's links, which lifts a braking nose and holds a braking tail [N] [N].
 

@@ -81,7 +81,9 @@ def _scale_magic_formula(tyre: TyreNumbers, peak: float, beta: float) -> TyreCur
         df = np.minimum(np.asarray(load) / (2.0 * tyre.nominal_load) - 1.0, MOST_LOAD_CHANGE)
         D = peak * (1.0 + tyre.peak[1] / tyre.peak[0] * df)
         K = beta * (tyre.stiffness[0] + tyre.stiffness[1] * df) * np.exp(tyre.stiffness[2] * df)
-        E = (tyre.curvature[0] + df * (tyre.curvature[1] + df * tyre.curvature[2])) * (1.0 + tyre.curvature[3])
+        E = (tyre.curvature[0] + df * (tyre.curvature[1] + df * tyre.curvature[2])) * (
+            1.0 + tyre.curvature[3]
+        )
         return _Scaled(K / (tyre.shape * D), tyre.shape, D, np.minimum(E, 1.0))
 
     def friction(slip: Floats, load: Floats) -> Floats:
@@ -93,9 +95,7 @@ def _scale_magic_formula(tyre: TyreNumbers, peak: float, beta: float) -> TyreCur
         B, C, D, E = scale(load)
         x = B * slip
         bent = x - E * (x - np.arctan(x))
-        return np.asarray(
-            D * np.cos(C * np.arctan(bent)) * C / (1 + bent**2) * B * (1 - E + E / (1 + x**2))
-        )
+        return np.asarray(D * np.cos(C * np.arctan(bent)) * C / (1 + bent**2) * B * (1 - E + E / (1 + x**2)))
 
     nominal = np.array(2.0 * tyre.nominal_load)
     low, high = 0.0, 1.0
@@ -123,7 +123,11 @@ def read_tyre_numbers(entries: Mapping[str, float], *, newer: bool) -> TyreNumbe
     def number(name: str) -> float:
         return entries.get(name, 0.0)
 
-    blown = number("INFLPRES") / number("NOMPRES") - 1.0 if newer and number("INFLPRES") * number("NOMPRES") > 0 else 0.0
+    blown = (
+        number("INFLPRES") / number("NOMPRES") - 1.0
+        if newer and number("INFLPRES") * number("NOMPRES") > 0
+        else 0.0
+    )
     stiffer = factor("LKX") * (1.0 + number("PPX1") * blown + number("PPX2") * blown**2)
     grip = factor("LMUX") * (1.0 + number("PPX3") * blown + number("PPX4") * blown**2)
     return TyreNumbers(
