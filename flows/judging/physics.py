@@ -1,7 +1,7 @@
 """The physics audit: a dataset's stored telemetry compared with the physical laws that it must follow."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from catalogs.studies.ablation import cut_coupling, load_kept_families
 from catalogs.surfaces import load_surface
 from catalogs.tyres import VERSIONS, tyre_entries
 from catalogs.variants import warn_of_variant
-from catalogs.vehicles import load_vehicle
+from catalogs.vehicles import load_vehicle, vehicle_tyre_source
 from flows.making.driving import collect_surface_depths, surface_of
 from flows.making.input_changes import refuse_changed_records
 from flows.making.places import find_scene, refuse_changed_scene
@@ -26,7 +26,7 @@ from flows.store.address import open_for_reading, want_telemetry
 from flows.store.layout import Layout
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest, read_plan_record, recorded_grid
-from flows.store.telemetry import read_columns, read_table
+from flows.store.telemetry import iterate_clips, read_columns, read_table, table_columns
 from tasks.conventions import (
     CHANNELS_BY_NAME,
     CLIP_CHANNELS,
@@ -45,6 +45,8 @@ from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.paper.low_speed import SteadyStop
 from tasks.vehicle.parameters import TyreFamily
 
+Tables = tuple[dict[str, np.ndarray], dict[str, np.ndarray]]
+"""Columns of a clip's ticks and of its frames."""
 NUMBER = r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"
 """A number of a tyre property file."""
 
@@ -80,12 +82,13 @@ def audit_physics(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     clips = clip_facts(root)
     driven = drive_facts(root, plan)
     route = find_route(plan.scene)
-    rows = []
+    judged = {}
     with progress_bar("laws of clip", len(clips)) as advance:
-        for facts in clips:
-            row = run_as_stage(_clip_row)(root, facts, driven.get(facts["clip_id"], {}), constants, route)
+        for facts, tables in iterate_tables(root, clips):
+            row = run_as_stage(_clip_row)(tables, facts, driven.get(facts["clip_id"], {}), constants, route)
             advance(facts["label"], failed=not row["passed"])
-            rows.append(row)
+            judged[facts["clip_id"]] = row
+    rows = [judged[facts["clip_id"]] for facts in clips]
     broken = [row for row in rows if not row["passed"]]
     result = {
         "verified": not broken,
@@ -162,11 +165,48 @@ def clip_columns(
         If the clip or one of the table's columns is not there, or it has another number of rows.
     """
     folder = Layout(root).telemetry / table
-    channels = TICK_CHANNELS if table == "ticks" else (*FRAME_CHANNELS, *TICK_CHANNELS)
-    columns = read_columns(folder, facts["clip_id"], [channel.name for channel in channels], rows)
+    columns = read_columns(folder, facts["clip_id"], list_columns(table), rows)
     if len(columns["t_ns"]) < 2:
         raise InputError(f"{folder}: a clip must have two rows or more; {facts['clip_id']} has one")
     return columns
+
+
+def iterate_tables(root: Path, clips: Sequence[dict[str, Any]]) -> Iterator[tuple[dict[str, Any], Tables]]:
+    """Yield each clip's row and its columns of both tables, in the order of the files, each of which is read once.
+
+    Parameters
+    ----------
+    root : of the dataset
+    clips : rows of all clips
+
+    Raises
+    ------
+    InputError
+        As `clip_columns` raises it.
+    """
+    folder, left = Layout(root).telemetry, {facts["clip_id"]: facts for facts in clips}
+    frames = iterate_clips(folder / "frames", list_columns("frames"))
+    shown: dict[str, dict[str, np.ndarray]] = {}
+    for clip_id, table in iterate_clips(folder / "ticks", list_columns("ticks")):
+        for other, rows in frames:
+            shown[other] = table_columns(rows)
+            if other == clip_id:
+                break
+        if clip_id in left and clip_id in shown and min(len(table), len(shown[clip_id]["t_ns"])) > 1:
+            yield left.pop(clip_id), (table_columns(table), shown.pop(clip_id))
+    for facts in left.values():  # one that is not there has its sentence
+        yield facts, (clip_columns(root, "ticks", facts), clip_columns(root, "frames", facts))
+
+
+def list_columns(table: str) -> list[str]:
+    """Return the names of the columns of the tick or the frame table that the laws are about.
+
+    Parameters
+    ----------
+    table : ``ticks`` or ``frames``
+    """
+    channels = TICK_CHANNELS if table == "ticks" else (*FRAME_CHANNELS, *TICK_CHANNELS)
+    return [channel.name for channel in channels]
 
 
 def read_constants(root: Path) -> Constants:
@@ -194,7 +234,7 @@ def read_constants(root: Path) -> Constants:
     mode, steady = settings.vehicle_mode, load_kept_low_speed(layout.inputs)
     return make_constants(
         _convert_numbers(car), {**vehicle.shared_families, **vehicle.families}, pavement, mode=mode,
-        ticks_per_frame=TICK_RATE_HZ / settings.frame_rate_hz, steady=steady, magic=_read_tyre(car, layout.inputs),
+        ticks_per_frame=TICK_RATE_HZ / settings.frame_rate_hz, steady=steady, magic=_read_tyre(files["vehicle"]),
         effects=vehicle.effects, forms=[(form.port, form.variable) for form in vehicle.forms],
     )  # fmt: skip
 
@@ -233,11 +273,10 @@ def make_constants(
     )  # fmt: skip
 
 
-def _read_tyre(car: Mapping[str, Any], inputs: Path) -> TyreNumbers | None:
-    """Return the kept tyre property file's numbers; None where the vehicle names no tyre."""
-    if not car.get("tyre"):
-        return None
-    return read_property_file((inputs / f"{car['tyre']}.tir").read_bytes())
+def _read_tyre(vehicle: Path) -> TyreNumbers | None:
+    """Return the numbers of the tyre that the kept vehicle names; None where it names none."""
+    source = vehicle_tyre_source(vehicle)
+    return None if source is None else read_property_file(source.read_bytes())
 
 
 def read_property_file(content: bytes) -> TyreNumbers:
@@ -263,11 +302,11 @@ def _convert_numbers(entry: dict[str, Any]) -> dict[str, float]:
 
 
 def _clip_row(
-    root: Path, seen: dict[str, Any], driven: dict[str, Any], constants: Constants, route: RouteLine | None
+    tables: Tables, seen: dict[str, Any], driven: dict[str, Any], constants: Constants, route: RouteLine | None
 ) -> dict[str, Any]:
-    ticks, frames = clip_columns(root, "ticks", seen), clip_columns(root, "frames", seen)
+    ticks, frames = tables
     facts = seen | driven
-    frames |= {name: np.full(len(frames["t_ns"]), driven[name]) for name in DEPTHS if name in driven}
+    frames = frames | {name: np.full(len(frames["t_ns"]), driven[name]) for name in DEPTHS if name in driven}
     holes = [f"ticks.{c}" for c in finite_rows(ticks)]
     with np.errstate(all="ignore"):  # stored values may be infinite; a law that infinity enters is broken
         verdict = audit_clip(ticks, frames, facts, constants, route)

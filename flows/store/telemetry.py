@@ -1,7 +1,7 @@
 """Telemetry as Arrow tables and Parquet files, labelled from the one table of conventions."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from itertools import islice
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -180,6 +180,35 @@ def read_table(path: Path, clip_id: str | None = None, required: Iterable[str] =
     table = _read_file(path, pq.read_table, path, filters=filters, **CHECKED)
     _refuse_columns(table, path, required, clip_id)
     return table
+
+
+def iterate_clips(folder: Path, required: Iterable[str] = ()) -> Iterator[tuple[str, pa.Table]]:
+    """Yield id and rows of each clip in a folder of Parquet files; each file is read once, a row group at a time.
+
+    Parameters
+    ----------
+    folder : of one table
+    required : names of columns that must be there
+
+    Raises
+    ------
+    InputError
+        As `read_table` raises it.
+    """
+    for path in sorted(folder.rglob("*.parquet")):
+        file = _read_file(path, pq.ParquetFile, path, **CHECKED)
+        rest: pa.Table | None = None
+        for group in range(file.num_row_groups):
+            part = _read_file(path, file.read_row_group, group)
+            table = part if rest is None else pa.concat_tables([rest, part]).unify_dictionaries()
+            _refuse_columns(table, path, ["clip_id", *required])
+            ids = table["clip_id"].to_numpy(zero_copy_only=False)
+            starts = [0, *(np.flatnonzero(ids[1:] != ids[:-1]) + 1).tolist(), len(ids)]
+            for start, end in pairwise(starts[:-1]):
+                yield str(ids[start]), table.slice(start, end - start)
+            rest = table.slice(starts[-2])
+        if rest is not None and len(rest):
+            yield str(rest["clip_id"][0]), rest
 
 
 def _read_file(
