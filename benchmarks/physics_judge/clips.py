@@ -76,7 +76,7 @@ def draw_clip(draw: np.random.Generator) -> StudyClip:
     mode: Mode = ("paper", "coupled")[int(draw.random() < 0.6)]
     while find_scenario_problems(scenario := _draw_scenario(draw)):
         pass
-    vehicle = _draw_vehicle(draw, mode)
+    vehicle = draw_vehicle(draw, mode)
     return make_clip(scenario, vehicle, mode, duration_s=round(draw.uniform(1.5, 6.0), 3))
 
 
@@ -141,7 +141,7 @@ def _read_constants(vehicle: Vehicle, mode: Mode) -> Constants:
     )  # fmt: skip
 
 
-def _draw_vehicle(draw: np.random.Generator, mode: Mode) -> Vehicle:
+def draw_vehicle(draw: np.random.Generator, mode: Mode) -> Vehicle:
     """Return a catalogue car, half of them calibrated otherwise, some on the Magic Formula, some with effects."""
     names = CARS if mode == "coupled" else CARS[:1]
     vehicle = load_vehicle(str(draw.choice(names)))
