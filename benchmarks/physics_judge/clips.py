@@ -136,8 +136,7 @@ def _read_constants(vehicle: Vehicle, mode: Mode) -> Constants:
     steady = load_low_speed()
     magic = None if vehicle.tyre is None else read_property_file(find_entry("tyre", TYRE).read_bytes())
     return make_constants(
-        car, {**vehicle.shared_families, **vehicle.families}, load_surface("dense-asphalt"), mode=mode, ticks_per_frame=100.0,
-        steady=steady, magic=magic, effects=vehicle.effects, forms=[(form.port, form.variable) for form in vehicle.forms],
+        car, vehicle, load_surface("dense-asphalt"), mode=mode, ticks_per_frame=100.0, steady=steady, magic=magic
     )  # fmt: skip
 
 

@@ -64,7 +64,9 @@ def move_poses(clip: StudyClip, change: Callable[[NDArray[np.float64]], NDArray[
     return clip.ticks, clip.frames | {"T_world_rig": poses.reshape(-1, 16)}
 
 
-def _shift(poses: NDArray[np.float64], rows: slice | int, metres: tuple[float, float, float]) -> NDArray[np.float64]:
+def _shift(
+    poses: NDArray[np.float64], rows: slice | int, metres: tuple[float, float, float]
+) -> NDArray[np.float64]:
     poses[rows, :3, 3] += np.array(metres)
     return poses
 
@@ -109,7 +111,9 @@ def _freeze_load(clip: StudyClip) -> Tables:
 
 def _smooth_acceleration(clip: StudyClip) -> Tables:
     a = clip.ticks["longitudinal_acceleration"]
-    return edit(clip, longitudinal_acceleration=np.convolve(np.pad(a, 10, mode="edge"), np.ones(21) / 21, "valid"))
+    return edit(
+        clip, longitudinal_acceleration=np.convolve(np.pad(a, 10, mode="edge"), np.ones(21) / 21, "valid")
+    )
 
 
 def _creep(clip: StudyClip) -> Tables:
@@ -152,20 +156,25 @@ ERRORS: dict[str, Error] = {
     "torque 3 % high": lambda c: edit(c, brake_torque_f=c.ticks["brake_torque_f"] * 1.03),
     "load moves to the wrong side": _mirror_loads,
     "axles swapped": _swap_axles,
-    "pitch nose-up": lambda c: edit(c, pitch=-c.ticks["pitch"], pitch_rate=-c.ticks["pitch_rate"], poses=True),
+    "pitch nose-up": lambda c: edit(
+        c, pitch=-c.ticks["pitch"], pitch_rate=-c.ticks["pitch_rate"], poses=True
+    ),
     "heave 1 cm off": lambda c: edit(c, heave=c.ticks["heave"] + 0.01, poses=True),
     "camera 5 cm too high": lambda c: move_poses(c, lambda p: _shift(p, slice(None), (0, 0, 0.05))),
     "jump of 2 cm": lambda c: move_poses(c, lambda p: _shift(p, 3, (0.02, 0, 0))),
     "time stamps a tick late": _stamp_late,
     "slip clipped": lambda c: edit(c, braking_slip_f=np.minimum(c.ticks["braking_slip_f"], 0.05)),
-    "friction of the neighbouring rate": lambda c: drive(c, {"precipitation_mm_h": 1.25 * c.rides[0].precipitation_mm_h}),
+    "friction of the neighbouring rate": lambda c: drive(
+        c, {"precipitation_mm_h": 1.25 * c.rides[0].precipitation_mm_h}
+    ),
     "held speed drifts": _drift_while_held,
     "ABS scale frozen": _freeze_scale,
     "road 3 cm farther on": lambda c: drive(c, {"hazard_center_m": c.rides[0].hazard_center_m + 0.03}),
     "mass 1 % high": lambda c: drive(c, sprung_mass=1.01),
     "wheel speed lags 20 ms": _lag_wheel,
     "static pitch twice": lambda c: (
-        c.ticks, c.frames | {"T_world_rig": pose(c, c.frames, c.facts["static_pitch"])}
+        c.ticks,
+        c.frames | {"T_world_rig": pose(c, c.frames, c.facts["static_pitch"])},
     ),
     "coasts twice as hard": lambda c: drive(c, coast_deceleration=2.0),
     "brake a tick late": lambda c: drive(c, {"brake_onset_s": c.rides[0].brake_onset_s + 0.001}),  # type: ignore[operator]

@@ -43,7 +43,7 @@ from tasks.eval.physics.route import RouteLine
 from tasks.eval.physics.tyres import read_tyre_numbers
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.paper.low_speed import SteadyStop
-from tasks.vehicle.parameters import TyreFamily
+from tasks.vehicle.parameters import Vehicle
 
 Tables = tuple[dict[str, np.ndarray], dict[str, np.ndarray]]
 """Columns of a clip's ticks and of its frames."""
@@ -57,9 +57,9 @@ DEPTHS = ("film_depth_mm", "snow_depth_mm", "snow_coverage")
 def audit_physics(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     """Work every stored column out again from the others, and name the column of a clip that breaks a law.
 
-    Both vehicle modes, held speeds, any tyre and any calibrated or grown vehicle are judged. A law that an effect, a form
-    or a steep road feature makes depend on what no column holds stands under ``not_judged``. Where the scene is at
-    hand, every frame's pose is held against its route.
+    Both vehicle modes, held speeds, any tyre and any calibrated or grown vehicle are judged. A law that an effect, a
+    form or a steep road feature makes depend on what no column holds stands under ``not_judged``. Where the scene is
+    at hand, every frame's pose is held against its route.
 
     Where a coupling is cut on purpose, the motion is held against the scenario that its variant drives, and the result
     says so; the depths of film and snow are then the picture's, and are held against nothing.
@@ -233,31 +233,28 @@ def read_constants(root: Path) -> Constants:
     settings = recorded_grid(read_plan_record(layout)["grid"], layout.plan)
     mode, steady = settings.vehicle_mode, load_kept_low_speed(layout.inputs)
     return make_constants(
-        _convert_numbers(car), {**vehicle.shared_families, **vehicle.families}, pavement, mode=mode,
-        ticks_per_frame=TICK_RATE_HZ / settings.frame_rate_hz, steady=steady, magic=_read_tyre(files["vehicle"]),
-        effects=vehicle.effects, forms=[(form.port, form.variable) for form in vehicle.forms],
+        _convert_numbers(car), vehicle, pavement, mode=mode, ticks_per_frame=TICK_RATE_HZ / settings.frame_rate_hz,
+        steady=steady, magic=_read_tyre(files["vehicle"]),
     )  # fmt: skip
 
 
 def make_constants(
-    car: Mapping[str, float], families: Mapping[str, TyreFamily], pavement: SurfaceParameters, *, mode: str,
-    ticks_per_frame: float, steady: SteadyStop | None, magic: TyreNumbers | None = None,
-    effects: Mapping[str, float] | None = None, forms: Sequence[tuple[str, str]] = (),
+    car: Mapping[str, float], vehicle: Vehicle, pavement: SurfaceParameters, *, mode: str, ticks_per_frame: float,
+    steady: SteadyStop | None, magic: TyreNumbers | None = None,
 ) -> Constants:  # fmt: skip
     """Return what the judge takes as given.
 
     Parameters
     ----------
     car : mechanical numbers of the vehicle, in SI
-    families : tyre families by kind of weather
+    vehicle : its tyre families, effects and forms
     pavement : the road's surface
     mode : paper or coupled
     ticks_per_frame : ticks from one frame to the next [1]
     steady : how the end of a stop is kept steady; None takes the published rule literally
     magic : the Magic Formula of the tyre; None for Burckhardt's curves
-    effects : numbers that the vehicle adds to the plain laws [units of the table of effects]
-    forms : port and variable of each form that it adds
     """
+    families, grows = {**vehicle.shared_families, **vehicle.families}, mode == "coupled"
     return Constants(
         car=car,
         surface={name: value for name, value in vars(pavement).items() if isinstance(value, float)},
@@ -268,8 +265,8 @@ def make_constants(
         low_speed_rule=steady is None or steady.pitch_rule,
         magic=magic,
         # the paper's mode knows no effect
-        effects={k: v for k, v in (effects or {}).items() if v} if mode == "coupled" else {},
-        forms=tuple(forms) if mode == "coupled" else (),
+        effects={name: value for name, value in vehicle.effects.items() if value and grows},
+        forms=tuple((form.port, form.variable) for form in vehicle.forms if grows),
     )  # fmt: skip
 
 
@@ -302,7 +299,11 @@ def _convert_numbers(entry: dict[str, Any]) -> dict[str, float]:
 
 
 def _clip_row(
-    tables: Tables, seen: dict[str, Any], driven: dict[str, Any], constants: Constants, route: RouteLine | None
+    tables: Tables,
+    seen: dict[str, Any],
+    driven: dict[str, Any],
+    constants: Constants,
+    route: RouteLine | None,
 ) -> dict[str, Any]:
     ticks, frames = tables
     facts = seen | driven

@@ -195,9 +195,13 @@ def _find_blindness(recovered: RecoveredMotion, thresholds: PoseThresholds) -> l
     """Return a sentence for each figure that the check sees less well than its limit needs."""
     found = [TOO_LITTLE] if recovered.blind else []
     seen = ~recovered.failed
-    figures = [("pitch", float(np.rad2deg(recovered.pitch_std[seen].max())), thresholds.pitch_rmse_deg, "deg")]
+    figures = [
+        ("pitch", float(np.rad2deg(recovered.pitch_std[seen].max())), thresholds.pitch_rmse_deg, "deg")
+    ]
     if thresholds.progress_rmse_m is not None:
-        figures.append(("progress", float(recovered.progress_std[seen].max()), thresholds.progress_rmse_m, "m"))
+        figures.append(
+            ("progress", float(recovered.progress_std[seen].max()), thresholds.progress_rmse_m, "m")
+        )
     return found + [
         f"not judged: {name} is known to {std:.2g} {unit}, and its limit of {limit:.2g} {unit} needs {SEES * limit:.2g}"
         for name, std, limit, unit in figures

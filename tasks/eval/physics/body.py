@@ -75,30 +75,30 @@ def body_laws(
         size = np.abs(load - static).max() + np.abs(forces[axle][inner]).max() + 1e-6
         laws.append(
             evaluate_law(f"axle's own motion, {axle}",
-                f"unsprung_heave_{axle} axle_load_{axle} heave pitch heave_rate pitch_rate",
+                f"axle_load_{axle} unsprung_heave_{axle} heave pitch heave_rate pitch_rate",
                 mass * bend - push[inner],
                 5e-3 * size + mass * 5 * jumpy[inner] + 0.5 * spread(np.abs(np.diff(push, 2))[2:-2], 2)
                 + np.where(hits, spread(np.abs(np.diff(push, prepend=push[:1])), 3), 0.0)[inner])
         )  # fmt: skip
     judged = _judged_rows(ticks, facts, constants, shaken)
-    laws += _sprung_laws(dz, dtheta, forces, moment, judged, constants, jumpy, hits, shaken=shaken)
+    # where passes converge slowly, the moment is of another deceleration than the ticks' own
+    swings = 5.0 * jumpy if shaken else jumpy
+    laws += _sprung_laws(dz, dtheta, forces, moment, judged, constants, swings, hits)
     return laws
 
 
 def _sprung_laws(
     dz: Floats, dtheta: Floats, forces: Mapping[str, Floats], moment: Floats, judged: NDArray[np.bool_],
-    constants: Constants, jumpy: Floats, hits: NDArray[np.bool_], *, shaken: bool,
+    constants: Constants, jumpy: Floats, hits: NDArray[np.bool_],
 ) -> list[Law | None]:  # fmt: skip
     car = constants.car
     up = -(forces["f"] + forces["r"]) / car["sprung_mass"]
     nose = car["cg_to_front_axle"] * forces["f"] - car["cg_to_rear_axle"] * forces["r"] + moment
     nose = nose / car["pitch_inertia"]
     laws = []
-    # where passes converge slowly, the moment is of another deceleration than the ticks' own
-    per_pass = 5.0 if shaken else 1.0
     every = np.ones(len(dz), bool)
     for name, rate, acceleration, rows, per_jump in (
-        ("heave", dz, up, every, 0.05), ("pitch", dtheta, nose, judged, per_pass),
+        ("heave", dz, up, every, 0.05), ("pitch", dtheta, nose, judged, 1.0),
     ):  # fmt: skip
         k = np.flatnonzero(rows[3:-3]) + 3
         step = rate[k + 1] - rate[k - 1]
@@ -106,7 +106,7 @@ def _sprung_laws(
         size = np.abs(acceleration[3:-3]).max() if len(k) else 0.0
         met = np.where(hits, spread(np.abs(np.diff(acceleration, prepend=acceleration[:1])), 3), 0.0)
         tolerance = DT * (per_jump * jumpy[k] + met[k] + 1e-3 * size) + 1e-10
-        columns = "heave pitch heave_rate pitch_rate unsprung_heave_f unsprung_heave_r"
+        columns = f"{name}_rate heave pitch heave_rate pitch_rate unsprung_heave_f unsprung_heave_r"
         braking = " longitudinal_acceleration" if name == "pitch" else ""
         laws.append(evaluate_law(f"body's {name} equation", columns + braking, step - drive, tolerance))
     return laws

@@ -140,10 +140,11 @@ def compute_forces(ticks: Mapping[str, Floats], facts: Mapping[str, Any], consta
     strut_f, strut_r = axles["f"].strut, axles["r"].strut
     hidden = sum(axles[axle].hidden for axle in "fr")
     # load and slope may both change within a tick, and their product at its ends does not show it
-    met = sum(
-        spread(np.abs(np.diff(ticks[f"tyre_load_{axle}"], prepend=0.0)) * np.abs(np.diff(axles[axle].slope, prepend=0.0)), 1)
+    changes = [
+        np.abs(np.diff(ticks[f"tyre_load_{axle}"], prepend=0.0) * np.diff(axles[axle].slope, prepend=0.0))
         for axle in "fr"
-    )  # fmt: skip
+    ]
+    met = spread(changes[0], 1) + spread(changes[1], 1)
     return Forces(
         moves=moves, held=held, hits=find_hits(ticks, constants), axles=axles, road=road, acceleration=acceleration,
         heave=(e("aero_lift", 0.0) * v**2 - strut_f - strut_r) / car["sprung_mass"],

@@ -180,8 +180,8 @@ def _motion_laws(
         integral_law("station is the integral of speed", "station speed", s, v, forces.hits, rows=rolls,
             doubt=_doubt_rate(a, forces.hidden / constants.mass), floor=1e-10),
         evaluate_law("station rests with the car", "station speed", np.diff(s)[~moves[:-1]], 1e-9),
-        integral_law("speed is the integral of acceleration", "speed longitudinal_acceleration", v, a, forces.hits, rows=rolls,
-            doubt=forces.hidden / constants.mass),
+        integral_law("speed is the integral of acceleration", "speed longitudinal_acceleration", v, a, forces.hits,
+            rows=rolls, doubt=forces.hidden / constants.mass),
         evaluate_law(SUM, "longitudinal_acceleration tyre_force_f tyre_force_r road_force speed",
             a - forces.acceleration, rounding_tolerance(a, force / constants.mass, road / constants.mass)),
         evaluate_law("road force of load and slope", "road_force tyre_load_f tyre_load_r station"
@@ -210,7 +210,8 @@ def _body_laws(ticks: Mapping[str, Floats], forces: Forces, constants: Constants
         integral_law("pitch is the integral of its rate", "pitch pitch_rate", theta, dtheta, hits,
             doubt=_doubt_rate(forces.pitch, unsure_pitch), floor=1e-12),
         integral_law(HEAVE, f"heave_rate {STATES}", dz, forces.heave, hits, doubt=unsure_heave, floor=1e-11),
-        integral_law(PITCH, f"pitch_rate {STATES} {loads}", dtheta, forces.pitch, hits, doubt=unsure_pitch, floor=1e-11),
+        integral_law(PITCH, f"pitch_rate {STATES} {loads}", dtheta, forces.pitch, hits, doubt=unsure_pitch,
+            floor=1e-11),
         evaluate_law("body starts at rest", "heave pitch heave_rate pitch_rate",
             np.array([ticks[name][0] for name in ("heave", "pitch", "heave_rate", "pitch_rate")]), 1e-12),
     ]  # fmt: skip
@@ -220,9 +221,9 @@ def _body_laws(ticks: Mapping[str, Floats], forces: Forces, constants: Constants
         at, mass = axles[axle], car[f"unsprung_mass_{axle}"]
         push = (at.strut + ticks[f"axle_load_{axle}"] - constants.static_load(axle)) / mass
         laws.append(
-            integral_law(f"{AXLE}, {axle}", f"unsprung_heave_{axle} axle_load_{axle} {STATES}", at.rate, push, hits, rows=inner,
-                doubt=(at.strut_error + at.linked) / mass + 2 * at.rate_error / DT + hops * spread(np.abs(push), AROUND)
-                + SLIGHT * np.abs(push).max(),
-                floor=1e-9)
+            integral_law(f"{AXLE}, {axle}", f"heave_rate unsprung_heave_{axle} axle_load_{axle} {STATES}", at.rate,
+                push, hits, rows=inner, floor=1e-9,
+                doubt=(at.strut_error + at.linked) / mass + 2 * at.rate_error / DT
+                + hops * spread(np.abs(push), AROUND) + SLIGHT * np.abs(push).max())
         )  # fmt: skip
     return laws

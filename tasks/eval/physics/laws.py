@@ -162,7 +162,7 @@ def wheel_laws(
             f" longitudinal_acceleration {ASKED}",
             step, integration_tolerance),
         evaluate_law(f"wheel starts rolling, {axle}", f"wheel_speed{x} clips.initial_speed_km_h",
-            omega[:1] * radius - facts["initial_speed_km_h"] / 3.6, 1e-9),
+            omega[:1] - facts["initial_speed_km_h"] / 3.6 / radius, 3e-9),
     ]  # fmt: skip
     if car["abs_build_rate"] * INNER_STEP >= 1 and car["abs_release_rate"] * INNER_STEP >= 1:
         laws.append(
@@ -232,7 +232,7 @@ def motion_laws(
         evaluate_law("m dv/dt is the sum of forces", "longitudinal_acceleration tyre_force_f tyre_force_r road_force",
             a - net, rounding_tolerance(a, force / m, road / m)),
         evaluate_law("kinetic energy falls by the work done", "speed longitudinal_acceleration road_force " + drives,
-            energy[rolling], 2e-5 * v[0] ** 2 + unsure_energy[rolling]),
+            energy[rolling] / v[0], 2e-5 * v[0] + unsure_energy[rolling] / v[0]),
         evaluate_law("road force of load and slope", "road_force tyre_load_f tyre_load_r station clips.hazard_height_m"
             " clips.hazard_center_m clips.hazard_length_m", road - uphill, rounding_tolerance(load_f, load_r)),
     ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Laws of the rig's pose on a known route: every frame stands where route, heave and pitch put it (paper, Eq. camera_pose)."""
+"""Laws of the rig's pose on a known route, of which heave and pitch move it (paper, Eq. camera_pose)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

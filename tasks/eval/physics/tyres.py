@@ -1,4 +1,4 @@
-"""The tyre's curve on one surface: Burckhardt's (paper, Appendix B), or the Magic Formula (Pacejka 2012, 4.E9 to 4.E18)."""
+"""The tyre's curve on one surface: Burckhardt's (paper, Appendix B), or the Magic Formula (Pacejka 2012, 4.E9)."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

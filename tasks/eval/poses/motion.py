@@ -127,7 +127,9 @@ def place_frames(count: int, place: Callable[[int, int, Floats], FrameStep]) -> 
         gap = frame - anchor
         if gap > MAX_GAP:
             step = failed_step(
-                f"the track was lost in frame {anchor + 1} and not found again", 0, blind=placements[anchor].step.blind
+                f"the track was lost in frame {anchor + 1} and not found again",
+                0,
+                blind=placements[anchor].step.blind,
             )
         else:
             step = place(anchor, frame, np.linalg.matrix_power(per_frame, gap))
