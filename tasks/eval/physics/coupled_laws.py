@@ -161,7 +161,7 @@ def _abs_laws(
     bend = spread(np.abs(np.diff(asked, 2, prepend=asked[:1], append=asked[-1:])), 2)[1:][rolls]
     return [
         evaluate_law(f"ABS within its rates, {axle}", columns, over, 1e-9),
-        evaluate_law(f"ABS command of slip, {axle}", columns, away, 1e-9 + bend),
+        evaluate_law(f"ABS command of slip, {axle}", columns, away, 1e-9 + bend + max(build, release) * DT),
     ]
 
 
