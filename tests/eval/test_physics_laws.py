@@ -21,7 +21,7 @@ from tasks.vehicle.tyres.magic_formula_tyre import MagicFormulaTyre, compute_mag
 
 SHARP = (
     "torque 3 % high", "axles swapped", "friction of the neighbouring rate", "held speed drifts", "mass 1 % high",
-    "camera 5 cm too high", "jump of 2 cm", "static pitch twice", "dampers 3 % soft", "wheel inertia 5 % high",
+    "camera 5 cm too high", "jump of 2 cm", "static pitch twice", "dampers 3 % soft", "brake share 2 % off",
 )  # fmt: skip
 STOP = Scenario(
     weather="rain", precipitation_mm_h=5.0, initial_speed_km_h=47.0, peak_pressure_mpa=6.0, ramp_s=0.3,

@@ -41,6 +41,8 @@ ROAD_PASS = 2e-5
 
 LAST_PASS = 5e-3
 """Way between the last two passes where a feature shakes the car, and they converge slowly [m]."""
+LEAP = 0.2
+"""Change of the brake pressure within a tick, over its largest value, that no ramp makes [1]."""
 SHAKEN = 0.5
 """Share of its load at rest by which a shaken axle's load changes [1]."""
 
@@ -149,6 +151,8 @@ def wheel_laws(
     uncertainty = radius / inertia * half.load_uncertainty[axle][rolls]
     integration_tolerance = (
         INNER_STEP * (uncertainty + 1e-6 * (np.abs(after) + np.abs(rate[rolls]) + 1.0)) + 2e-6
+    jolt = np.where(find_leaps(ticks), spread(np.abs(np.diff(rate, prepend=rate[:1])), 3), 0.0)
+    integration_tolerance = integration_tolerance + 2 * INNER_STEP * jolt[1:][rolls]
     )
     x = f"_{axle}"
     laws = [
@@ -193,7 +197,8 @@ def motion_laws(
     road = ticks["road_force"]
     moves = v > 0
     both = np.flatnonzero(moves[1:] & moves[:-1]) + 1
-    met = np.where(find_hits(ticks, constants), spread(np.abs(np.diff(a, prepend=a[:1])), 3), 0.0)[1:]
+    unseen = find_hits(ticks, constants) | find_leaps(ticks)
+    met = np.where(unseen, spread(np.abs(np.diff(a, prepend=a[:1])), 3), 0.0)[1:]
     h = INNER_STEP
     coast = np.where(moves, car["coast_deceleration"], 0.0)
     time = ticks["t_ns"]
@@ -321,6 +326,18 @@ def is_shaken(ticks: Mapping[str, Floats], constants: Constants) -> bool:
     """
     changes = [np.abs(ticks[f"axle_load_{axle}"] / constants.static_load(axle) - 1.0).max() for axle in "fr"]
     return bool(max(changes) > SHAKEN) and bool(np.ptp(ticks["road_height_f"]) > 0)
+
+
+def find_leaps(ticks: Mapping[str, Floats]) -> NDArray[np.bool_]:
+    """Return the ticks about which the brake pressure jumps, and wheels with it, [N].
+
+    Parameters
+    ----------
+    ticks : columns of the tick table
+    """
+    pressure = ticks["brake_pressure_mpa"]
+    leaps = np.abs(np.diff(pressure, prepend=pressure[:1])) > LEAP * max(pressure.max(), 1e-9)
+    return np.asarray(spread(leaps.astype(float), 3) > 0)
 
 
 def finite_rows(columns: Mapping[str, NDArray[Any]]) -> list[str]:

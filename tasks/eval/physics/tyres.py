@@ -128,12 +128,13 @@ def read_tyre_numbers(entries: Mapping[str, float], *, newer: bool) -> TyreNumbe
         if newer and number("INFLPRES") * number("NOMPRES") > 0
         else 0.0
     )
+    bend = factor("LEX")
     stiffer = factor("LKX") * (1.0 + number("PPX1") * blown + number("PPX2") * blown**2)
     grip = factor("LMUX") * (1.0 + number("PPX3") * blown + number("PPX4") * blown**2)
     return TyreNumbers(
         nominal_load=number("FNOMIN") * factor("LFZO"),
         shape=number("PCX1") * factor("LCX"),
         peak=(number("PDX1") * grip, number("PDX2") * grip),
-        curvature=(*(number(name) * factor("LEX") for name in ("PEX1", "PEX2", "PEX3")), number("PEX4")),
+        curvature=(number("PEX1") * bend, number("PEX2") * bend, number("PEX3") * bend, number("PEX4")),
         stiffness=(number("PKX1") * stiffer, number("PKX2") * stiffer, number("PKX3")),
     )
