@@ -149,11 +149,9 @@ def wheel_laws(
     after = half.rate[axle][rolls]
     step = np.diff(omega)[rolls] - half.change[axle][rolls]
     uncertainty = radius / inertia * half.load_uncertainty[axle][rolls]
-    integration_tolerance = (
-        INNER_STEP * (uncertainty + 1e-6 * (np.abs(after) + np.abs(rate[rolls]) + 1.0)) + 2e-6
+    integration_tolerance = INNER_STEP * (uncertainty + 1e-6 * (np.abs(after) + np.abs(rate[rolls]) + 1.0))
     jolt = np.where(find_leaps(ticks), spread(np.abs(np.diff(rate, prepend=rate[:1])), 3), 0.0)
-    integration_tolerance = integration_tolerance + 2 * INNER_STEP * jolt[1:][rolls]
-    )
+    integration_tolerance = integration_tolerance + 2 * INNER_STEP * jolt[1:][rolls] + 2e-6
     x = f"_{axle}"
     laws = [
         evaluate_law(f"slip of wheel speed, {axle}", f"braking_slip{x} wheel_speed{x} speed", kappa - slip, 1e-9),
