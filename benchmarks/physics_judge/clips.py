@@ -12,7 +12,7 @@ from catalogs.scenario import Scenario, find_scenario_problems
 from catalogs.surfaces import load_surface
 from catalogs.tyres import load_tyre
 from catalogs.vehicles import load_vehicle
-from flows.judging.physics import make_constants, read_property_file
+from flows.judging.physics_constants import make_constants, read_property_file
 from flows.making.driving import collect_surface_figures, simulate_drive
 from tasks.eval.physics.constants import Constants
 from tasks.render.camera import body_poses

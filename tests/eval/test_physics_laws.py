@@ -12,7 +12,7 @@ from catalogs.entries import find_entry
 from catalogs.scenario import Scenario
 from catalogs.tyres import load_tyre
 from catalogs.vehicles import load_vehicle
-from flows.judging.physics import read_property_file
+from flows.judging.physics_constants import read_property_file
 from tasks.eval.physics.audit import audit_clip
 from tasks.eval.physics.constants import DT
 from tasks.eval.physics.tyres import find_curve
