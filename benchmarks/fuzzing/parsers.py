@@ -49,7 +49,7 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from flows.judging.claims import read_claim
 from flows.judging.foreign_sources import read_camera, read_footage
-from flows.judging.physics import read_constants
+from flows.judging.physics_constants import read_constants
 from flows.judging.trajectories import read_trajectory
 from flows.making.plan import read_plan
 from flows.making.seal import seal_dataset

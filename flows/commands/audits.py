@@ -18,7 +18,7 @@ KEY = define_option(
     "key", str | None, "File with the signer's Ed25519 public key (PEM), to check the signature.", None
 )
 VERIFIED = require_key("verified")
-LAW_COLUMNS = ("label", "passed", "laws", "column", "tightest")
+LAW_COLUMNS = ("label", "passed", "laws", "column", "tightest", "not_judged")
 
 
 def shorten_law_rows(result: dict[str, Any]) -> dict[str, Any]:
@@ -97,7 +97,7 @@ COMMANDS = (
     Command(
         name="audit-physics",
         group=GROUP,
-        sentence="Compute every telemetry column again from the others, and name the column that breaks a law.",
+        sentence="Compute every telemetry column and pose again; name law, tick, size and column of each break.",
         function="flows.judging.physics:audit_physics",
         options=(DATASET, OUT),
         brief=shorten_law_rows,

@@ -1,28 +1,31 @@
 """The physics audit: a dataset's stored telemetry compared with the physical laws that it must follow."""
 
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from catalogs.documents import read_yaml
-from catalogs.grids.form import TICK_RATE_HZ
-from catalogs.low_speed import load_kept_low_speed
+from catalogs.scenes import load_scene
 from catalogs.studies.ablation import cut_coupling, load_kept_families
 from catalogs.surfaces import load_surface
 from catalogs.variants import warn_of_variant
-from catalogs.vehicles import load_vehicle
+from flows.judging.physics_constants import read_constants
 from flows.making.driving import collect_surface_depths, surface_of
 from flows.making.input_changes import refuse_changed_records
+from flows.making.places import find_scene, refuse_changed_scene
 from flows.making.plan import Plan, read_plan
 from flows.making.traced import refuse_traced
 from flows.running.orchestration import run_as_stage
+from flows.running.progress import progress_bar
 from flows.store.address import open_for_reading, want_telemetry
+from flows.store.clip_tables import iterate_clips
 from flows.store.layout import Layout
 from flows.store.outputs import Outputs
-from flows.store.sealed import read_manifest, read_plan_record, recorded_grid
+from flows.store.sealed import read_manifest, read_plan_record
 from flows.store.telemetry import list_columns, read_columns, read_table
 from tasks.conventions import (
+    CHANNELS_BY_NAME,
     CLIP_CHANNELS,
     FRAME_CHANNELS,
     IDENTITY_CHANNELS,
@@ -30,28 +33,39 @@ from tasks.conventions import (
 )
 from tasks.errors import InputError
 from tasks.eval.physics.audit import PhysicsVerdict, audit_clip
-from tasks.eval.physics.constants import DT, Constants, TyreTables
-from tasks.eval.physics.laws import finite_rows
+from tasks.eval.physics.constants import DT, Constants
+from tasks.eval.physics.laws import Law, finite_rows
+from tasks.eval.physics.route import RouteLine
+
+Tables = tuple[dict[str, np.ndarray], dict[str, np.ndarray]]
+"""Columns of a clip's ticks and of its frames."""
 
 DEPTHS = ("film_depth_mm", "snow_depth_mm", "snow_coverage")
 """Columns of what lies on the road that is seen."""
 
+LEVEL_WITHOUT = frozenset({"ticks.road_grade"})
+"""Columns that a law reads also of an older dataset without them: its cars felt every road as level."""
+
 
 def audit_physics(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     """Work every stored column out again from the others, and name the column of a clip that breaks a law.
+
+    Both vehicle modes, held speeds, any tyre and any calibrated or grown vehicle are judged. A law that an effect, a
+    form or a steep road feature makes depend on what no column holds stands under ``not_judged``. Where the scene is
+    at hand, every frame's pose is held against its route.
 
     Where a coupling is cut on purpose, the motion is held against the scenario that its variant drives, and the result
     says so; the depths of film and snow are then the picture's, and are held against nothing.
 
     Parameters
     ----------
-    dataset : a finished dataset in the paper's vehicle mode
+    dataset : a finished dataset
     out : folder for physics.json
 
     Raises
     ------
     InputError
-        If the folder is no finished dataset, a table lacks columns, or its mode's laws are not known here.
+        If the folder is no finished dataset, or a table lacks columns.
     """
     results = Outputs(out, "audit-physics", "physics.json")
     root = open_for_reading(dataset, want_telemetry).root
@@ -59,23 +73,24 @@ def audit_physics(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     refuse_traced(plan.inputs, dataset, "audit-physics")
     constants = read_constants(root)
     clips = clip_facts(root)
-    held = [facts["label"] for facts in clips if facts["hold_speed"]]
-    if held:
-        raise InputError(
-            f"{dataset}: {len(held)} clips hold their speed until the brake ({held[0]} first), by a force that no"
-            " column records: the physics audit knows coasting cars only"
-        )
-    driven, absent = drive_facts(root, plan), list_absent_columns(Layout(root))
-    rows = [
-        run_as_stage(_clip_row)(root, facts, driven.get(facts["clip_id"], {}), constants, absent)
-        for facts in clips
-    ]
+    driven, route = drive_facts(root, plan), find_route(plan.scene)
+    absent = list_absent_columns(Layout(root))
+    judged = {}
+    with progress_bar("laws of clip", len(clips)) as advance:
+        for facts, tables in iterate_tables(root, clips):
+            row = run_as_stage(_clip_row)(
+                tables, facts, driven.get(facts["clip_id"], {}), constants, route, absent
+            )
+            advance(facts["label"], failed=not row["passed"])
+            judged[facts["clip_id"]] = row
+    rows = [judged[facts["clip_id"]] for facts in clips]
     broken = [row for row in rows if not row["passed"]]
     result = {
         "verified": not broken,
         "variant": plan.settings.variant,
         **({"warning": warning} if (warning := warn_of_variant(plan.settings.variant)) else {}),
         "clips_checked": len(rows),
+        "poses_checked": route is not None,
         "laws_checked": sum(row["laws"] for row in rows),
         "wheels_lifted": [row["label"] for row in rows if not row["superposition_holds"]],
         "clips": rows,
@@ -139,16 +154,16 @@ def list_absent_columns(layout: Layout) -> frozenset[str]:
     layout : of the dataset
     """
     tables = {
-        "ticks": TICK_CHANNELS,
-        "frames": (*FRAME_CHANNELS, *TICK_CHANNELS),
-        "clips.parquet": CLIP_CHANNELS,
+        "ticks": list_known("ticks"),
+        "frames": list_known("frames"),
+        "clips.parquet": [channel.name for channel in CLIP_CHANNELS],
     }
     return frozenset(
-        f"{table.removesuffix('.parquet')}.{channel.name}"
-        for table, channels in tables.items()
-        for names in [list_columns(layout.telemetry / table)]
-        for channel in channels
-        if channel.name not in names
+        f"{table.removesuffix('.parquet')}.{name}"
+        for table, known in tables.items()
+        for stored in [list_columns(layout.telemetry / table)]
+        for name in known
+        if name not in stored
     )
 
 
@@ -166,91 +181,112 @@ def clip_columns(root: Path, table: str, facts: dict[str, Any]) -> dict[str, np.
     InputError
         If the clip or a column of every dataset is not there, or it has another number of rows than the plan.
     """
-    folder = Layout(root).telemetry / table
-    channels = TICK_CHANNELS if table == "ticks" else (*FRAME_CHANNELS, *TICK_CHANNELS)
     rows = read_plan(root).settings.rows_per_clip[table]
-    return read_columns(folder, facts["clip_id"], [channel.name for channel in channels], most=rows)
+    return read_columns(Layout(root).telemetry / table, facts["clip_id"], list_known(table), most=rows)
 
 
-def read_constants(root: Path) -> Constants:
-    """The frozen car and pavement of a dataset, as numbers by name, in SI.
+def iterate_tables(root: Path, clips: Sequence[dict[str, Any]]) -> Iterator[tuple[dict[str, Any], Tables]]:
+    """Yield each clip's row and its columns of both tables, in the order of the files, each of which is read once.
+
+    Parameters
+    ----------
+    root : of the dataset
+    clips : rows of all clips
 
     Raises
     ------
     InputError
-        If a file is missing, or the dataset was made in another mode or with effects.
+        As `clip_columns` raises it.
     """
-    layout = Layout(root)
-    files = {name: layout.inputs / f"{name}.yaml" for name in ("vehicle", "surface")}
-    missing = [
-        f"{path}: no such file; is {root} a finished muSync dataset?"
-        for path in files.values()
-        if not path.is_file()
-    ]
-    if missing:
-        raise InputError(missing)
-    # of the form that they must have
-    vehicle = load_vehicle(files["vehicle"], layout.inputs / "weather")
-    pavement = load_surface(files["surface"], layout.inputs / "weather")
-    car = read_yaml(files["vehicle"], "catalogue entry")
-    settings = recorded_grid(read_plan_record(layout)["grid"], layout.plan)
-    mode, steady = settings.vehicle_mode, load_kept_low_speed(layout.inputs)
-    if mode != "paper" or car.get("effects"):
-        raise InputError(
-            f"{root}: the physics audit knows the laws of the paper's vehicle; this dataset was made in {mode} mode"
-            f"{' with effects' if car.get('effects') else ''}, whose inner steps the stored ticks do not fix."
-        )
-    if car.get("tyre"):
-        raise InputError(
-            f"{root}: the physics audit knows Burckhardt's tyre; this dataset's vehicle drives on {car['tyre']}"
-        )
-    tyres = {kind: TyreTables(**vars(vehicle.find_tyre_family(kind))) for kind in vehicle.find_weathers()}
-    surface = {name: value for name, value in vars(pavement).items() if isinstance(value, float)}
-    return Constants(
-        car=_convert_numbers(car), surface=surface, tyres=tyres, mode=mode,
-        ticks_per_frame=TICK_RATE_HZ / settings.frame_rate_hz,
-        steady_limit=0.0 if steady is None else steady.explicit_limit,
-        held_share=0.0 if steady is None else steady.held_share,
-        low_speed_rule=steady is None or steady.pitch_rule,
-    )  # fmt: skip
+    folder, left = Layout(root).telemetry, {facts["clip_id"]: facts for facts in clips}
+    rows = read_plan(root).settings.rows_per_clip
+    frames = iterate_clips(folder / "frames", list_known("frames"), rows["frames"])
+    shown: dict[str, dict[str, np.ndarray]] = {}
+    for clip_id, ticks in iterate_clips(folder / "ticks", list_known("ticks"), rows["ticks"]):
+        for other, columns in frames:
+            shown[other] = columns
+            if other == clip_id:
+                break
+        found = {"ticks": len(ticks["t_ns"]), "frames": len(shown.get(clip_id, ticks)["t_ns"])}
+        if clip_id in left and clip_id in shown and found == rows:
+            yield left.pop(clip_id), (ticks, shown.pop(clip_id))
+    for facts in left.values():  # one that is not there has its sentence
+        yield facts, (clip_columns(root, "ticks", facts), clip_columns(root, "frames", facts))
 
 
-def _convert_numbers(entry: dict[str, Any]) -> dict[str, float]:
-    scalars = {
-        k: v for k, v in entry.items() if isinstance(v, dict) and isinstance(v.get("value"), (int, float))
-    }
-    return {
-        name: float(np.deg2rad(item["value"])) if item.get("unit") == "deg" else float(item["value"])
-        for name, item in scalars.items()
-    }
+def list_known(table: str) -> list[str]:
+    """Return the names of the columns of the tick or the frame table that the laws are about.
+
+    Parameters
+    ----------
+    table : ``ticks`` or ``frames``
+    """
+    channels = TICK_CHANNELS if table == "ticks" else (*FRAME_CHANNELS, *TICK_CHANNELS)
+    return [channel.name for channel in channels]
 
 
 def _clip_row(
-    root: Path, seen: dict[str, Any], driven: dict[str, Any], constants: Constants, absent: frozenset[str]
+    tables: Tables,
+    seen: dict[str, Any],
+    driven: dict[str, Any],
+    constants: Constants,
+    route: RouteLine | None,
+    absent: frozenset[str],
 ) -> dict[str, Any]:
-    ticks, frames = clip_columns(root, "ticks", seen), clip_columns(root, "frames", seen)
+    ticks, frames = tables
     facts = seen | driven
-    frames |= {name: np.full(len(frames["t_ns"]), driven[name]) for name in DEPTHS if name in driven}
+    frames = frames | {name: np.full(len(frames["t_ns"]), driven[name]) for name in DEPTHS if name in driven}
     holes = [name for c in finite_rows(ticks) if (name := f"ticks.{c}") not in absent]
     with np.errstate(all="ignore"):  # stored values may be infinite; a law that infinity enters is broken
-        verdict = audit_clip(ticks, frames, facts, constants, absent)
+        verdict = audit_clip(ticks, frames, facts, constants, route, absent - LEVEL_WITHOUT)
     lifted = {
         f"wheel_lift_time_{axle}": float(np.sum(~ticks[f"contact_{axle}"].astype(bool))) * DT for axle in "fr"
     }
     contact = lifted | {"superposition_holds": not any(lifted.values())}
-    row = {"clip_id": facts["clip_id"], "label": facts["label"], **_as_row(verdict), "not_finite": holes}
+    row = {
+        "clip_id": facts["clip_id"],
+        "label": facts["label"],
+        **_as_row(verdict, frames["tick"]),
+        "not_finite": holes,
+    }
     return row | contact
 
 
-def _as_row(verdict: PhysicsVerdict) -> dict[str, Any]:
+def find_route(scene: Mapping[str, Any]) -> RouteLine | None:
+    """Return the route of the recorded scene; None where that is not at hand, or is another one by now.
+
+    Parameters
+    ----------
+    scene : ``name`` and ``sha256``, of a plan
+    """
+    try:
+        refuse_changed_scene(scene)
+        route = load_scene(find_scene(scene)).route
+    except InputError:
+        return None
+    return RouteLine(station=route.station, T_world_rig=route.T_world_rig)
+
+
+def _as_row(verdict: PhysicsVerdict, frame_ticks: np.ndarray) -> dict[str, Any]:
     return {
         "passed": verdict.passed,
         "laws": len(verdict.laws),
         "column": verdict.column,
         "also": list(verdict.also),
-        "broken": [
-            {"law": x.name, "excess": min(x.excess, 1e300), "row": x.at, "columns": sorted(x.columns)}
-            for x in verdict.broken
-        ],
+        "broken": [_describe_break(law, frame_ticks) for law in verdict.broken],
+        "not_judged": dict(verdict.not_judged),
         "tightest": max((x.excess for x in verdict.laws if not x.broken), default=0.0),
     }
+
+
+def _describe_break(law: Law, frame_ticks: np.ndarray) -> dict[str, Any]:
+    """Law, place and size of a break; ``tick`` is null where a law is of the clip's row."""
+    table, _, name = law.of.partition(".")
+    tick = {"ticks": law.at, "frames": int(frame_ticks[law.at]) if law.at < len(frame_ticks) else None}.get(
+        table
+    )
+    channel = CHANNELS_BY_NAME.get(name)
+    return {
+        "law": law.name, "excess": min(law.excess, 1e300), "row": law.at, "tick": tick,
+        "size": min(law.size, 1e300), "unit": channel.unit if channel else "", "columns": sorted(law.columns),
+    }  # fmt: skip

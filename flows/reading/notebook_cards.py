@@ -66,11 +66,17 @@ def clip_card(clip: "Clip") -> str:
         ("surface friction", _format_figure(figures.get("surface_friction"), "{:.3f}")),
         ("stopping distance", _format_figure(figures.get("stopping_distance"), "{:.1f} m", none="no stop in the clip")),
         ("largest nose-down pitch", _format_figure(figures.get("peak_pitch"), "{:.2f} deg", degrees(1))),
-        ("pose check", {True: "passed", False: "failed: in quarantine"}.get(clip.record["verdict"]["passed"], "none")),
+        ("pose check", _name_verdict(clip.record["verdict"])),
         ("clip id", clip.clip_id),
         *([("frames", fault)] if fault else []),
     ]  # fmt: skip
     return _render_card(clip.label, pictures, rows)
+
+
+def _name_verdict(verdict: Mapping[str, Any]) -> str:
+    if verdict["passed"] is None:
+        return "none" if verdict["method"] is None else "not judged: it sees too little"
+    return "passed" if verdict["passed"] else "failed: in quarantine"
 
 
 def _format_figure(value: float | None, form: str, factor: float = 1.0, none: str = "not represented") -> str:

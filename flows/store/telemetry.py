@@ -159,7 +159,7 @@ def read_parts(paths: Iterable[Path], most: int) -> Iterator[pa.Table]:
     for path, file in files:
         table = call_reader(path, file.read, remedy=STAGED, use_threads=False)
         file.close()
-        _refuse_columns(table, path)
+        refuse_columns(table, path)
         for name, empty in common.items():
             chunks = pa.chunked_array([empty, *table[name].chunks]).unify_dictionaries().chunks[1:]
             place = table.schema.get_field_index(name)
@@ -189,11 +189,11 @@ def read_table(
         refuse_footer(file, most if clip_id is None else most * CLIPS_PER_FILE)
     filters = None if clip_id is None else [("clip_id", "==", clip_id)]
     table = call_reader(path, pq.read_table, path, filters=filters, **CHECKED)
-    _refuse_columns(table, path, required, clip_id)
+    refuse_columns(table, path, required, clip_id)
     return table if has_nulls(table.schema) else null_missing(table)
 
 
-def _refuse_columns(
+def refuse_columns(
     table: pa.Table, path: Path, required: Iterable[str] = (), clip_id: str | None = None
 ) -> None:
     """Raise `InputError` for a table that lacks a column or a clip, or has text where numbers belong."""
@@ -257,8 +257,13 @@ def read_columns(
             f"{path}: must hold {most} rows of clip {clip_id}; it holds {len(table)}: musync repair makes the table"
             " again"
         )
+    return take_columns(table, wanted)
+
+
+def take_columns(table: pa.Table, names: Iterable[str]) -> dict[str, np.ndarray]:
+    """Return the columns of a table, and each of ``names`` that it does not have as NaN."""
     columns = table_columns(table)
-    return columns | {name: np.full(len(table), np.nan) for name in wanted if name not in columns}
+    return columns | {name: np.full(len(table), np.nan) for name in names if name not in columns}
 
 
 def table_columns(table: pa.Table) -> dict[str, np.ndarray]:

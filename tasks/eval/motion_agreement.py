@@ -11,6 +11,11 @@ from tasks.eval.poses.motion import RecoveredMotion
 
 Floats = NDArray[np.float64]
 
+TOO_LITTLE = "not judged: the pictures show too little to follow"
+SEES = 0.2
+"""Largest standard uncertainty of a figure, as a share of its limit: errors that steps share are up to four times what
+the covariance says, as fog that stands in the picture shows [1]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class PoseThresholds:
@@ -55,7 +60,8 @@ class PoseVerdict:
     Parameters
     ----------
     method : name of the pose check
-    passed : whether every judged figure keeps its threshold
+    passed : whether every judged figure keeps its threshold; None where one does not, and the check sees too little to
+        say that it should
     pitch_rmse_deg : RMSE of recovered against claimed pitch, both counted from frame 0 [deg]
     pitch_relative_error : the same over the RMS of the claimed pitch [1]; NaN without a response
     pitch_correlation : Pearson's, over the frames with a pose [1]; NaN where either does not vary
@@ -66,11 +72,11 @@ class PoseVerdict:
     judged_frames : number of frames after the first with a pose; without any, every figure is NaN [1]
     roll_rmse_deg, yaw_rmse_deg, lateral_rmse_m, rise_rmse_m, heave_gain, heave_gain_std : as in `BodyErrors`; NaN where
         the claim says nothing of them
-    reasons : one sentence per threshold missed
+    reasons : one sentence per threshold missed, after those that say why the clip is not judged
     """
 
     method: str
-    passed: bool
+    passed: bool | None
     pitch_rmse_deg: float
     pitch_relative_error: float
     pitch_correlation: float
@@ -135,7 +141,8 @@ def judge_pose(
     if failed > thresholds.failed_share * frames:
         reasons.append(f"{failed} of {frames} frames have no pose: {recovered.failures[0]}")
     if judged_frames == 0:
-        return _refuse_to_judge(recovered.method, failed, (*reasons, "no frame after the first has a pose"))
+        reasons.append("no frame after the first has a pose")
+        return _refuse_to_judge(recovered, failed, reasons)
     claimed = np.rad2deg(claimed_pitch - claimed_pitch[0])[seen]
     pitch = np.rad2deg(recovered.pitch)[seen]
     way = (claimed_station - claimed_station[0])[seen]
@@ -167,9 +174,10 @@ def judge_pose(
         reasons.append(
             f"pitch correlation is {correlation:.4g}, at least {thresholds.pitch_correlation:g} is needed"
         )
+    blindness = _find_blindness(recovered, thresholds) if reasons else []
     return PoseVerdict(
         method=recovered.method,
-        passed=not reasons,
+        passed=None if blindness else not reasons,
         pitch_rmse_deg=pitch_rmse,
         pitch_relative_error=relative,
         pitch_correlation=correlation,
@@ -179,8 +187,26 @@ def judge_pose(
         failed_frames=failed,
         judged_frames=judged_frames,
         **vars(errors),
-        reasons=tuple(reasons),
+        reasons=(*blindness, *reasons),
     )
+
+
+def _find_blindness(recovered: RecoveredMotion, thresholds: PoseThresholds) -> list[str]:
+    """Return a sentence for each figure that the check sees less well than its limit needs."""
+    found = [TOO_LITTLE] if recovered.blind else []
+    seen = ~recovered.failed
+    figures = [
+        ("pitch", float(np.rad2deg(recovered.pitch_std[seen].max())), thresholds.pitch_rmse_deg, "deg")
+    ]
+    if thresholds.progress_rmse_m is not None:
+        figures.append(
+            ("progress", float(recovered.progress_std[seen].max()), thresholds.progress_rmse_m, "m")
+        )
+    return found + [
+        f"not judged: {name} is known to {std:.2g} {unit}, and its limit of {limit:.2g} {unit} needs {SEES * limit:.2g}"
+        for name, std, limit, unit in figures
+        if std > SEES * limit
+    ]
 
 
 def _list_body_limits(
@@ -199,12 +225,12 @@ def _list_body_limits(
     return limits
 
 
-def _refuse_to_judge(method: str, failed: int, reasons: tuple[str, ...]) -> PoseVerdict:
+def _refuse_to_judge(recovered: RecoveredMotion, failed: int, reasons: list[str]) -> PoseVerdict:
     """Return the verdict on a clip of which no frame can be compared with the first."""
     nan = float("nan")
     return PoseVerdict(
-        method=method,
-        passed=False,
+        method=recovered.method,
+        passed=None if recovered.blind else False,
         pitch_rmse_deg=nan,
         pitch_relative_error=nan,
         pitch_correlation=nan,
@@ -214,5 +240,5 @@ def _refuse_to_judge(method: str, failed: int, reasons: tuple[str, ...]) -> Pose
         failed_frames=failed,
         judged_frames=0,
         **vars(UNKNOWN_BODY),
-        reasons=reasons,
+        reasons=(*([TOO_LITTLE] if recovered.blind else []), *reasons),
     )

@@ -182,3 +182,31 @@ def test_telemetry_that_does_not_fit_the_frames_is_refused(hump_clip: Clip) -> N
     with pytest.raises(InputError) as caught:
         judge_pose(motion_with(hump_clip, hump_clip.pitch), hump_clip.pitch[:-1], holed, THRESHOLDS)
     assert len(caught.value.problems) == 2
+
+
+@pytest.mark.parametrize(("pitch_std_deg", "passed"), [(0.002, False), (0.03, None)])
+def test_a_missed_limit_is_judged_only_where_the_check_sees_well_enough(
+    hump_clip: Clip, recovered_motions: dict[str, RecoveredMotion], pitch_std_deg: float, passed: bool | None
+) -> None:
+    seen = recovered_motions["pnp"]
+    motion = replace(seen, pitch_std=np.full(len(seen.pitch), np.deg2rad(pitch_std_deg)))
+    verdict = judge_pose(motion, 0 * hump_clip.pitch, hump_clip.station, THRESHOLDS)
+    assert verdict.passed is passed
+    assert verdict.reasons[0].startswith("not judged: pitch is known to 0.03 deg") is (passed is None)
+    assert judge_pose(motion, hump_clip.pitch, hump_clip.station, THRESHOLDS).passed is True
+
+
+def test_a_clip_too_dark_to_follow_is_not_judged_and_one_that_shows_other_pictures_fails(
+    hump_clip: Clip,
+) -> None:
+    part = slice(0, 8)
+    depth, sky = hump_clip.depth[part], hump_clip.class_id[part] == SemanticClass.SKY
+    noise = np.random.default_rng(1).normal(0, 0.5, hump_clip.frames[part].shape)
+    dark = np.clip(0.005 * hump_clip.frames[part] + noise, 0, 255).round().astype(np.uint8)
+    other = hump_clip.frames[np.array([0, 4, 1, 5, 2, 6, 3, 7]) * len(hump_clip.frames) // 8]
+    verdicts = []
+    for frames in (dark, other):
+        recovered = recover_motion_pnp(frames, depth, hump_clip.K, hump_clip.T_rig_camera, sky)
+        verdicts.append(judge_pose(recovered, hump_clip.pitch[part], hump_clip.station[part], THRESHOLDS))
+    assert [verdict.passed for verdict in verdicts] == [None, False]
+    assert verdicts[0].reasons[0] == "not judged: the pictures show too little to follow"

@@ -9,12 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.eval.physics.body import body_laws, outcome_laws, surface_laws
+from tasks.eval.physics.commands import command_laws, road_height_laws
 from tasks.eval.physics.constants import Constants
+from tasks.eval.physics.coupled_laws import coupled_laws
+from tasks.eval.physics.effects import find_unjudged
 from tasks.eval.physics.frames import frame_laws, pose_laws
 from tasks.eval.physics.grade import grade_laws
 from tasks.eval.physics.half_step import follow_half_step
-from tasks.eval.physics.laws import Law, command_laws, motion_laws, wheel_laws
+from tasks.eval.physics.laws import Law, motion_laws, wheel_laws
 from tasks.eval.physics.pose_check import pose_check_laws
+from tasks.eval.physics.route import RouteLine, route_laws
 
 COPIED = "frame rows are ticks: "
 """Prefix of the names of the laws that relate the two tables."""
@@ -39,12 +43,14 @@ class PhysicsVerdict:
     laws : all that could be evaluated
     column : the column that explains the broken laws best, as table.column; empty if none is broken
     also : columns that explain the broken laws as well
+    not_judged : laws that this car or road takes away, each with the reason
     """
 
     passed: bool
     laws: tuple[Law, ...]
     column: str
     also: tuple[str, ...]
+    not_judged: Mapping[str, str]
 
     @property
     def broken(self) -> tuple[Law, ...]:
@@ -57,6 +63,7 @@ def audit_clip(
     frames: Mapping[str, NDArray[Any]],
     facts: Mapping[str, Any],
     constants: Constants,
+    route: RouteLine | None = None,
     absent: Set[str] = frozenset(),
 ) -> PhysicsVerdict:
     """Check one clip's stored columns by every law.
@@ -67,9 +74,11 @@ def audit_clip(
     frames : columns of the frame table
     facts : the clip's row: scenario, surface, outcome and check
     constants : frozen car and pavement
+    route : the scene's route; None where it is not at hand, and no pose is held against it
     absent : columns, as table.column, that an older dataset does not have: no law that relates one is evaluated
     """
-    laws = tuple(law for law in evaluate_laws(ticks, frames, facts, constants) if not law.columns & absent)
+    found = evaluate_laws(ticks, frames, facts, constants, route)
+    laws = tuple(law for law in found if not law.columns & absent)
     suspects = rank_suspects(laws)
     if len(suspects) > 1:
         suspects = _rank_by_pattern(suspects, laws, ticks, frames, facts, constants)
@@ -78,6 +87,7 @@ def audit_clip(
         laws=laws,
         column=suspects[0] if suspects else "",
         also=tuple(suspects[1:]),
+        not_judged=find_unjudged(facts, constants),
     )
 
 
@@ -86,28 +96,38 @@ def evaluate_laws(
     frames: Mapping[str, NDArray[Any]],
     facts: Mapping[str, Any],
     constants: Constants,
+    route: RouteLine | None = None,
 ) -> tuple[Law, ...]:
     """Evaluate every law that can be evaluated on one clip.
 
     Parameters
     ----------
-    ticks, frames, facts, constants : as in ``audit_clip``
+    ticks, frames, facts, constants, route : as in ``audit_clip``
     """
-    half = follow_half_step(ticks, facts, constants)
+    if constants.mode == "paper":
+        half = follow_half_step(ticks, facts, constants)
+        moving = [
+            *wheel_laws(ticks, facts, "f", constants, half),
+            *wheel_laws(ticks, facts, "r", constants, half),
+            *motion_laws(ticks, facts, constants, half),
+            *road_height_laws(ticks, facts, constants),
+            *body_laws(ticks, facts, constants, half),
+        ]
+    else:
+        moving = coupled_laws(ticks, facts, constants)
     found = [
-        *wheel_laws(ticks, facts, "f", constants, half),
-        *wheel_laws(ticks, facts, "r", constants, half),
-        *motion_laws(ticks, facts, constants, half),
-        *command_laws(ticks, facts, constants),
-        *body_laws(ticks, facts, constants, half),
+        *moving,
+        *command_laws(ticks, facts),
         *surface_laws(facts, constants),
         *frame_laws(ticks, frames, facts, constants),
         *pose_laws(frames, constants),
+        *route_laws(frames, route, constants),
         *grade_laws(ticks, frames, constants),
         *outcome_laws(ticks, facts, constants),
         *pose_check_laws(frames, facts),
     ]
-    return tuple(x for x in found if x is not None)
+    unjudged = find_unjudged(facts, constants)
+    return tuple(x for x in found if x is not None and x.name.split(", ")[0] not in unjudged)
 
 
 def rank_suspects(laws: tuple[Law, ...]) -> list[str]:

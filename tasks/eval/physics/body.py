@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.eval.physics.constants import DT, SURFACE_FORMS, Constants, Floats, derive_surface
+from tasks.eval.physics.coupled import find_hits, spread
 from tasks.eval.physics.half_step import INNER_STEP, HalfStep, find_brake_onset
-from tasks.eval.physics.laws import Law, evaluate_law, rounding_tolerance
+from tasks.eval.physics.laws import Law, evaluate_law, is_shaken, rounding_tolerance
 from tasks.eval.physics.stop_pitch import CAP_S, compute_pitching_deceleration
 from tasks.eval.physics.superposition import sum_contact_changes
 
@@ -34,20 +35,21 @@ def body_laws(
     car = constants.car
     z, dz, theta, dtheta = (ticks[c] for c in ("heave", "heave_rate", "pitch", "pitch_rate"))
     # the brake moment follows dv/dt, so its jumps within a few ticks change both rates
-    jumpy = _spread_maximum(_largest_input_changes(ticks, facts, constants), 3)
+    shaken, hits = is_shaken(ticks, constants), find_hits(ticks, constants)
+    jumpy = _spread_maximum(_largest_input_changes(ticks, facts, constants), STOP_PASS if shaken else 3)
     pitch_input = 1.3 * car["sprung_mass"] * car["cg_height"] / car["pitch_inertia"]
     laws: list[Law | None] = []
     for name, x, dx, per_jump in (("heave", z, dz, 0.05), ("pitch", theta, dtheta, pitch_input)):
         step = x[2:] - x[:-2] - DT / 3 * (dx[2:] + 4 * dx[1:-1] + dx[:-2])
-        tolerance = DT**2 * per_jump * jumpy[1:-1] + 1e-6 * DT * np.abs(dx).max() + 1e-12
+        bend = spread(np.abs(np.diff(dx, 2)), 2)
+        tolerance = DT * (DT * per_jump * jumpy[1:-1] + 0.1 * bend + 1e-6 * np.abs(dx).max()) + 1e-12
         laws.append(
             evaluate_law(f"{name} is the integral of its rate", f"{name} {name}_rate", step, tolerance)
         )
 
     forces: dict[str, Floats] = {}
-    lifted = not all(np.all(ticks[f"axle_load_{axle}"] > 0) for axle in "fr")
     moment = _brake_moment(ticks, facts, constants, half)
-    pushed = sum_contact_changes(ticks, moment, constants) if lifted and constants.mode == "paper" else {}
+    pushed = sum_contact_changes(ticks, moment, constants) if shaken else {}
     for axle, lever in (("f", -car["cg_to_front_axle"]), ("r", car["cg_to_rear_axle"])):
         u = ticks[f"unsprung_heave_{axle}"]
         du = np.full_like(u, np.nan)
@@ -73,18 +75,21 @@ def body_laws(
         size = np.abs(load - static).max() + np.abs(forces[axle][inner]).max() + 1e-6
         laws.append(
             evaluate_law(f"axle's own motion, {axle}",
-                f"unsprung_heave_{axle} axle_load_{axle} heave pitch heave_rate pitch_rate",
-                mass * bend - push[inner], 5e-3 * size + mass * 5 * jumpy[inner])
+                f"axle_load_{axle} unsprung_heave_{axle} heave pitch heave_rate pitch_rate",
+                mass * bend - push[inner],
+                5e-3 * size + mass * 5 * jumpy[inner] + 0.5 * spread(np.abs(np.diff(push, 2))[2:-2], 2)
+                + np.where(hits, spread(np.abs(np.diff(push, prepend=push[:1])), 3), 0.0)[inner])
         )  # fmt: skip
-    if constants.mode == "paper":
-        judged = _judged_rows(ticks, facts, constants)
-        laws += _sprung_laws(dz, dtheta, forces, moment, judged, constants, jumpy)
+    judged = _judged_rows(ticks, facts, constants, shaken)
+    # where passes converge slowly, the moment is of another deceleration than the ticks' own
+    swings = 5.0 * jumpy if shaken else jumpy
+    laws += _sprung_laws(dz, dtheta, forces, moment, judged, constants, swings, hits)
     return laws
 
 
 def _sprung_laws(
     dz: Floats, dtheta: Floats, forces: Mapping[str, Floats], moment: Floats, judged: NDArray[np.bool_],
-    constants: Constants, jumpy: Floats,
+    constants: Constants, jumpy: Floats, hits: NDArray[np.bool_],
 ) -> list[Law | None]:  # fmt: skip
     car = constants.car
     up = -(forces["f"] + forces["r"]) / car["sprung_mass"]
@@ -99,23 +104,26 @@ def _sprung_laws(
         step = rate[k + 1] - rate[k - 1]
         drive = DT / 3 * (acceleration[k + 1] + 4 * acceleration[k] + acceleration[k - 1])
         size = np.abs(acceleration[3:-3]).max() if len(k) else 0.0
-        tolerance = DT * (per_jump * jumpy[k] + 1e-3 * size) + 1e-10
-        columns = "heave pitch heave_rate pitch_rate unsprung_heave_f unsprung_heave_r"
+        met = np.where(hits, spread(np.abs(np.diff(acceleration, prepend=acceleration[:1])), 3), 0.0)
+        tolerance = DT * (per_jump * jumpy[k] + met[k] + 1e-3 * size) + 1e-10
+        columns = f"{name}_rate heave pitch heave_rate pitch_rate unsprung_heave_f unsprung_heave_r"
         braking = " longitudinal_acceleration" if name == "pitch" else ""
         laws.append(evaluate_law(f"body's {name} equation", columns + braking, step - drive, tolerance))
     return laws
 
 
 def _judged_rows(
-    ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants
+    ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants, shaken: bool
 ) -> NDArray[np.bool_]:
-    """Rows whose brake moment follows from the ticks [N]: all but those about a literal stop on a road feature.
+    """Rows whose brake moment follows from the ticks [N]: all but those about a stop on a road feature.
+
+    So it is of a literal stop, and of one on a feature that shakes the car.
 
     There the low-speed rule holds one sample of the last fixed-point pass but one, and the ticks are of the last.
     """
     judged = np.ones(len(ticks["speed"]), bool)
     standing = np.flatnonzero(ticks["speed"] <= 0)
-    if standing.size and constants.held_share == 0 and facts["hazard_height_m"] != 0:
+    if standing.size and (constants.held_share == 0 or shaken) and facts["hazard_height_m"] != 0:
         tyre = constants.tyres[facts["weather"]]
         hold, release = (tyre.at(t, facts["surface_friction"]) for t in (tyre.hold_s, tyre.release_s))
         begin = int(standing[0]) - round(max(hold, CAP_S) / DT) - STOP_PASS

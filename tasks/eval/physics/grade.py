@@ -20,7 +20,7 @@ RISE_M = 1e-3
 def grade_laws(
     ticks: Mapping[str, Floats], frames: Mapping[str, NDArray[Any]], constants: Constants
 ) -> list[Law | None]:
-    """Return the law that the road rises between two frames by the integral of its grade over the way.
+    """Return the law that the road rises between two frames by the integral of its grade; none without grades.
 
     The route's height is that of the rig poses without heave and pitch. A grade is a mean over `SMOOTHING_M`, near an
     end of the route one whose middle lies half that length away: where the road bends nearby, that much is left open.
@@ -31,6 +31,8 @@ def grade_laws(
     frames : columns of the frame table
     constants : car and pavement
     """
+    if np.isnan(ticks.get("road_grade", np.nan)).all():
+        return []
     T = frames["T_world_rig"].reshape(-1, 4, 4)
     body = pose_body(
         frames["heave"], frames["pitch"], constants.car["cg_to_front_axle"], constants.car["cg_height"]

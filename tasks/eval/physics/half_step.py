@@ -5,14 +5,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tasks.eval.physics.constants import (
     DT,
     Constants,
     Floats,
-    compute_burckhardt_friction,
     find_climb,
-    peak_slip,
     pressure_at,
     raised_cosine,
 )
@@ -21,6 +20,7 @@ from tasks.eval.physics.implicit_step import (
     find_slowest_explicit_speed,
     solve_wheel_speed,
 )
+from tasks.eval.physics.tyres import find_curve
 
 INNER_STEP = 0.0005
 """Step of the integration behind the ticks (paper, Table frozen_physical_params) [s]."""
@@ -56,9 +56,8 @@ def follow_half_step(ticks: Mapping[str, Floats], facts: Mapping[str, Any], cons
     constants : car and pavement
     """
     car, m, L = constants.car, constants.mass, constants.wheelbase
-    tyre = constants.tyres[facts["weather"]]
-    beta, top = tyre.at(tyre.slip_stiffness, facts["surface_friction"]), peak_slip(tyre.burckhardt)
-    target, width, radius = top / beta, car["abs_release_width"], car["wheel_radius"]
+    curve = find_curve(facts, constants)
+    target, width, radius = curve.target_slip, car["abs_release_width"], car["wheel_radius"]
     s, v, a = ticks["station"], ticks["speed"], ticks["longitudinal_acceleration"]
     speed = v[:-1] + INNER_STEP * a[:-1]
     station = s[:-1] + 0.5 * INNER_STEP * (v[:-1] + speed)
@@ -86,10 +85,7 @@ def follow_half_step(ticks: Mapping[str, Floats], facts: Mapping[str, Any], cons
         if analytic:
             lever = car["cg_to_rear_axle" if axle == "f" else "cg_to_front_axle"]
             between = m / L * (car["gravity"] * lever + sign * (a + climb)[:-1] * car["cg_height"])
-        grip = compute_burckhardt_friction(beta * slip, tyre.burckhardt) / compute_burckhardt_friction(
-            np.array(top), tyre.burckhardt
-        )
-        push = facts["tyre_peak"] * grip * between
+        push = curve.friction(slip, between) * between
         share = np.clip((target * (1 + width) - slip) / (width * target), 0.0, 1.0)
         brake = share * constants.brake_share(axle) * car["brake_gain"] * pressure
         rates[axle] = (radius * push - brake) / car[f"wheel_inertia_{axle}"]
@@ -98,12 +94,25 @@ def follow_half_step(ticks: Mapping[str, Floats], facts: Mapping[str, Any], cons
         at_end = compute_wheel_rate(ended, between[second], pressure[second], axle, facts, constants)[0]
         changes[axle][second] = (omega - before)[second] + INNER_STEP * at_end
         forward -= push + between * raised_cosine(station - behind, *hump)[1]
+    held = find_held_rows(time, facts, find_brake_onset(ticks, facts))
     return HalfStep(
-        acceleration=forward / m - car["coast_deceleration"] - later_climb,
+        acceleration=np.where(held, 0.0, forward / m - car["coast_deceleration"] - later_climb),
         rate=rates,
         change=changes,
         load_uncertainty=doubts,
     )
+
+
+def find_held_rows(time: Floats, facts: Mapping[str, Any], onset: float) -> NDArray[np.bool_]:
+    """Return when the driver holds the speed: until the brake onset, and throughout without one [N].
+
+    Parameters
+    ----------
+    time : [N] [s]
+    facts : the clip's row
+    onset : of the brake [s]
+    """
+    return (time < onset) & bool(facts["hold_speed"])
 
 
 def pressure_shape(facts: Mapping[str, Any]) -> tuple[float, float, float, float]:

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from tasks.eval.physics.constants import Constants, Floats, compute_burckhardt_friction, peak_slip
+from tasks.eval.physics.constants import Constants, Floats
+from tasks.eval.physics.tyres import find_curve
 
 MOST_ITERATIONS = 40
 """Newton steps of the rows that need most [1]."""
@@ -24,18 +25,15 @@ def find_slowest_explicit_speed(facts: Mapping[str, Any], constants: Constants, 
     """
     if constants.steady_limit == 0.0:
         return 0.0
-    car, tyre = constants.car, constants.tyres[facts["weather"]]
-    beta, top = tyre.at(tyre.slip_stiffness, facts["surface_friction"]), peak_slip(tyre.burckhardt)
-    c1, c2, c3 = tyre.burckhardt
-    height = float(compute_burckhardt_friction(np.array(top), tyre.burckhardt))
-    slope = facts["tyre_peak"] * beta * (c1 * c2 - c3) / height
+    car, curve = constants.car, find_curve(facts, constants)
     weight = constants.mass * car["gravity"] / constants.wheelbase
-    moved = facts["tyre_peak"] * weight * car["cg_height"]
+    moved = curve.peak * weight * car["cg_height"]
     found = [car["slip_speed_floor"]]
     for axle, lever, load in (("f", "cg_to_rear_axle", moved), ("r", "cg_to_front_axle", 0.0)):
-        grip = car["wheel_radius"] * slope * (weight * car[lever] + load)
+        most = weight * car[lever] + load
+        grip = car["wheel_radius"] * float(curve.slope(np.array(0.0), np.array(most))) * most
         release = constants.brake_share(axle) * car["brake_gain"] * facts["peak_pressure_mpa"]
-        release /= car["abs_release_width"] * top / beta
+        release /= car["abs_release_width"] * curve.target_slip
         inertia = car[f"wheel_inertia_{axle}"] * constants.steady_limit
         found.append(step * car["wheel_radius"] * max(grip, release) / inertia)
     return max(found)
@@ -54,16 +52,13 @@ def compute_wheel_rate(
     facts : the clip's row
     constants : car and pavement
     """
-    car, tyre = constants.car, constants.tyres[facts["weather"]]
-    beta, top = tyre.at(tyre.slip_stiffness, facts["surface_friction"]), peak_slip(tyre.burckhardt)
-    target, width, radius = top / beta, car["abs_release_width"], car["wheel_radius"]
-    c1, c2, c3 = tyre.burckhardt
-    scale = facts["tyre_peak"] / compute_burckhardt_friction(np.array(top), tyre.burckhardt)
+    car, curve = constants.car, find_curve(facts, constants)
+    target, width, radius = curve.target_slip, car["abs_release_width"], car["wheel_radius"]
     felt = np.clip(slip, 0.0, 1.0)
-    grip = scale * compute_burckhardt_friction(beta * felt, tyre.burckhardt)
+    grip = curve.friction(felt, load)
     share = (target * (1 + width) - felt) / (width * target)
     torque = constants.brake_share(axle) * car["brake_gain"] * pressure
-    steeper = radius * load * scale * beta * (c1 * c2 * np.exp(-c2 * beta * felt) - c3)
+    steeper = radius * load * curve.slope(felt, load)
     steeper = steeper + np.where((share > 0) & (share < 1), torque / (width * target), 0.0)
     rate = radius * grip * load - np.clip(share, 0.0, 1.0) * torque
     inertia = car[f"wheel_inertia_{axle}"]

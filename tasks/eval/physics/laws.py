@@ -5,7 +5,7 @@ rounding. No tolerance is tuned to the size of a fault.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,25 +14,30 @@ from numpy.typing import NDArray
 from tasks.eval.physics.constants import (
     Constants,
     Floats,
-    compute_burckhardt_friction,
     find_climb,
-    peak_slip,
-    pressure_at,
     raised_cosine,
 )
-from tasks.eval.physics.half_step import INNER_STEP, HalfStep, find_brake_onset, pressure_shape
+from tasks.eval.physics.coupled import find_hits, spread
+from tasks.eval.physics.half_step import (
+    INNER_STEP,
+    HalfStep,
+    find_brake_onset,
+    find_held_rows,
+)
+from tasks.eval.physics.tyres import find_curve
 
 ROUNDING = 1e-9
 """Relative error that double-precision sums of a run may carry [1]."""
 
-AT_A_STEP = 1e-9
-"""Time about a tick within which a command that jumps has either value [s]."""
 
 ASKED = "clips.peak_pressure_mpa clips.ramp_s"
 """Columns that decide the brake pressure between ticks."""
 
-ROAD_PASS = 2e-5
-"""Road height left between the last two fixed-point passes over a road feature [m]."""
+
+LEAP = 0.2
+"""Change of the brake pressure within a tick, over its largest value, that no ramp makes [1]."""
+SHAKEN = 0.5
+"""Share of its load at rest by which a shaken axle's load changes [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,17 +50,30 @@ class Law:
     columns : the columns that it relates, as table.column
     excess : largest residual over its tolerance; above 1 the law is broken [1]
     at : row of the largest excess [1]
+    size : the residual there, in the unit of ``of`` [any]
+    of : the column that the residual is one of
     """
 
     name: str
     columns: frozenset[str]
     excess: float
     at: int
+    size: float
+    of: str
 
     @property
     def broken(self) -> bool:
         """Whether the telemetry breaks it; a law that cannot be evaluated is broken."""
         return not self.excess <= 1.0
+
+    def moved_to(self, rows: NDArray[np.int64]) -> "Law":
+        """Return the law with its row counted in the table.
+
+        Parameters
+        ----------
+        rows : rows of the table that were judged [1]
+        """
+        return replace(self, at=int(rows[self.at]))
 
 
 def evaluate_law(
@@ -66,8 +84,8 @@ def evaluate_law(
     Parameters
     ----------
     name : what it says
-    columns : names, separated by blanks; those without a table are of ``table``
-    residual, tolerance : [N], in one unit; NaN residuals of masked rows must be left out before [any]
+    columns : names, separated by blanks; those without a table are of ``table``; the residual is one of the first
+    residual, tolerance : [N], in its unit; NaN residuals of masked rows must be left out before [any]
     table : default table
     """
     residual = np.atleast_1d(residual)
@@ -75,9 +93,12 @@ def evaluate_law(
         return None
     excess = np.abs(residual) / tolerance
     worst = int(np.argmax(np.where(np.isfinite(excess), excess, np.inf)))
-    names = frozenset(c if "." in c else f"{table}.{c}" for c in columns.split())
+    names = [c if "." in c else f"{table}.{c}" for c in columns.split()]
     value = float(excess[worst])
-    return Law(name=name, columns=names, excess=value if np.isfinite(value) else np.inf, at=worst)
+    return Law(
+        name=name, columns=frozenset(names), excess=value if np.isfinite(value) else np.inf, at=worst,
+        size=abs(float(residual[worst])), of=names[0],
+    )  # fmt: skip
 
 
 def rounding_tolerance(*terms: Floats) -> Floats:
@@ -104,18 +125,15 @@ def wheel_laws(
     constants : car and pavement
     half : state half a tick after each tick
     """
-    car, tyre = constants.car, constants.tyres[facts["weather"]]
+    car, curve = constants.car, find_curve(facts, constants)
     v, omega = ticks["speed"], ticks[f"wheel_speed_{axle}"]
     kappa, force = ticks[f"braking_slip_{axle}"], ticks[f"tyre_force_{axle}"]
     torque, q, load = (ticks[f"{c}_{axle}"] for c in ("brake_torque", "abs_scale", "tyre_load"))
     radius, inertia = car["wheel_radius"], car[f"wheel_inertia_{axle}"]
-    beta = tyre.at(tyre.slip_stiffness, facts["surface_friction"])
-    top = peak_slip(tyre.burckhardt)
-    target, width = top / beta, car["abs_release_width"]
+    target, width = curve.target_slip, car["abs_release_width"]
 
     slip = np.clip((v - radius * omega) / np.maximum(v, car["slip_speed_floor"]), 0.0, 1.0)
-    grip = facts["tyre_peak"] * compute_burckhardt_friction(beta * kappa, tyre.burckhardt)
-    grip = grip / compute_burckhardt_friction(np.array(top), tyre.burckhardt)
+    grip = curve.friction(kappa, load)
     asked = np.clip((target * (1 + width) - kappa) / (width * target), 0.0, 1.0)
     gain = constants.brake_share(axle) * car["brake_gain"]
 
@@ -125,6 +143,8 @@ def wheel_laws(
     step = np.diff(omega)[rolls] - half.change[axle][rolls]
     uncertainty = radius / inertia * half.load_uncertainty[axle][rolls]
     integration_tolerance = INNER_STEP * (uncertainty + 1e-6 * (np.abs(after) + np.abs(rate[rolls]) + 1.0))
+    jolt = np.where(find_leaps(ticks), spread(np.abs(np.diff(rate, prepend=rate[:1])), 3), 0.0)
+    integration_tolerance = integration_tolerance + 2 * INNER_STEP * jolt[1:][rolls] + 2e-6
     x = f"_{axle}"
     laws = [
         evaluate_law(f"slip of wheel speed, {axle}", f"braking_slip{x} wheel_speed{x} speed", kappa - slip, 1e-9),
@@ -137,7 +157,7 @@ def wheel_laws(
             f" longitudinal_acceleration {ASKED}",
             step, integration_tolerance),
         evaluate_law(f"wheel starts rolling, {axle}", f"wheel_speed{x} clips.initial_speed_km_h",
-            omega[:1] * radius - facts["initial_speed_km_h"] / 3.6, 1e-9),
+            omega[:1] - facts["initial_speed_km_h"] / 3.6 / radius, 3e-9),
     ]  # fmt: skip
     if car["abs_build_rate"] * INNER_STEP >= 1 and car["abs_release_rate"] * INNER_STEP >= 1:
         laws.append(
@@ -168,11 +188,14 @@ def motion_laws(
     road = ticks["road_force"]
     moves = v > 0
     both = np.flatnonzero(moves[1:] & moves[:-1]) + 1
+    unseen = find_hits(ticks, constants) | find_leaps(ticks)
+    met = np.where(unseen, spread(np.abs(np.diff(a, prepend=a[:1])), 3), 0.0)[1:]
     h = INNER_STEP
     coast = np.where(moves, car["coast_deceleration"], 0.0)
     climb, later_climb, open_climb = find_climb(ticks, constants)
-    net = np.where(moves, (road - force) / m - climb, 0.0) - coast
     time = ticks["t_ns"]
+    held = find_held_rows(1e-3 * np.arange(len(s)), facts, find_brake_onset(ticks, facts))
+    net = np.where(held, 0.0, np.where(moves, (road - force) / m - climb, 0.0) - coast)
 
     later = half.acceleration
     uncertainty = (half.load_uncertainty["f"] + half.load_uncertainty["r"])[both - 1] / m
@@ -180,6 +203,9 @@ def motion_laws(
     way = (np.diff(s) - 0.5 * h * (v[:-1] + 2 * between + v[1:]))[both - 1]
     gained = (np.diff(v) - h * (a[:-1] + later))[both - 1]
     power = 0.5 * h * (net[:-1] * (v[:-1] + between) + later * (between + v[1:]))
+    unsure_power = h * v[1:] * (half.load_uncertainty["f"] + half.load_uncertainty["r"]) / m
+    unsure_power = unsure_power + h * v[1:] * met
+    unsure_energy = np.concatenate([[0.0], np.cumsum(unsure_power)])
     energy = 0.5 * (v**2 - v[0] ** 2) - np.concatenate([[0.0], np.cumsum(power)])
     rolling = np.flatnonzero(moves)
     drives = " ".join(
@@ -199,12 +225,12 @@ def motion_laws(
         evaluate_law("station is the integral of speed", "station speed longitudinal_acceleration", way, 1e-10),
         evaluate_law("station rests with the car", "station speed", np.diff(s)[stays[1:] - 1], 1e-9),
         evaluate_law("speed is the integral of acceleration", "speed longitudinal_acceleration " + drives,
-            gained, h * (uncertainty + open_climb[both - 1] + 1e-5)),
+            gained, h * (2 * uncertainty + met[both - 1] + open_climb[both - 1] + 1e-5)),
         evaluate_law("m dv/dt is the sum of forces",
             "longitudinal_acceleration tyre_force_f tyre_force_r road_force road_grade",
             a - net, rounding_tolerance(a, force / m, road / m)),
         evaluate_law("kinetic energy falls by the work done", "speed longitudinal_acceleration road_force " + drives,
-            energy[rolling], 2e-5 * v[0] ** 2),
+            energy[rolling] / v[0], 2e-5 * v[0] + unsure_energy[rolling] / v[0]),
         evaluate_law("road force of load and slope", "road_force tyre_load_f tyre_load_r station clips.hazard_height_m"
             " clips.hazard_center_m clips.hazard_length_m", road - uphill, rounding_tolerance(load_f, load_r)),
     ]  # fmt: skip
@@ -232,44 +258,28 @@ def motion_laws(
     return laws
 
 
-def command_laws(
-    ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants
-) -> list[Law | None]:
-    """Return the laws of brake pressure and road heights as the scenario commands them.
+def is_shaken(ticks: Mapping[str, Floats], constants: Constants) -> bool:
+    """Return whether the road changes an axle's load by `SHAKEN` of that at rest.
 
     Parameters
     ----------
     ticks : columns of the tick table
-    facts : the clip's row
     constants : car and pavement
     """
-    s, v = ticks["station"], ticks["speed"]
-    time: Floats = 1e-3 * np.arange(len(s), dtype=np.float64)
-    onset = find_brake_onset(ticks, facts)
-    peak, ramp, hold, lasting = pressure_shape(facts)
+    changes = [np.abs(ticks[f"axle_load_{axle}"] / constants.static_load(axle) - 1.0).max() for axle in "fr"]
+    return bool(max(changes) > SHAKEN) and bool(np.ptp(ticks["road_height_f"]) > 0)
+
+
+def find_leaps(ticks: Mapping[str, Floats]) -> NDArray[np.bool_]:
+    """Return the ticks about which the brake pressure jumps, and wheels with it, [N].
+
+    Parameters
+    ----------
+    ticks : columns of the tick table
+    """
     pressure = ticks["brake_pressure_mpa"]
-    around = [
-        pressure_at(time - onset + late, peak, ramp, hold, lasting) for late in (-AT_A_STEP, 0.0, AT_A_STEP)
-    ]
-    wanted = np.clip(pressure, np.min(around, axis=0), np.max(around, axis=0))
-    steepest = peak / max(ramp, 1e-3)
-    by_place = facts["brake_onset_m"] is not None and np.isfinite(facts["brake_onset_m"])
-    slack = 1e-9 + (steepest * 1e-5 if by_place else 0.0)
-    release = "" if np.isinf(hold) else " clips.hold_s clips.release_s"
-    columns = f"brake_pressure_mpa clips.peak_pressure_mpa clips.ramp_s clips.brake_onset_s{release}"
-    if by_place:
-        columns = columns.replace("brake_onset_s", "brake_onset_m")
-    laws = [evaluate_law("brake pressure as commanded", columns, pressure - wanted, slack)]
-    hump = facts["hazard_center_m"], facts["hazard_length_m"], facts["hazard_height_m"]
-    moves = v > 0
-    for axle, behind in (("f", 0.0), ("r", constants.wheelbase)):
-        height, _ = raised_cosine(s - behind, *hump)
-        laws.append(
-            evaluate_law(f"road height as commanded, {axle}", f"road_height_{axle} station clips.hazard_height_m"
-                " clips.hazard_center_m clips.hazard_length_m",
-                (ticks[f"road_height_{axle}"] - height)[moves], ROAD_PASS)
-        )  # fmt: skip
-    return laws
+    leaps = np.abs(np.diff(pressure, prepend=pressure[:1])) > LEAP * max(pressure.max(), 1e-9)
+    return np.asarray(spread(leaps.astype(float), 3) > 0)
 
 
 def finite_rows(columns: Mapping[str, NDArray[Any]]) -> list[str]:

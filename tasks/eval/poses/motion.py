@@ -40,6 +40,7 @@ class RecoveredMotion:
     inliers : int64 [F] points or pixels that carried the estimate; 0 in frame 0
     failed : bool [F]
     failures : one sentence per failed frame
+    blind : every failed frame shows too little to follow
     """
 
     method: str
@@ -54,6 +55,7 @@ class RecoveredMotion:
     inliers: NDArray[np.int64]
     failed: NDArray[np.bool_]
     failures: tuple[str, ...]
+    blind: bool = False
 
     @property
     def typical_pitch_std(self) -> float:
@@ -78,21 +80,24 @@ class FrameStep:
     covariance : float64 [6, 6] of the left twist (translation, rotation) that errors add [m, rad]
     inliers : points or pixels that carried the estimate
     failure : why there is no estimate; empty where there is one
+    blind : there is none because the pictures show too little to follow
     """
 
     T_earlier_later: Floats
     covariance: Floats
     inliers: int
     failure: str = ""
+    blind: bool = False
 
 
-def failed_step(reason: str, inliers: int) -> FrameStep:
-    """Return a step that could not be made, with the reason as the end of a sentence."""
+def failed_step(reason: str, inliers: int, *, blind: bool = False) -> FrameStep:
+    """Return a step that could not be made, with the reason as the end of a sentence; ``blind`` as in `FrameStep`."""
     return FrameStep(
         T_earlier_later=np.full((4, 4), np.nan),
         covariance=np.full((6, 6), np.nan),
         inliers=inliers,
         failure=reason,
+        blind=blind,
     )
 
 
@@ -121,7 +126,11 @@ def place_frames(count: int, place: Callable[[int, int, Floats], FrameStep]) -> 
     for frame in range(1, count):
         gap = frame - anchor
         if gap > MAX_GAP:
-            step = failed_step(f"the track was lost in frame {anchor + 1} and not found again", 0)
+            step = failed_step(
+                f"the track was lost in frame {anchor + 1} and not found again",
+                0,
+                blind=placements[anchor].step.blind,
+            )
         else:
             step = place(anchor, frame, np.linalg.matrix_power(per_frame, gap))
         placements.append(Placement(anchor=anchor, step=step))
@@ -211,6 +220,7 @@ def integrate_motion(
         inliers=np.array([0, *(p.step.inliers for p in placements)], dtype=np.int64),
         failed=failed,
         failures=tuple(failures),
+        blind=bool(failures) and all(placed.step.blind for placed in placements if placed.step.failure),
     )
 
 

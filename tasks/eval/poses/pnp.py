@@ -272,13 +272,17 @@ def _solve_tracks(
     settings: PnpSettings,
 ) -> FrameStep:
     if len(corners) < settings.min_points:
-        return failed_step(f"{len(corners)} points to track, at least {settings.min_points} are needed", 0)
+        return failed_step(
+            f"{len(corners)} points to track, at least {settings.min_points} are needed", 0, blind=True
+        )
     origin = view.source[corners[:, 1], corners[:, 0]]
     q, smooth = _sample_inverse_depth(anchor.inverse_depth, origin, settings)
     tracked = tracks.came_back & smooth
     count = int(tracked.sum())
     if count < settings.min_points:
-        return failed_step(f"{count} points tracked, at least {settings.min_points} are needed", count)
+        return failed_step(
+            f"{count} points tracked, at least {settings.min_points} are needed", count, blind=True
+        )
     points = viewing_rays(origin[tracked], K) / q[tracked, None]
     limits = PnpLimits(
         min_inliers=max(settings.min_points, int(settings.min_inlier_share * count)),

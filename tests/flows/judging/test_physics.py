@@ -10,8 +10,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from flows.judging.physics import audit_physics, clip_columns, clip_facts, read_constants
+from flows.judging.physics import audit_physics, clip_columns, clip_facts, find_route
+from flows.judging.physics_constants import read_constants
 from flows.making.generate import generate_dataset
+from flows.making.plan import read_plan
 from flows.store.layout import Layout
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
@@ -57,6 +59,18 @@ frames: 16
 frame_rate_hz: 5
 low_speed: {low_speed}
 base: {{initial_speed_km_h: 25, peak_pressure_mpa: 2.3, brake_onset_s: 0.2}}
+scenarios:
+  stop: {{weather: dry}}
+"""
+HELD = """
+name: held
+scene: {folder}/scene
+camera: {folder}/camera.yaml
+frames: 16
+frame_rate_hz: 5
+vehicle_mode: coupled
+vehicle: {car}
+base: {{initial_speed_km_h: 25, peak_pressure_mpa: 2.3, brake_onset_s: 0.4, hold_speed: true}}
 scenarios:
   stop: {{weather: dry}}
 """
@@ -232,13 +246,24 @@ def test_a_table_without_a_column_is_refused(dataset: Path, tmp_path: Path) -> N
         audit_physics(str(copy))
 
 
-def test_a_dataset_on_another_tyre_is_refused_by_its_name(dataset: Path, tmp_path: Path) -> None:
-    copy = tmp_path / "copy"
-    shutil.copytree(dataset, copy, ignore=shutil.ignore_patterns("frames.zarr", "telemetry"))
-    with open(copy / "inputs" / "vehicle.yaml", "a") as file:
-        file.write("\ntyre: pacejka-205-60r15\n")
-    with pytest.raises(InputError, match=r"knows Burckhardt's tyre; .* drives on pacejka-205-60r15"):
-        read_constants(copy)
+def test_a_grown_car_on_another_tyre_that_holds_its_speed_is_judged_with_its_poses(tmp_path: Path) -> None:
+    car = tmp_path / "car.yaml"
+    car.write_text("extends: multibody-grown\ntyre: pacejka-205-60r15\n")
+    grid = write_toy_grid(tmp_path, HELD, car=car)
+    generate_dataset(grid, str(tmp_path / "made"), runner="threads", workers=1, pictures=False)
+    result = audit_physics(str(tmp_path / "made"), out=str(tmp_path))
+    assert result["verified"], [(row["label"], row["broken"]) for row in result["clips"]]
+    assert result["poses_checked"]
+    facts = clip_facts(tmp_path / "made")[0]
+    ticks, frames = (clip_columns(tmp_path / "made", table, facts) for table in ("ticks", "frames"))
+    high = frames["T_world_rig"] + 0.05 * (np.arange(16) == 11)
+    route = find_route(read_plan(tmp_path / "made").scene)
+    verdict = audit_clip(
+        ticks, {**frames, "T_world_rig": high}, facts, read_constants(tmp_path / "made"), route
+    )
+    assert [(law.name, round(law.size, 3)) for law in verdict.broken] == [
+        ("rig stands where route, heave and pitch put it", 0.05)
+    ]
 
 
 def test_a_clip_without_a_judged_frame_has_no_figures_of_the_check_and_keeps_its_laws(

@@ -14,7 +14,8 @@ from flows.auditing.audit import audit_dataset
 from flows.auditing.driven_lines import Asked, drive_clip, is_driven, load_entries
 from flows.auditing.explain import explain_frame
 from flows.auditing.kept_lines import list_lines
-from flows.judging.physics import audit_physics, clip_columns, clip_facts, read_constants
+from flows.judging.physics import audit_physics, clip_columns, clip_facts
+from flows.judging.physics_constants import read_constants
 from flows.making.freezing import frozen_run
 from flows.making.generate import generate_dataset
 from flows.making.plan import make_plan, read_plan

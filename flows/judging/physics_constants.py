@@ -1,0 +1,115 @@
+"""What the physics judge takes as given: numbers of a dataset's frozen car, tyre and pavement."""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from catalogs.documents import read_yaml
+from catalogs.low_speed import load_kept_low_speed
+from catalogs.surfaces import load_surface
+from catalogs.tyres import VERSIONS, tyre_entries
+from catalogs.vehicles import load_vehicle, vehicle_tyre_source
+from flows.making.plan import TICK_RATE_HZ
+from flows.store.layout import Layout
+from flows.store.sealed import read_plan_record, recorded_grid
+from tasks.errors import InputError
+from tasks.eval.physics.constants import Constants, TyreNumbers, TyreTables
+from tasks.eval.physics.tyres import read_tyre_numbers
+from tasks.surface.state import SurfaceParameters
+from tasks.vehicle.paper.low_speed import SteadyStop
+from tasks.vehicle.parameters import Vehicle
+
+NUMBER = r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"
+"""A number of a tyre property file."""
+
+
+def read_constants(root: Path) -> Constants:
+    """The frozen car and pavement of a dataset, as numbers by name, in SI.
+
+    Raises
+    ------
+    InputError
+        If a file is missing or has a wrong form.
+    """
+    layout = Layout(root)
+    files = {name: layout.inputs / f"{name}.yaml" for name in ("vehicle", "surface")}
+    missing = [
+        f"{path}: no such file; is {root} a finished muSync dataset?"
+        for path in files.values()
+        if not path.is_file()
+    ]
+    if missing:
+        raise InputError(missing)
+    # of the form that they must have
+    vehicle = load_vehicle(files["vehicle"], layout.inputs / "weather")
+    pavement = load_surface(files["surface"], layout.inputs / "weather")
+    car = read_yaml(files["vehicle"], "catalogue entry")
+    settings = recorded_grid(read_plan_record(layout)["grid"], layout.plan)
+    mode, steady = settings.vehicle_mode, load_kept_low_speed(layout.inputs)
+    return make_constants(
+        _convert_numbers(car), vehicle, pavement, mode=mode, ticks_per_frame=TICK_RATE_HZ / settings.frame_rate_hz,
+        steady=steady, magic=_read_tyre(files["vehicle"]),
+    )  # fmt: skip
+
+
+def make_constants(
+    car: Mapping[str, float], vehicle: Vehicle, pavement: SurfaceParameters, *, mode: str, ticks_per_frame: float,
+    steady: SteadyStop | None, magic: TyreNumbers | None = None,
+) -> Constants:  # fmt: skip
+    """Return what the judge takes as given.
+
+    Parameters
+    ----------
+    car : mechanical numbers of the vehicle, in SI
+    vehicle : its tyre families, effects and forms
+    pavement : the road's surface
+    mode : paper or coupled
+    ticks_per_frame : ticks from one frame to the next [1]
+    steady : how the end of a stop is kept steady; None takes the published rule literally
+    magic : the Magic Formula of the tyre; None for Burckhardt's curves
+    """
+    grows = mode == "coupled"
+    return Constants(
+        car=car,
+        surface={name: value for name, value in vars(pavement).items() if isinstance(value, float)},
+        tyres={kind: TyreTables(**vars(vehicle.find_tyre_family(kind))) for kind in vehicle.find_weathers()},
+        mode=mode, ticks_per_frame=ticks_per_frame,
+        steady_limit=0.0 if steady is None else steady.explicit_limit,
+        held_share=0.0 if steady is None else steady.held_share,
+        low_speed_rule=steady is None or steady.pitch_rule,
+        magic=magic,
+        # the paper's mode knows no effect
+        effects={name: value for name, value in vehicle.effects.items() if value and grows},
+        forms=tuple((form.port, form.variable) for form in vehicle.forms if grows),
+    )  # fmt: skip
+
+
+def _read_tyre(vehicle: Path) -> TyreNumbers | None:
+    """Return the numbers of the tyre that the kept vehicle names; None where it names none."""
+    source = vehicle_tyre_source(vehicle)
+    return None if source is None else read_property_file(source.read_bytes())
+
+
+def read_property_file(content: bytes) -> TyreNumbers:
+    """Return the numbers of a tyre property file as the judge takes them.
+
+    Parameters
+    ----------
+    content : of the file
+    """
+    entries = tyre_entries(content)
+    numbers = {name: float(value) for name, value in entries.items() if re.fullmatch(NUMBER, value)}
+    return read_tyre_numbers(numbers, newer=VERSIONS[entries["FITTYP"]] == "MF 6.1")
+
+
+def _convert_numbers(entry: dict[str, Any]) -> dict[str, float]:
+    scalars = {
+        k: v for k, v in entry.items() if isinstance(v, dict) and isinstance(v.get("value"), (int, float))
+    }
+    return {
+        name: float(np.deg2rad(item["value"])) if item.get("unit") == "deg" else float(item["value"])
+        for name, item in scalars.items()
+    }

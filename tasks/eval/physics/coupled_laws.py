@@ -1,0 +1,229 @@
+"""Laws of the physical model: relations of columns at each tick, and integrals over one tick.
+
+A relation holds to rounding. An integral is worked out from the rates at four ticks; its bound is what these rates
+change beyond a straight line about the tick, since that is all that the logging interval hides.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.eval.physics.constants import DT, Constants, Floats
+from tasks.eval.physics.coupled import AxleForces, Forces, compute_forces, spread
+from tasks.eval.physics.effects import AXLE, FORCE, HEAVE, PITCH, SUM, TORQUE
+from tasks.eval.physics.half_step import INNER_STEP
+from tasks.eval.physics.laws import Law, evaluate_law, rounding_tolerance
+from tasks.eval.physics.tyres import find_curve
+
+HIDDEN = 1.5
+"""Share of a rate's change of slope that an integral over a tick may miss: half where it jumps within, times 3 [1]."""
+SWING = 20.0
+"""Accelerations by which a wheel may swing within a tick that is as long as its time constant or longer [1]."""
+AROUND = 20
+"""Ticks about a row whose largest force an error of second order of the inner step follows: a quarter of a hop [1]."""
+SLIGHT = 5e-4
+"""Share of the clip's largest force that is always in doubt [1]."""
+EDGE = 4
+"""Ticks at either end where differences know the axle's rate less well [1]."""
+BALANCE = 3e-3
+"""Share of tyre's and brake's pull within which a stiff wheel's inertia is not told from rounding [1]."""
+STATES = "heave pitch heave_rate pitch_rate unsprung_heave_f unsprung_heave_r"
+"""Columns that decide the struts' forces."""
+
+
+def coupled_laws(
+    ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants
+) -> list[Law | None]:
+    """Return the laws of slip, tyre, brake, wheels, motion, road, contact and body of the physical model.
+
+    Parameters
+    ----------
+    ticks : columns of the tick table
+    facts : the clip's row
+    constants : car and pavement
+    """
+    forces = compute_forces(ticks, facts, constants)
+    return [
+        *_axle_laws(ticks, facts, forces, "f", constants),
+        *_axle_laws(ticks, facts, forces, "r", constants),
+        *_motion_laws(ticks, facts, forces, constants),
+        *_body_laws(ticks, forces, constants),
+    ]
+
+
+def integral_law(
+    name: str, columns: str, values: Floats, rate: Floats, hits: NDArray[np.bool_], *,
+    rows: NDArray[np.bool_] | None = None, doubt: Floats | float = 0.0, floor: float = 0.0,
+) -> Law | None:  # fmt: skip
+    """Return the law that a column changes over each tick by the integral of its rate.
+
+    Parameters
+    ----------
+    name, columns : as in ``evaluate_law``
+    values, rate : [N] the column and its rate at the ticks [any, any/s]
+    hits : [N] ticks about which the rate may jump to and fro
+    rows : [N - 1] intervals that are judged; None for all
+    doubt : [N] largest error of the rate itself [any/s]
+    floor : rounding of the column [any]
+    """
+    inner = np.concatenate([rate[:1], rate, rate[-1:]])
+    gained = DT / 24 * (13 * (inner[1:-2] + inner[2:-1]) - inner[:-3] - inner[3:])
+    gained[[0, -1]] = DT / 2 * (rate[:-1] + rate[1:])[[0, -1]]
+    bend = spread(np.abs(np.diff(inner, 2)), 2)
+    bend = bend + np.where(hits, spread(np.abs(np.diff(rate, prepend=rate[:1])), 3), 0.0)
+    unsure = HIDDEN * bend + spread(np.broadcast_to(doubt, rate.shape), 1)
+    unsure = np.where(hits, 4.0, 1.0) * unsure
+    tolerance = DT * np.maximum(unsure[1:], unsure[:-1]) + floor
+    tolerance = tolerance + 1e-9 * DT * np.abs(rate).max() + 1e-12 * np.abs(values).max()
+    k = np.arange(len(values) - 1) if rows is None else np.flatnonzero(rows)
+    law = evaluate_law(name, columns, (np.diff(values) - gained)[k], tolerance[k])
+    return None if law is None else law.moved_to(k)
+
+
+def _axle_laws(
+    ticks: Mapping[str, Floats], facts: Mapping[str, Any], forces: Forces, axle: str, constants: Constants
+) -> list[Law | None]:
+    car, curve, x, at = constants.car, find_curve(facts, constants), f"_{axle}", forces.axles[axle]
+    v, omega, kappa = ticks["speed"], ticks[f"wheel_speed{x}"], ticks[f"braking_slip{x}"]
+    load, torque = ticks[f"tyre_load{x}"], ticks[f"brake_torque{x}"]
+    damping = constants.effects.get("tyre_damping", 0.0)
+    jolt = DT * at.linked / car[f"unsprung_mass{x}"]
+    slight = 3e-3 * np.abs(at.rate).max()
+    part = slice(EDGE, -EDGE) if damping else slice(None)
+    force = ticks[f"tyre_force{x}"]
+    radius, floor = car["wheel_radius"], car["slip_speed_floor"]
+    slip = np.clip((v - radius * omega) / np.maximum(v, floor), -1.0, 1.0)
+    rolls = forces.moves[1:] & forces.moves[:-1]
+    feature = "clips.hazard_height_m clips.hazard_center_m clips.hazard_length_m"
+    tilted = "" if not constants.effects.get("force_tilt") else f" tyre_force{x}"
+    return [
+        evaluate_law(f"slip of wheel speed, {axle}", f"braking_slip{x} wheel_speed{x} speed", kappa - slip, 1e-9),
+        evaluate_law(f"{FORCE}, {axle}", f"tyre_force{x} braking_slip{x} tyre_load{x} clips.tyre_peak",
+            force - at.tyre_force, rounding_tolerance(force, load)),
+        evaluate_law(f"{TORQUE}, {axle}", f"brake_torque{x} abs_scale{x} brake_pressure_mpa",
+            torque - at.torque, rounding_tolerance(torque) + 1e-9 + at.torque_error),
+        *_abs_laws(ticks, forces, axle, curve.target_slip, constants),
+        integral_law(f"wheel torque balance, {axle}", f"wheel_speed{x} tyre_force{x} brake_torque{x} tyre_load{x}",
+            omega, at.spin, forces.hits, rows=_leave_out_stop(rolls), doubt=_doubt_spin(at), floor=1e-6),
+        evaluate_law(f"wheel starts rolling, {axle}", f"wheel_speed{x} clips.initial_speed_km_h",
+            omega[:1] - facts["initial_speed_km_h"] / 3.6 / radius, 1e-9),
+        evaluate_law(f"wheel stands with the car, {axle}", f"wheel_speed{x} speed", omega[~forces.moves], 1e-12),
+        evaluate_law(f"road height as commanded, {axle}", f"road_height{x} station {feature}",
+            ticks[f"road_height{x}"] - at.height, 1e-9 * (1.0 + abs(facts["hazard_height_m"]))),
+        evaluate_law(f"contact load of tyre squeeze, {axle}", f"tyre_load{x} road_height{x} unsprung_heave{x}",
+            (load - at.load)[part], (rounding_tolerance(load) + damping * (3 * at.rate_error + slight + jolt))[part]),
+        evaluate_law(f"axle load of contact load, {axle}", f"axle_load{x} tyre_load{x}{tilted}",
+            ticks[f"axle_load{x}"] - at.vertical, rounding_tolerance(load, force)),
+        evaluate_law(f"contact is a load, {axle}", f"contact{x} axle_load{x}",
+            (ticks[f"contact{x}"] != (ticks[f"axle_load{x}"] > 0)).astype(float), 0.5),
+    ]  # fmt: skip
+
+
+def _leave_out_stop(rolls: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Intervals less the last ones before a stop, in which the wheel stops within an inner step, [N - 1]."""
+    return rolls & (np.concatenate([rolls[EDGE:], np.full(EDGE, rolls[-1])]))
+
+
+def _doubt_rate(acceleration: Floats, unsure: Floats) -> Floats:
+    """Largest change of a rate that a tick can hide, where its own rate jumps or is unsure, [N]."""
+    return DT * (0.5 * spread(np.abs(np.diff(acceleration, prepend=acceleration[:1])), 1) + unsure)
+
+
+def _doubt_spin(at: AxleForces) -> Floats:
+    """Largest change of a wheel's acceleration that a tick can hide: a wheel swings back within its time constant."""
+    swings = np.minimum((at.stiffness * DT) ** 2, 1.0) * SWING
+    swung = np.where(at.turns, SWING, swings) * spread(np.abs(at.spin), 2)
+    return np.asarray(swung + swings / SWING * BALANCE * at.pull + at.flips)
+
+
+def _abs_laws(
+    ticks: Mapping[str, Floats], forces: Forces, axle: str, target: float, constants: Constants
+) -> list[Law | None]:
+    """Return the law of the ABS; with limited rates its bounds and its largest change a tick."""
+    car, columns = constants.car, f"abs_scale_{axle} braking_slip_{axle}"
+    q, width = ticks[f"abs_scale_{axle}"], car["abs_release_width"]
+    asked = np.clip((target * (1 + width) - ticks[f"braking_slip_{axle}"]) / (width * target), 0.0, 1.0)
+    asked = np.where(ticks["speed"] >= constants.effects.get("abs_cutoff", 0.0), asked, 1.0)
+    asked = np.where(forces.moves, asked, 1.0)
+    step, build, release = 0.5 * DT, car["abs_build_rate"], car["abs_release_rate"]
+    if build * step >= 1 and release * step >= 1:
+        return [evaluate_law(f"ABS command of slip, {axle}", columns, q - asked, 1e-7)]
+    rolls = np.flatnonzero(forces.moves[1:] & forces.moves[:-1])
+    gone = np.diff(q)[rolls]
+    over = np.maximum(np.maximum(gone - build * DT, -gone - release * DT), 0.0)
+    # it goes towards what is asked: beyond the band of both ticks it may not go
+    low, high = (pick(asked[1:], asked[:-1])[rolls] for pick in (np.minimum, np.maximum))
+    kept = q[1:][rolls]
+    away = np.where(kept > np.maximum(high, q[:-1][rolls]), 1.0, 0.0) * (kept - high)
+    away = away + np.where(kept < np.minimum(low, q[:-1][rolls]), 1.0, 0.0) * (low - kept)
+    bend = spread(np.abs(np.diff(asked, 2, prepend=asked[:1], append=asked[-1:])), 2)[1:][rolls]
+    return [
+        evaluate_law(f"ABS within its rates, {axle}", columns, over, 1e-9),
+        evaluate_law(f"ABS command of slip, {axle}", columns, away, 1e-9 + bend + max(build, release) * DT),
+    ]
+
+
+def _motion_laws(
+    ticks: Mapping[str, Floats], facts: Mapping[str, Any], forces: Forces, constants: Constants
+) -> list[Law | None]:
+    s, v, a = ticks["station"], ticks["speed"], ticks["longitudinal_acceleration"]
+    moves, road = forces.moves, ticks["road_force"]
+    force = ticks["tyre_force_f"] + ticks["tyre_force_r"]
+    rolls = moves[1:] & moves[:-1]
+    start = facts["initial_speed_km_h"] / 3.6
+    return [
+        evaluate_law("time counts milliseconds", "t_ns", ticks["t_ns"] - 1e6 * np.arange(len(s)), 0.5),
+        evaluate_law("station starts at zero", "station", s[:1], 1e-9),
+        evaluate_law("speed starts as commanded", "speed clips.initial_speed_km_h", v[:1] - start, 1e-9),
+        integral_law("station is the integral of speed", "station speed", s, v, forces.hits, rows=rolls,
+            doubt=_doubt_rate(a, forces.hidden / constants.mass), floor=1e-10),
+        evaluate_law("station rests with the car", "station speed", np.diff(s)[~moves[:-1]], 1e-9),
+        integral_law("speed is the integral of acceleration", "speed longitudinal_acceleration", v, a, forces.hits,
+            rows=rolls, doubt=forces.hidden / constants.mass),
+        evaluate_law(SUM, "longitudinal_acceleration tyre_force_f tyre_force_r road_force speed",
+            a - forces.acceleration, rounding_tolerance(a, force / constants.mass, road / constants.mass)),
+        evaluate_law("road force of load and slope", "road_force tyre_load_f tyre_load_r station"
+            " clips.hazard_height_m clips.hazard_center_m clips.hazard_length_m",
+            road - forces.road, rounding_tolerance(road) + 1e-6),
+    ]  # fmt: skip
+
+
+def _body_laws(ticks: Mapping[str, Floats], forces: Forces, constants: Constants) -> list[Law | None]:
+    car, axles, hits = constants.car, forces.axles, forces.hits
+    loads = "tyre_force_f tyre_force_r brake_torque_f brake_torque_r longitudinal_acceleration tyre_load_f tyre_load_r"
+    error = sum(axles[axle].strut_error + axles[axle].linked for axle in "fr")
+    arm = max(car["cg_to_front_axle"], car["cg_to_rear_axle"])
+    stiffness = max(car[f"tyre_stiffness_{axle}"] + car[f"suspension_stiffness_{axle}"] for axle in "fr")
+    hops = 3 * INNER_STEP**2 * stiffness / min(car["unsprung_mass_f"], car["unsprung_mass_r"])
+    unsure_heave = error / car["sprung_mass"] + hops * spread(np.abs(forces.heave), AROUND)
+    unsure_heave = unsure_heave + SLIGHT * np.abs(forces.heave).max()
+    unsure_pitch = (arm * error + 2 * car["cg_height"] * forces.hidden) / car["pitch_inertia"]
+    unsure_pitch = (
+        unsure_pitch + hops * spread(np.abs(forces.pitch), AROUND) + SLIGHT * np.abs(forces.pitch).max()
+    )
+    z, theta, dz, dtheta = (ticks[name] for name in ("heave", "pitch", "heave_rate", "pitch_rate"))
+    laws = [
+        integral_law("heave is the integral of its rate", "heave heave_rate", z, dz, hits,
+            doubt=_doubt_rate(forces.heave, unsure_heave), floor=1e-12),
+        integral_law("pitch is the integral of its rate", "pitch pitch_rate", theta, dtheta, hits,
+            doubt=_doubt_rate(forces.pitch, unsure_pitch), floor=1e-12),
+        integral_law(HEAVE, f"heave_rate {STATES}", dz, forces.heave, hits, doubt=unsure_heave, floor=1e-11),
+        integral_law(PITCH, f"pitch_rate {STATES} {loads}", dtheta, forces.pitch, hits, doubt=unsure_pitch,
+            floor=1e-11),
+        evaluate_law("body starts at rest", "heave pitch heave_rate pitch_rate",
+            np.array([ticks[name][0] for name in ("heave", "pitch", "heave_rate", "pitch_rate")]), 1e-12),
+    ]  # fmt: skip
+    inner = np.zeros(len(z) - 1, bool)
+    inner[EDGE:-EDGE] = True
+    for axle in "fr":
+        at, mass = axles[axle], car[f"unsprung_mass_{axle}"]
+        push = (at.strut + ticks[f"axle_load_{axle}"] - constants.static_load(axle)) / mass
+        laws.append(
+            integral_law(f"{AXLE}, {axle}", f"heave_rate unsprung_heave_{axle} axle_load_{axle} {STATES}", at.rate,
+                push, hits, rows=inner, floor=1e-9,
+                doubt=(at.strut_error + at.linked) / mass + 2 * at.rate_error / DT
+                + hops * spread(np.abs(push), AROUND) + SLIGHT * np.abs(push).max())
+        )  # fmt: skip
+    return laws
