@@ -13,13 +13,15 @@ from catalogs.surfaces import load_surface
 from catalogs.tyres import load_tyre
 from catalogs.vehicles import load_vehicle
 from flows.judging.physics_constants import make_constants, read_property_file
+from flows.making.clip import collect_motion_figures
 from flows.making.driving import collect_surface_figures, simulate_drive
 from tasks.eval.physics.constants import Constants
 from tasks.render.camera import body_poses
 from tasks.scene.route import Route, route_from_positions
+from tasks.scene.route_shape import sample_grade
 from tasks.vehicle.effects.table import EFFECT_UNITS, PARAMETERS
 from tasks.vehicle.parameters import Vehicle
-from tasks.vehicle.rollout import Mode, compute_lift_times
+from tasks.vehicle.rollout import Mode
 
 CARS = ("paper-reference", "bmw-m8", "multibody-staged", "multibody-grown")
 TYRE = "pacejka-205-60r15"
@@ -91,10 +93,10 @@ def make_clip(scenario: Scenario, vehicle: Vehicle, mode: Mode, *, duration_s: f
     duration_s : length [s]
     """
     pavement, steady = load_surface("dense-asphalt"), load_low_speed()
-    state, ride = simulate_drive(scenario, vehicle, pavement, mode, duration_s, steady)
+    route = make_route(scenario.initial_speed_km_h / 3.6 * duration_s + 30.0)
+    state, ride = simulate_drive(scenario, vehicle, pavement, mode, duration_s, steady, sample_grade(route))
     ticks = ride.columns
     tick = np.arange(0, len(ticks["speed"]), 100)
-    route = make_route(float(ticks["station"][-1]) + 10.0)
     poses = body_poses(
         route, ticks["station"][tick], ticks["heave"][tick], ticks["pitch"][tick],
         cg_behind_front_axle=vehicle.cg_to_front_axle, cg_height=vehicle.cg_height,
@@ -107,8 +109,7 @@ def make_clip(scenario: Scenario, vehicle: Vehicle, mode: Mode, *, duration_s: f
     frames |= {name: np.full(len(tick), value) for name, value in figures.items()}
     facts = {key: np.nan if value is None else value for key, value in scenario.as_row().items()} | figures
     facts |= {"stop_time": ride.stop_time, "stopping_distance": ride.stopping_distance}
-    facts |= {"peak_pitch": float(ticks["pitch"].max()), "static_pitch": ride.static_pitch}
-    facts |= compute_lift_times(ticks)
+    facts |= {"static_pitch": ride.static_pitch, **collect_motion_figures(ticks)}
     name = f"{vehicle.name} {mode} {scenario.weather} {scenario.initial_speed_km_h:.0f} km/h"
     if scenario.hazard_height_m:
         name += f" {scenario.hazard_height_m:.2f} m over {scenario.hazard_length_m:.2f} m"

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from benchmarks.physics_judge.clips import StudyClip, make_clip
+from flows.making.clip import collect_motion_figures
 from tasks.render.camera import body_poses
-from tasks.vehicle.rollout import compute_lift_times
 
 Tables = tuple[dict[str, NDArray[Any]], dict[str, NDArray[Any]]]
 SURFACE = ("film_depth_mm", "snow_depth_mm", "snow_coverage", "surface_friction", "tyre_peak")
@@ -55,7 +55,7 @@ def state_outcome(clip: StudyClip, ticks: dict[str, NDArray[Any]]) -> dict[str, 
     station, seconds = ticks["station"], 0.001 * np.arange(len(ticks["speed"]))
     way = station[-1] - np.interp(clip.facts["brake_onset_s"], seconds, station)
     stop = {"stop_time": 0.001 * standing[0], "stopping_distance": way} if len(standing) else {}
-    return clip.facts | {"peak_pitch": float(ticks["pitch"].max()), **compute_lift_times(ticks), **stop}
+    return clip.facts | {**collect_motion_figures(ticks), **stop}
 
 
 def move_poses(clip: StudyClip, change: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> Tables:

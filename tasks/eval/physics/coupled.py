@@ -10,6 +10,7 @@ from scipy.ndimage import maximum_filter1d
 
 from tasks.eval.physics.constants import DT, Constants, Floats, pressure_at, read_grade
 from tasks.eval.physics.effects import (
+    bound_lateral_hold,
     compute_engine_torque,
     compute_friction,
     compute_links,
@@ -136,6 +137,8 @@ def compute_forces(ticks: Mapping[str, Floats], facts: Mapping[str, Any], consta
     )  # fmt: skip
     braking = passed * lever + ticks["brake_torque_f"] + ticks["brake_torque_r"]
     braking = braking + _drag_shaft(ticks, moves, constants)
+    # what holds the speed on a hill drives at the ground
+    braking = braking - np.where(held, m * climb * (lever + car["wheel_radius"]), 0.0)
     moment = braking * (1.0 + e("pitch_gain", 0.0)) + e("aero_pitch", 0.0) * v**2
     strut_f, strut_r = axles["f"].strut, axles["r"].strut
     hidden = sum(axles[axle].hidden for axle in "fr")
@@ -209,6 +212,7 @@ def _compute_axle(
     hidden = hidden + flips * inertia / radius
     name = "anti_dive" if axle == "f" else "anti_lift"
     passes = abs(e(name, 0.0)) + abs(e(f"stick_{name}", 0.0))
+    linked = hidden * (passes * car["cg_height"] / constants.wheelbase + tilt * np.abs(slope))
     return AxleForces(
         height=felt, slope=slope, rate=rate, rate_error=rate_error,
         load=np.where(squeeze > 0.0, damped, 0.0),
@@ -218,7 +222,7 @@ def _compute_axle(
         torque_error=_doubt_line(line, facts, constants) * gain,
         spin=spin, stiffness=stiffness, turns=turns & moves, flips=flips,
         pull=(np.abs(radius * force) + np.abs(ticks[f"brake_torque_{axle}"])) / inertia,
-        hidden=hidden, linked=hidden * (passes * car["cg_height"] / constants.wheelbase + tilt * np.abs(slope)),
+        hidden=hidden, linked=linked + bound_lateral_hold(load, travel, v, curve.peak, constants.effects),
         strut=strut - links if axle == "f" else strut + links,
         strut_error=(damper * (1.0 + abs(e("damper_asymmetry", 0.0))) + dry) * rate_error,
     )  # fmt: skip

@@ -18,6 +18,8 @@ LOWEST_GEAR = 12.0
 """Wheel speed below which the engine's drag falls with it [rad/s]."""
 COULOMB_SPEED = 0.01
 """Strut rate over which dry friction turns [m/s]."""
+RAISED = 0.5
+"""Share by which effects may raise a tyre's friction above its peak [1]."""
 STICK_SLIP = 0.002
 """Slip over which a sticking tyre builds up its force [1]."""
 
@@ -104,6 +106,27 @@ def share_sticking(speed: Floats, effects: Mapping[str, float]) -> Floats:
     above, below = effects.get("stick_above", 0.0), effects.get("stick_below", 0.0)
     u = np.clip((above - speed) / max(above - below, 1e-300), 0.0, 1.0)
     return np.where(speed >= above, 0.0, np.where(speed <= below, 1.0, u**2 * (3.0 - 2.0 * u)))
+
+
+def bound_lateral_hold(
+    load: Floats, travel: Floats, speed: Floats, peak: float, effects: Mapping[str, float]
+) -> Floats:
+    """Return the largest vertical force that links make of a sticking tyre's lateral force [N] [N].
+
+    How far the tyre is deflected no column holds; its force stays within the friction of the axle, which no other
+    effect raises by more than `RAISED`.
+
+    Parameters
+    ----------
+    load, travel : of the axle [N] [N, m]
+    speed : of the car [N] [m/s]
+    peak : of the tyre on the surface [1]
+    effects : of the car
+    """
+    if effects.get("lateral_stiffness", 0.0) <= 0.0:
+        return np.zeros(len(speed))
+    incline = effects.get("track_change", 0.0) + effects.get("track_change_by_travel", 0.0) * travel
+    return share_sticking(speed, effects) * (1.0 + RAISED) * peak * load * np.abs(incline)
 
 
 def compute_friction(
