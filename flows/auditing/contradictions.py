@@ -160,8 +160,8 @@ def _compare_files(layout: Layout, manifest: Manifest, plan: Plan) -> Iterator[s
     planned: dict[str, str | None] = dict.fromkeys(
         [*list_remade(plan), *(f"inputs/{name}" for name in plan.inputs)]
     )
-    for clip in plan.clips:
-        planned |= {layout.relative(layout.frame_shard(name, clip.index)): clip.clip_id for name in arrays}
+    for made in plan.clips:
+        planned |= {layout.relative(layout.frame_shard(name, made.index)): made.clip_id for name in arrays}
     recorded = {path: clip_id for path, (_, clip_id) in recorded_files(manifest).items()}
     for path in sorted(recorded.keys() ^ planned.keys()):
         is_recorded = path in recorded

@@ -55,8 +55,8 @@ def compare_frame_metadata(
                 check_frames(
                     read_local_metadata(layout.frames), members, layout.frames.name, *arguments["shape"][:2]
                 )
-            values = (parse_json(text, path, "metadata") for text in (wanted, content))
-            lies = list(_compare_values(*values, is_same_writer))
+            ours, theirs = (parse_json(text, path, "metadata") for text in (wanted, content))
+            lies = list(_compare_values(ours, theirs, is_same_writer))
         except InputError as error:
             lies = list(error.problems)
         yield path, [lie if lie.startswith(path) else f"{path}: {lie}" for lie in cap_problems(lies, _SHOWN)]
