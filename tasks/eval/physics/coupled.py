@@ -113,7 +113,7 @@ def compute_forces(ticks: Mapping[str, Floats], facts: Mapping[str, Any], consta
     car, m, e = constants.car, constants.mass, constants.effects.get
     curve, v = find_curve(facts, constants), ticks["speed"]
     moves = v > 0
-    held = find_held_rows(DT * np.arange(len(v)), facts, find_brake_onset(ticks, facts))
+    held = find_held_rows(DT * np.arange(len(v), dtype=np.float64), facts, find_brake_onset(ticks, facts))
     climb = car["gravity"] * read_grade(ticks)
     line = _act_on_pads(ticks, facts, constants)
     front, rear = (constants.brake_share(axle) * car["brake_gain"] for axle in "fr")
@@ -249,7 +249,7 @@ def _act_on_pads(ticks: Mapping[str, Floats], facts: Mapping[str, Any], constant
     dead = constants.effects.get("dead_time", 0.0)
     if dead == 0.0 and constants.effects.get("lag", 0.0) <= 0.0:
         return ticks["brake_pressure_mpa"]
-    time = INNER_STEP * np.arange(2 * len(ticks["speed"]) - 1)
+    time = INNER_STEP * np.arange(2 * len(ticks["speed"]) - 1, dtype=np.float64)
     commanded = pressure_at(time - find_brake_onset(ticks, facts) - dead, *pressure_shape(facts))
     return delay_pressure(commanded, INNER_STEP, constants.effects)[::2]
 

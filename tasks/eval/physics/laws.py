@@ -194,7 +194,7 @@ def motion_laws(
     coast = np.where(moves, car["coast_deceleration"], 0.0)
     climb, later_climb, open_climb = find_climb(ticks, constants)
     time = ticks["t_ns"]
-    held = find_held_rows(1e-3 * np.arange(len(s)), facts, find_brake_onset(ticks, facts))
+    held = find_held_rows(1e-3 * np.arange(len(s), dtype=np.float64), facts, find_brake_onset(ticks, facts))
     net = np.where(held, 0.0, np.where(moves, (road - force) / m - climb, 0.0) - coast)
 
     later = half.acceleration

@@ -98,7 +98,7 @@ def set_scalars(vehicle: Vehicle, values: Mapping[CalibrationScalar, float]) -> 
         for family, knot in scalar.places:
             table = list(getattr(families[family], scalar.group))
             table[knot] = value
-            families[family] = replace(families[family], **{scalar.group: tuple(table)})
+            families[family] = replace(families[family], **{scalar.group: tuple(table)})  # type: ignore[arg-type]
     if "cg_to_front_axle" in fields:
         fields["cg_to_rear_axle"] = vehicle.wheelbase - fields["cg_to_front_axle"]
     return replace(vehicle, families=families, effects=effects, **fields)  # type: ignore[arg-type]

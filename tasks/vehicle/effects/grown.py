@@ -52,7 +52,7 @@ def apply_effects(vehicle: Vehicle, values: Mapping[str, float]) -> Vehicle:
                     for weather in kinds:
                         family = group[weather]
                         scaled = tuple(v * (1.0 + value) for v in getattr(family, table))
-                        group[weather] = replace(family, **{table: scaled})
+                        group[weather] = replace(family, **{table: scaled})  # type: ignore[arg-type]
             else:
                 old = fields.get(field, getattr(vehicle, field))
                 fields[field] = old * (1.0 + value) if row.kind == "scaled" else old + value
