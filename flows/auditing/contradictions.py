@@ -206,7 +206,7 @@ def _compare_parts(layout: Layout, plan: Plan, damaged: Collection[str]) -> Iter
                     require_file(layout.root / path), len(ids) * plan.settings.rows_per_clip[table]
                 )
             except InputError as error:
-                yield from error.problems
+                yield from (f"{path}: {problem.partition(': ')[2]}" for problem in error.problems)
                 continue
             if found != ids:
                 strange = [name for name in found if name not in ids]
@@ -219,8 +219,8 @@ def _compare_parts(layout: Layout, plan: Plan, damaged: Collection[str]) -> Iter
 
 def _list_clips(path: Path, most: int) -> list[str]:
     """The ids in a table of at most so many rows, in the order of their first rows."""
+    refuse_footer(path, most)
     try:
-        refuse_footer(path, most)
         table = pq.ParquetFile(path).read(["clip_id"])
         names: list[str] = table["clip_id"].unique().to_pylist()
     except (pa.ArrowException, OSError, ValueError, KeyError) as error:

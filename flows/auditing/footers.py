@@ -35,10 +35,12 @@ def find_label_lies(file: pq.ParquetFile, wanted: pa.Schema, is_same_writer: boo
                 yield f"{key} of column {name} must be {format_value(a)}; it is {format_value(b)}"
         if is_same_writer and ours.type != theirs.type:
             yield f"column {name} must be of type {ours.type}; it is of {theirs.type}"
-    more = {*(file.metadata.metadata or {})} - _OWN_KEYS
-    if is_same_writer and more:
-        names = sorted(key.decode(errors="replace") for key in more)
-        yield f"must carry no further metadata; it carries {format_value(names)}"
+    ours, theirs = (
+        {key: text for key, text in (carried or {}).items() if key not in _OWN_KEYS}
+        for carried in (wanted.metadata, file.metadata.metadata)
+    )
+    if is_same_writer and ours != theirs:
+        yield f"must carry the metadata {format_value(str(ours))}; it carries {format_value(str(theirs))}"
 
 
 def _read_labels(field: pa.Field) -> dict[str, str]:

@@ -26,6 +26,7 @@ from flows.store.sealed import read_manifest, read_plan_record
 from flows.store.telemetry import list_columns, read_columns, read_table
 from tasks.conventions import (
     CHANNELS_BY_NAME,
+    CHECK_CHANNELS,
     CLIP_CHANNELS,
     FRAME_CHANNELS,
     IDENTITY_CHANNELS,
@@ -113,7 +114,7 @@ def clip_facts(root: Path) -> list[dict[str, Any]]:
     path = layout.telemetry / "clips.parquet"
     required = [channel.name for channel in IDENTITY_CHANNELS]
     table = read_table(path, required=required, most=len(manifest["clips"]))
-    unknown = {channel.name: np.nan for channel in CLIP_CHANNELS if channel.unit}
+    unknown = {channel.name: np.nan for channel in (*CLIP_CHANNELS, *CHECK_CHANNELS) if channel.unit}
     rows: list[dict[str, Any]] = [
         unknown | {name: value for name, value in row.items() if value is not None or name not in unknown}
         for row in table.to_pylist()

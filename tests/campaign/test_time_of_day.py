@@ -44,12 +44,12 @@ def test_a_gap_in_a_clock_of_seconds_is_no_time_of_day() -> None:
 
 def test_a_log_of_a_time_of_day_is_imported_by_its_unit_and_told_without_it(tmp_path: Path) -> None:
     log = log_signal(braking_columns())
-    log["t_ms"] = write_digits(37438.0 + log["t_ms"] / 1e3)
+    log["time"] = write_digits(37438.0 + log.pop("t_ms") / 1e3)
     source = write_csv(tmp_path / "log.csv", log)
-    text = problems_of(tmp_path, log, time={"source": "t_ms"})
+    text = problems_of(tmp_path, log, time={"source": "time"})
     assert "give unit: HHMMSS under time in the map" in text
     assert "cut the run there" not in text and "frozen" not in text
-    found = import_columns(tmp_path, source, time={"source": "t_ms", "unit": "HHMMSS"})
+    found = import_columns(tmp_path, source, time={"source": "time", "unit": "HHMMSS"})
     assert len(found["speed"]) > 390
     np.testing.assert_allclose(found["speed"], braking_columns()["speed"][: len(found["speed"])], atol=1e-6)
 

@@ -2,6 +2,7 @@
 
 import shutil
 from collections.abc import Callable, Collection
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +10,11 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from flows.making.identity import identify_run, list_deciding
+from flows.making.plan import Plan
 from flows.store.layout import Layout
 from flows.store.telemetry import content_hash, read_columns, write_parquet
+from manifests.canonical import sha256_of_file
 from tests.flows.reseal import reseal
 
 Columns = dict[str, np.ndarray]
@@ -41,6 +45,13 @@ def make_older(
 
     def forget(manifest: dict[str, Any]) -> None:
         manifest["made_with"]["code"] = {"version": "0.0.1", "source_sha256": "0" * 64}
+        plan = Plan.of(manifest, older.manifest)
+        ids = [clip.clip_id for clip in plan.clips]
+        deciding = list_deciding(plan.settings, plan.scene, plan.inputs, plan.backend)
+        manifest["run_id"] = identify_run(deciding, manifest["grid"], ids, manifest["made_with"])
+        plan = replace(plan, run_id=manifest["run_id"])
+        older.plan.write_bytes(b"".join(plan.file_pieces()))
+        manifest["artifacts"]["plan.json"] = sha256_of_file(older.plan)
         for clip in manifest["clips"]:
             for record, prefix in (("figures", ""), ("verdict", "check_")):
                 clip[record] = {k: v for k, v in clip[record].items() if f"{prefix}{k}" not in lacking}

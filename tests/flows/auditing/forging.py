@@ -144,7 +144,10 @@ def record_rows(layout: Layout) -> None:
 
     def change(manifest: dict[str, Any]) -> None:
         for clip in manifest["clips"][:2]:
-            ticks, frames = (read_columns(layout.root / path, clip["clip_id"]) for path in (TICKS, FRAMES))
+            ticks, frames = (
+                read_columns(layout.root / path, clip["clip_id"], most=100_000, exact=False)
+                for path in (TICKS, FRAMES)
+            )
             own = sorted(frames.keys() - clip["figures"].keys() - {"clip_id", "label", "weather"})
             clip["content"]["ticks"] = columns_hash(ticks, [channel.name for channel in TICK_CHANNELS])
             clip["content"]["frames"] = columns_hash(frames, own)

@@ -6,7 +6,7 @@ import pytest
 
 from catalogs.cameras import load_camera
 from catalogs.scenes import write_scene
-from flows.making.scenes import import_scene, render_pose
+from flows.making.scenes import render_pose, scene_import
 from tasks.errors import InputError
 from tasks.render.camera import world_to_camera
 from tests.toy_street import toy_street
@@ -48,7 +48,7 @@ def test_depth_of_the_road_is_that_of_the_plane_below_the_camera(pose):
 
 def test_a_sun_below_the_horizon_is_refused_before_the_files_are_read(tmp_path):
     with pytest.raises(InputError, match="sun"):
-        import_scene(
+        scene_import(
             str(tmp_path / "no.ply"),
             str(tmp_path / "no.csv"),
             str(tmp_path / "out"),
