@@ -239,7 +239,7 @@ def _compare_summaries(
             rows = len(next(iter(wanted.values())))
             found = read_columns(require_file(layout.root / path), most=rows, exact=False)
         except InputError as error:
-            yield from error.problems
+            yield from (f"{path}: {problem.partition(': ')[2]}" for problem in error.problems)
             continue
         # the table of an older dataset decides which columns it has
         wanted = {name: values for name, values in wanted.items() if name in found or name in ESSENTIAL}

@@ -93,7 +93,7 @@ FORGERIES: dict[str, tuple[Forge, str, str]] = {
     "more rows": (
         change_table(TICKS, lambda t: pa.concat_tables([t, t.slice(len(t) - 1)]).combine_chunks()),
         TICKS,
-        "rows of each of its 2 clips",
+        "must have at most 2,002 rows; it has 2,003",
     ),
     "one more column": (
         change_table(TICKS, lambda t: t.append_column("friction_true", t["speed"])),
@@ -127,7 +127,7 @@ MORE: dict[str, tuple[Forge, str, str]] = {
     "metadata of a file": (
         change_table(FRAMES, lambda t: t.replace_schema_metadata({"pandas": "{}"})),
         FRAMES,
-        "carries ['pandas']",
+        "it carries {b'pandas': b'{}'}",
     ),
     "statistics of frames": (forge_footer(FRAMES, "station", 1e9), FRAMES, "max of column station"),
     "statistics of clips": (forge_footer(CLIPS, "tyre_peak", 0.1), CLIPS, "max of column tyre_peak"),
