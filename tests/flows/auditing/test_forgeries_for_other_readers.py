@@ -275,7 +275,7 @@ MORE: dict[str, tuple[Forge, str, str]] = {
             PAIRS, lambda t: pa.concat_tables([t, t.slice(0, 1)]).unify_dictionaries().combine_chunks()
         ),
         PAIRS,
-        "in row 0 must be",
+        "must have at most 2 rows; it has 3",
     ),
 }
 
