@@ -1,4 +1,4 @@
-"""``python -m benchmarks.crashes [--kills 200] [--flips 500] [--disks 20] [--stop 60]``: count what survives."""
+"""``python -m benchmarks.crashes [--kills 200] [--flips 500] [--stop 60] [--readers 64]``: count what survives."""
 
 import argparse
 import json
@@ -10,11 +10,20 @@ from benchmarks.crashes.commands import kill_commands
 from benchmarks.crashes.disturbances import disturb_runs
 from benchmarks.crashes.full_disk import full_disk_study
 from benchmarks.crashes.kills import GRID, kill_study
+from benchmarks.crashes.readers import read_while_written
 from benchmarks.crashes.rot import flip_study
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    for name, count in (("kills", 200), ("flips", 500), ("disks", 20), ("stop", 60), ("seed", 9)):
+    for name, count in (
+        ("kills", 200),
+        ("flips", 500),
+        ("disks", 20),
+        ("stop", 60),
+        ("clips", 10_000),
+        ("readers", 64),
+        ("seed", 9),
+    ):
         parser.add_argument(f"--{name}", type=int, default=count)
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
@@ -25,6 +34,7 @@ if __name__ == "__main__":
         filled = full_disk_study(place / "grid.yaml", place, place / "whole", asked.disks)
         commands = kill_commands(place / "commands")
         disturbed = disturb_runs(place / "disturbed", asked.stop)
+        disturbed["many readers"] = read_while_written(place / "read", asked.clips, asked.readers)
     found = {
         "killed": killed,
         "flipped": flipped,

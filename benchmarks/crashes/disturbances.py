@@ -82,7 +82,7 @@ def disturb_runs(place: Path, stop_s: float) -> dict[str, dict[str, Any]]:
     disturb("second writer", lambda _, folder: _write_too(grid, folder))
     refused = "another run is writing this dataset" in found["second writer"]["said"]
     found["second writer"]["right"] &= refused
-    found["folder of another"] = _write_without_right(grid, place / "closed")
+    found["folder of another"] = write_without_right(grid, place / "closed")
     return found
 
 
@@ -123,7 +123,7 @@ def _write_too(grid: Path, folder: Path) -> str:
     return f"{code}: {said.strip()}"
 
 
-def _write_without_right(grid: Path, closed: Path) -> dict[str, Any]:
+def write_without_right(grid: Path, closed: Path) -> dict[str, Any]:
     """Make a dataset in a folder that nobody may write to, without the rights by which root may."""
     closed.mkdir(mode=0o555)
     code, said = finish_run(grid, closed / "data", "--no-frames", before=_obey_modes)
