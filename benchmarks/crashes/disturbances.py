@@ -8,7 +8,8 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -79,9 +80,11 @@ def disturb_runs(place: Path, stop_s: float) -> dict[str, dict[str, Any]]:
                 "FAKETIME_DONT_FAKE_MONOTONIC": "1", "NO_FAKE_STAT": "1",
             }  # fmt: skip
             disturb(name, lambda *_, clock=clock, to=seconds: _turn_clock(clock, to), settings=settings)
-    disturb("second writer", lambda _, folder: _write_too(grid, folder))
-    refused = "another run is writing this dataset" in found["second writer"]["said"]
-    found["second writer"]["right"] &= refused
+    disturb("second writer", lambda run, folder: _write_too(run, grid, folder))
+    said = found["second writer"]["said"]
+    found["second writer"]["right"] &= (
+        said.startswith("2: ") and "another run is writing this dataset" in said
+    )
     found["folder of another"] = write_without_right(grid, place / "closed")
     return found
 
@@ -94,14 +97,22 @@ def _wait_for_clip(run: Process, layout: Layout) -> int:
     return committed
 
 
-def _stop_processes(pids: list[int], seconds: float) -> str:
+@contextmanager
+def _stopped(pids: list[int]) -> Iterator[None]:
     if not pids:
         raise RuntimeError("the run had ended, and nothing was left to stop")
     for pid in pids:
         os.kill(pid, signal.SIGSTOP)
-    time.sleep(seconds)
-    for pid in pids:
-        os.kill(pid, signal.SIGCONT)
+    try:
+        yield
+    finally:
+        for pid in pids:
+            os.kill(pid, signal.SIGCONT)
+
+
+def _stop_processes(pids: list[int], seconds: float) -> str:
+    with _stopped(pids):
+        time.sleep(seconds)
     return ""
 
 
@@ -118,8 +129,9 @@ def _turn_clock(clock: Path, seconds: int) -> str:
     return ""
 
 
-def _write_too(grid: Path, folder: Path) -> str:
-    code, said = finish_run(grid, folder, "--no-frames")
+def _write_too(run: Process, grid: Path, folder: Path) -> str:
+    with _stopped([run.pid, *list_children(run)]):  # or it may have ended before the second asks
+        code, said = finish_run(grid, folder, "--no-frames")
     return f"{code}: {said.strip()}"
 
 
