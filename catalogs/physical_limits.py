@@ -56,7 +56,7 @@ def find_limit_problem(name: str, value: float, limit: Scalar) -> str | None:
     """
     if not value > limit.value:
         return None
-    return f"{name} must be at most {limit.value:g} {limit.unit} ({limit.source}); it is {value:g}"
+    return f"{name} must be at most {_write_limit(limit)} ({limit.source}); it is {value:g}"
 
 
 def find_least_problem(name: str, value: float, least: Scalar) -> str | None:
@@ -68,4 +68,8 @@ def find_least_problem(name: str, value: float, least: Scalar) -> str | None:
     """
     if not value < least.value:
         return None
-    return f"{name} must be at least {least.value:g} {least.unit} ({least.source}); it is {value:g}"
+    return f"{name} must be at least {_write_limit(least)} ({least.source}); it is {value:g}"
+
+
+def _write_limit(limit: Scalar) -> str:
+    return f"{limit.value:g}" if limit.unit == "1" else f"{limit.value:g} {limit.unit}"

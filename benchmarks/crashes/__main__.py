@@ -1,4 +1,4 @@
-"""``python -m benchmarks.crashes [--kills 200] [--flips 500] [--disks 20]``: count what survives."""
+"""``python -m benchmarks.crashes [--kills 200] [--flips 500] [--stop 60] [--readers 64]``: count what survives."""
 
 import argparse
 import json
@@ -7,13 +7,23 @@ import tempfile
 from pathlib import Path
 
 from benchmarks.crashes.commands import kill_commands
+from benchmarks.crashes.disturbances import disturb_runs
 from benchmarks.crashes.full_disk import full_disk_study
 from benchmarks.crashes.kills import GRID, kill_study
+from benchmarks.crashes.readers import read_while_written
 from benchmarks.crashes.rot import flip_study
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    for name, count in (("kills", 200), ("flips", 500), ("disks", 20), ("seed", 9)):
+    for name, count in (
+        ("kills", 200),
+        ("flips", 500),
+        ("disks", 20),
+        ("stop", 60),
+        ("clips", 10_000),
+        ("readers", 64),
+        ("seed", 9),
+    ):
         parser.add_argument(f"--{name}", type=int, default=count)
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
@@ -23,12 +33,22 @@ if __name__ == "__main__":
         flipped = flip_study(place / "whole", asked.flips)
         filled = full_disk_study(place / "grid.yaml", place, place / "whole", asked.disks)
         commands = kill_commands(place / "commands")
-    print(json.dumps({"killed": killed, "flipped": flipped, "filled": filled, "commands": commands}))
+        disturbed = disturb_runs(place / "disturbed", asked.stop)
+        disturbed["many readers"] = read_while_written(place / "read", asked.clips, asked.readers)
+    found = {
+        "killed": killed,
+        "flipped": flipped,
+        "filled": filled,
+        "commands": commands,
+        "disturbed": disturbed,
+    }
+    print(json.dumps(found))
     good = (
         killed["equal"] == killed["runs_finished"] > 0
         and killed["half_clips"] == 0
         and flipped["named"] == flipped["flips"]
         and filled["told"] == filled["equal"] == filled["disks"]
         and all(row["equal"] == row["kills"] > 0 for row in commands.values())
+        and all(row["right"] for row in disturbed.values())
     )
     sys.exit(0 if good else 1)

@@ -1,6 +1,5 @@
 """A file system that is full at a random write: one sentence, and the same command goes on when there is room."""
 
-import os
 import random
 import subprocess
 import sys
@@ -10,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.crashes.kills import files_of
+from benchmarks.crashes.processes import finish_run
 
 ROOM = 2**30
 """Of the file system once it has been freed [B]."""
@@ -39,34 +39,17 @@ def full_disk_study(grid: Path, place: Path, whole: Path, disks: int, seed: int 
         # half of them below 300 kB, where plan, inputs and metadata are written
         bound = 300_000 if turn % 2 else size
         with _small_disk(place / f"disk-{turn}", draw.randrange(4096, bound)) as disk:
-            code, said = _run_generate(grid, disk / "data")
+            code, said = finish_run(grid, disk / "data")
             told = code == 2 and "the disk is full" in said and "Traceback" not in said
             found["told"] += told
             found["plans"] += (disk / "data" / "plan.json").is_file()
             _remount_disk(disk, ROOM)
-            again, said_again = _run_generate(grid, disk / "data")
+            again, said_again = finish_run(grid, disk / "data")
             equal = again == 0 and files_of(disk / "data") == wanted
             found["equal"] += equal
             print(f"disk {turn + 1} of {disks}: {'told' if told else said}, {'equal' if equal else said_again}",
                 file=sys.stderr)  # fmt: skip
     return found
-
-
-def _run_generate(grid: Path, folder: Path) -> tuple[int, str]:
-    command = [
-        sys.executable,
-        "-m",
-        "flows.cli",
-        "generate",
-        str(grid),
-        "--out",
-        str(folder),
-        "--runner",
-        "threads",
-    ]
-    clean = {key: value for key, value in os.environ.items() if key != "PREFECT_API_URL"}
-    done = subprocess.run(command, capture_output=True, text=True, env=clean)
-    return done.returncode, done.stderr
 
 
 @contextmanager

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
@@ -14,7 +15,13 @@ PATIENCE_S = 60.0
 """How long a cluster may take to start [s]."""
 
 
-def start_run(grid: Path, folder: Path, scheduler: str | None = None) -> Process:
+def start_run(
+    grid: Path,
+    folder: Path,
+    scheduler: str | None = None,
+    *options: str,
+    settings: Mapping[str, str] | None = None,
+) -> Process:
     """Start a generating run with two workers, or on a cluster.
 
     Parameters
@@ -22,10 +29,28 @@ def start_run(grid: Path, folder: Path, scheduler: str | None = None) -> Process
     grid : grid file
     folder : of the dataset
     scheduler : address of a cluster; None starts worker processes of the run's own
+    options : further ones of the command
+    settings : further variables of its environment
     """
     place = ["--scheduler", scheduler] if scheduler else ["--runner", "processes", "--workers", "2"]
-    command = [sys.executable, "-m", "flows.cli", "generate", str(grid), "--out", str(folder), *place]
-    return _start_process(command)
+    return _start_process([*_generate(grid, folder), *place, *options], settings)
+
+
+def finish_run(
+    grid: Path, folder: Path, *options: str, before: Callable[[], object] | None = None
+) -> tuple[int, str]:
+    """Make a dataset in threads; return the exit code of the command and what it said on its error stream.
+
+    Parameters
+    ----------
+    grid : grid file
+    folder : of the dataset
+    options : further ones of the command
+    before : what its process does first
+    """
+    command = [*_generate(grid, folder), "--runner", "threads", *options]
+    done = subprocess.run(command, capture_output=True, text=True, env=_clean(), preexec_fn=before)
+    return done.returncode, done.stderr
 
 
 def list_children(process: Process) -> list[int]:
@@ -83,10 +108,21 @@ class Cluster:
             kill_group(process)
 
 
-def _start_process(command: list[str]) -> Process:
-    clean = {key: value for key, value in os.environ.items() if key != "PREFECT_API_URL"}
+def _generate(grid: Path, folder: Path) -> list[str]:
+    return [sys.executable, "-m", "flows.cli", "generate", str(grid), "--out", str(folder)]
+
+
+def _clean() -> dict[str, str]:
+    return {key: value for key, value in os.environ.items() if key != "PREFECT_API_URL"}
+
+
+def _start_process(command: list[str], settings: Mapping[str, str] | None = None) -> Process:
     return subprocess.Popen(
-        command, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=clean
+        command,
+        start_new_session=True,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env=_clean() | dict(settings or {}),
     )
 
 

@@ -185,8 +185,8 @@ def describe_twice(path: Path, name: str, choices: Mapping[str, str]) -> str:
     """
     places = ", ".join(f"{choice} ({where})" if where else choice for choice, where in choices.items())
     return (
-        f"{path.name}: signal {shorten(name, 60)} stands {len(choices)} times: name one of them as its source, which"
-        f" are {shorten(places)}"
+        f"{path.name}: signal {shorten(name, 60)} stands {len(choices)} times: in the map name one of them as its"
+        f" source: {shorten(places)}"
     )
 
 

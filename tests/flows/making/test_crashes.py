@@ -3,6 +3,7 @@
 import time
 
 from benchmarks.crashes.commands import kill_commands
+from benchmarks.crashes.disturbances import write_without_right
 from benchmarks.crashes.kills import files_of, half_clips
 from benchmarks.crashes.processes import start_run
 from flows.making.generate import generate_dataset
@@ -28,3 +29,8 @@ def test_a_command_that_is_killed_before_any_change_of_the_disk_ends_the_second_
     found = kill_commands(tmp_path, ("sign", "export --to croissant"))
     assert [row["first"] for row in found.values()] == [None, None]
     assert all(row["equal"] == row["kills"] > 9 for row in found.values())
+
+
+def test_a_folder_that_may_not_be_written_is_told_in_one_sentence(toy_dataset, tmp_path):
+    found = write_without_right(toy_dataset.root.parent / "grid.yaml", tmp_path / "closed")
+    assert found["right"], found["said"]
