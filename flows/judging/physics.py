@@ -288,6 +288,11 @@ def _describe_break(law: Law, frame_ticks: np.ndarray) -> dict[str, Any]:
     )
     channel = CHANNELS_BY_NAME.get(name)
     return {
-        "law": law.name, "excess": min(law.excess, 1e300), "row": law.at, "tick": tick,
-        "size": min(law.size, 1e300), "unit": channel.unit if channel else "", "columns": sorted(law.columns),
+        "law": law.name, "excess": _bound_number(law.excess), "row": law.at, "tick": tick,
+        "size": _bound_number(law.size), "unit": channel.unit if channel else "", "columns": sorted(law.columns),
     }  # fmt: skip
+
+
+def _bound_number(value: float) -> float:
+    """A number that JSON can hold: what is not finite breaks a law by any amount."""
+    return min(value, 1e300) if value == value else 1e300

@@ -54,7 +54,7 @@ def refuse_footer(path: Path, most: int, remedy: str = SEALED) -> None:
     Raises
     ------
     InputError
-        If it cannot be read, or has more rows, more columns or longer names.
+        If it cannot be read, has more rows, more columns or longer names, or a column twice.
     """
     footer = call_reader(path, pq.read_metadata, path, remedy=remedy)
     counts = {
@@ -69,6 +69,10 @@ def refuse_footer(path: Path, most: int, remedy: str = SEALED) -> None:
     ]
     if problems:
         raise InputError(problems)
+    names = call_reader(path, footer.schema.to_arrow_schema, remedy=remedy).names
+    if len({*names}) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise InputError(f"{path}: each column must stand once; {shorten(twice)} stands twice: {remedy}")
 
 
 def refuse_rows(path: Path, clip_id: str, rows: int) -> None:

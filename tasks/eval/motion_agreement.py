@@ -174,7 +174,7 @@ def judge_pose(
         reasons.append(
             f"pitch correlation is {correlation:.4g}, at least {thresholds.pitch_correlation:g} is needed"
         )
-    blindness = _find_blindness(recovered, thresholds) if reasons else []
+    blindness = _find_blindness(recovered, thresholds, pitch_rmse, progress_rmse) if reasons else []
     return PoseVerdict(
         method=recovered.method,
         passed=None if blindness else not reasons,
@@ -191,20 +191,25 @@ def judge_pose(
     )
 
 
-def _find_blindness(recovered: RecoveredMotion, thresholds: PoseThresholds) -> list[str]:
-    """Return a sentence for each figure that the check sees less well than its limit needs."""
+def _find_blindness(
+    recovered: RecoveredMotion, thresholds: PoseThresholds, pitch_rmse: float, progress_rmse: float
+) -> list[str]:
+    """Return a sentence for each figure that the check sees less well than its limit needs.
+
+    There is none where an error exceeds its limit by more than such a sight explains: then the motion is another.
+    """
     found = [TOO_LITTLE] if recovered.blind else []
     seen = ~recovered.failed
-    figures = [
-        ("pitch", float(np.rad2deg(recovered.pitch_std[seen].max())), thresholds.pitch_rmse_deg, "deg")
-    ]
+    pitch_std = float(np.rad2deg(recovered.pitch_std[seen].max()))
+    figures = [("pitch", pitch_rmse, pitch_std, thresholds.pitch_rmse_deg, "deg")]
     if thresholds.progress_rmse_m is not None:
-        figures.append(
-            ("progress", float(recovered.progress_std[seen].max()), thresholds.progress_rmse_m, "m")
-        )
+        progress_std = float(recovered.progress_std[seen].max())
+        figures.append(("progress", progress_rmse, progress_std, thresholds.progress_rmse_m, "m"))
+    if any(error > limit + std / SEES for _, error, std, limit, _ in figures):
+        return found
     return found + [
         f"not judged: {name} is known to {std:.2g} {unit}, and its limit of {limit:.2g} {unit} needs {SEES * limit:.2g}"
-        for name, std, limit, unit in figures
+        for name, _, std, limit, unit in figures
         if std > SEES * limit
     ]
 

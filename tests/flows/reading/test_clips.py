@@ -117,9 +117,10 @@ def test_the_plot_shows_the_telemetry_in_the_units_of_its_titles(data):
 def test_a_card_has_the_counts_the_weathers_the_range_of_stops_and_a_picture_of_each_weather(data):
     stopped = with_clip(data, 0, figures=data["dry/flat"].figures | {"stopping_distance": 8.25})
     stopped = with_clip(stopped, 2, figures=data["snow-3/flat"].figures | {"stopping_distance": 31.75})
+    stopped = with_clip(stopped, 1, verdict=data["dry/hump"].record["verdict"] | {"passed": False})
     card = stopped._repr_html_()
     for text in ("4, of 11 frames at 10 Hz", ">44<", "dry (2), snow (2)", "8.2 to 31.8 m (2 of 4 clips stop)",
-                 "4 clips, whose pose check failed", data.manifest["run_id"]):  # fmt: skip
+                 "1 clips, whose pose check failed", data.manifest["run_id"]):  # fmt: skip
         assert text in card
     assert "no clip stops" in data._repr_html_()
     sources = re.findall(r'src="data:image/jpeg;base64,([^"]+)"', card)

@@ -236,11 +236,8 @@ def test_workers_give_the_same_batches_in_the_seeds_order(data):
 
 
 def test_clips_in_quarantine_are_left_out_and_named_unless_asked_for(data):
-    # one second of a toy street is too little for any clip to pass: let one
-    clips = copy.deepcopy(data.manifest["clips"])
-    clips[1]["verdict"]["passed"] = True
-    data, manifest = replace(data), data.manifest | {"clips": clips}
-    vars(data)["manifest"] = manifest
+    data = with_verdicts(data, [False, True, False, False])
+    clips = data.manifest["clips"]
     failed = tuple(clip["label"] for clip in clips if not clip["verdict"]["passed"])
     assert len(failed) == 3
     with pytest.warns(UserWarning, match="3 of 4 clips are in quarantine") as told:
@@ -258,7 +255,18 @@ def test_clips_in_quarantine_are_left_out_and_named_unless_asked_for(data):
     assert [problem.partition(" must")[0] for problem in caught.value.problems] == ["stride", "clips:"]
 
 
+def with_verdicts(data, verdicts):
+    """The dataset as if the pose check of each clip had said so; one second of a toy street is too little for it."""
+    clips = copy.deepcopy(data.manifest["clips"])
+    for clip, passed in zip(clips, verdicts, strict=True):
+        clip["verdict"]["passed"] = passed
+    data, manifest = replace(data), data.manifest | {"clips": clips}
+    vars(data)["manifest"] = manifest
+    return data
+
+
 def test_a_dataset_all_in_quarantine_is_no_training_set(data):
+    data = with_verdicts(data, [False] * 4)
     with pytest.raises(InputError, match="every clip is in quarantine"):
         data.torch(window=5, columns=["speed"])
 
