@@ -46,41 +46,22 @@ class JointRulesEntry(CatalogueEntry):
 class DecisionRulesEntry(CatalogueEntry):
     """Content of the file; the meanings are given by ``DecisionRules``."""
 
-    accept_score: Level
-    held_out_gain: Level
-    rival_span: Level
-    rival_gain_share: Share
-    discrepancy_limit: Level
-    foreign_inflation: Level
-    disputed_inflation: Level
-    win_share: Share
-    bootstrap_resamples: Count
-    refined_candidates: Count
-    refined_look_alikes: Count
-    look_alike_cosine: Share
-    hopeful_share: Share
-    trusted_screen_share: Share
-    relinearisation_gain: Level
-    reached_share: Share
+    named_odds: Level
+    slab_width: Level
+    spike_width: Share
+    signature_error: Share
+    form_width: Level
+    form_odds: Level
     most_effects: Count
-    explored_candidates: Count
-    relinearised_candidates: Count
-    relinearisation_change: Share
-    retune_pull: Level
-    negligible_share: Level
+    beam_width: Count
+    most_turns: Count
+    most_compared: Count
+    discrepancy_limit: Level
     relinearisation_pull: Level
-    disagreement: Level
-    lone_form_share: Share
     least_expected_d2: Level
     retune_widening: Level
     error_resamples: Count
-    worse_limit: Level
-    retuned_limit: Level
-    noticed_share: Share
     longest_lag: Annotated[Scalar, require_quantity("s", above=0)]
-    interval_widening: Annotated[Scalar, require_quantity("1", minimum=1)]
-    profile_points: Count
-    profile_tolerance: Share
     step_misfit: Level
     fewest_runs: Count
     joint: JointRulesEntry

@@ -22,7 +22,8 @@ class EffectEntry(CatalogueEntry):
     enters: Text
     says: Text
     parameters: Annotated[tuple[Text, ...], Field(min_length=1, max_length=2)]
-    alone: bool = True
+    matters: Annotated[float, Field(gt=0)]
+    because: Text
 
     @field_validator("parameters")
     @classmethod
@@ -73,5 +74,5 @@ def _make_effect(entry: EffectEntry) -> Effect:
     return Effect(
         name=entry.name, effect_class=entry.effect_class, variable=entry.variable, enters=entry.enters,
         says=entry.says, parameters=tuple(PARAMETERS[name] for name in entry.parameters),
-        alone=entry.alone,
+        matters=entry.matters,
     )  # fmt: skip

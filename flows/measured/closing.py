@@ -25,7 +25,7 @@ from tasks.campaign.braking_heat import estimate_disc_temperatures
 from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
 from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter, Verdict
 from tasks.identification.decision.excitation import find_reached_range
-from tasks.identification.decision.verdict import SearchOutcome
+from tasks.identification.decision.verdict import Outcome
 from tasks.identification.decision.words import join_phrases, say_effect, tell_verdict
 from tasks.identification.joint.verdict import JointOutcome
 from tasks.vehicle.effects.library import Effect
@@ -120,16 +120,16 @@ def find_unused_tolerances(vehicle: str) -> list[str]:
     return [name for name in load_tolerances(vehicle) if name not in moved]
 
 
-def _reached_ranges(outcome: SearchOutcome | JointOutcome) -> dict[str, tuple[float, float]]:
+def _reached_ranges(outcome: Outcome | JointOutcome) -> dict[str, tuple[float, float]]:
     """Return what the training runs reached of the variable of each form that is named."""
     if isinstance(outcome, JointOutcome):
         return {}  # a joint fit names no forms
-    verdict, runs = outcome.verdict, [run.model for run in outcome.end.evidence.train]
+    verdict, runs = outcome.verdict, [run.model for run in outcome.finding.evidence.train]
     forms = {effect.variable for effect in verdict.effects if effect.effect_class == "form"}
     return {variable: find_reached_range(runs, verdict.theta, verdict.slots, variable) for variable in forms}
 
 
-def tell_search(outcome: SearchOutcome | JointOutcome) -> dict[str, Any]:
+def tell_search(outcome: Outcome | JointOutcome) -> dict[str, Any]:
     """Return what a search says beside its verdict, as plain values: in words, and what is left over.
 
     Parameters
@@ -150,13 +150,13 @@ def tell_search(outcome: SearchOutcome | JointOutcome) -> dict[str, Any]:
         "sentence": sentence,
         "calibrated": [effect_json(effect, library) for effect in outcome.calibrated],
     }
-    if isinstance(outcome, SearchOutcome):
+    if isinstance(outcome, Outcome):
         residual = compute_residual_rmse((*train, *held_out))
         pulls = compute_friction_pulls(outcome)
         return {
             "search": SEARCHES[0],
             **told,
-            "numbers": _number_json(SESSION, outcome.end.base.session, outcome.end.base.session_error),
+            "numbers": _number_json(SESSION, outcome.fitted.session, outcome.fitted.session_error),
             "residual_rmse": residual,
             "friction_pulls_sigma": pulls,
         }
@@ -180,14 +180,14 @@ def _number_json(
     }
 
 
-def _say_own_numbers(outcome: SearchOutcome | JointOutcome, library: Sequence[Effect]) -> str:
+def _say_own_numbers(outcome: Outcome | JointOutcome, library: Sequence[Effect]) -> str:
     """Return what the numbers that the file hardly knew say of the car, else, beside no name, the one pulled most."""
     told = {rival.name for _, rival in outcome.verdict.rivals}
     if own := [effect for effect in outcome.calibrated if effect.name not in told]:
         return join_phrases(say_effect(effect, library) for effect in own)
     if isinstance(outcome, JointOutcome) or outcome.verdict.effects:
         return ""
-    base = outcome.end.base
+    base = outcome.fitted
     place = int(np.argmax(base.pulls))
     number = next(e for e in library if e.effect_class == "retune" and e.parameters[0].name == SESSION[place])
     return f"most: {number.say({SESSION[place]: float(base.session[place])})}"
@@ -212,6 +212,7 @@ def verdict_json(verdict: Verdict) -> dict[str, Any]:
         "verdict": verdict.verdict,
         "effects": [effect_json(effect, library) for effect in verdict.effects],
         "rivals": [{"of": of, **effect_json(effect, library)} for of, effect in verdict.rivals],
+        "odds": [{"names": list(o.names), "odds": o.odds} for o in verdict.odds],
         "discriminating_experiment": None
         if experiment is None
         else {
@@ -273,10 +274,7 @@ def effect_json(effect: NamedEffect, library: Sequence[Effect]) -> dict[str, Any
         "parameters": {p.name: _parameter(p) for p in effect.parameters},
         "score": effect.score,
         "gain": effect.gain,
-        "inflation": effect.inflation,
-        "held_out_gain": effect.held_out_gain,
-        "cross_validated_gain": effect.cross_validated_gain,
-        "win_share": effect.win_share,
+        "spread": effect.spread,
     }
 
 

@@ -129,7 +129,7 @@ def close_loop_benchmark(
             "named": [effect.name for effect in verdict.effects],
             "rivals": [rival.name for _, rival in verdict.rivals],
             "ports": [[effect.port, effect.variable] for effect in verdict.effects],
-            "tried": [[effect.name, effect.score, effect.held_out_gain] for effect in verdict.tried[:3]],
+            "tried": [[effect.name, effect.score, effect.gain] for effect in verdict.tried[:3]],
             "half_widths_off": miss,
             "covered": None if miss is None else miss <= 1.0,
             "reasons": list(verdict.reasons),

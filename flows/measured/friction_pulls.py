@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from tasks.identification.decision.verdict import SearchOutcome
+from tasks.identification.decision.verdict import Outcome
 from tasks.identification.decision.words import join_phrases
 from tasks.identification.inference.disturbance import FRICTION
 
@@ -11,7 +11,7 @@ TOLD_PULL = 2.5
 """Pull of a run's friction from which it is told, in tolerances: one such run in 80 has it by chance [1]."""
 
 
-def compute_friction_pulls(outcome: SearchOutcome) -> dict[str, float]:
+def compute_friction_pulls(outcome: Outcome) -> dict[str, float]:
     """Return by training run how far its friction is pulled from the surface mapping, in its tolerances [1].
 
     It is 0 for a run that does not reach its limit of friction.
@@ -20,10 +20,11 @@ def compute_friction_pulls(outcome: SearchOutcome) -> dict[str, float]:
     ----------
     outcome : the verdict and what it stands on
     """
-    runs, tolerance = outcome.end.evidence.train, outcome.end.evidence.tolerances.friction
+    evidence = outcome.finding.evidence
+    runs, tolerance = evidence.train, evidence.tolerances.friction
     return {
         run.model.run.name: float(offsets[FRICTION] / tolerance)
-        for run, offsets in zip(runs, outcome.end.base.offsets, strict=True)
+        for run, offsets in zip(runs, outcome.fitted.offsets, strict=True)
     }
 
 

@@ -1,4 +1,4 @@
-"""Predictions of a verdict's models for each measured run, whichever search reached it, and the residuals."""
+"""Predictions of a verdict's models for each measured run, and the residuals."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.campaign import CHANNELS
-from tasks.identification.decision.verdict import SearchOutcome
+from tasks.identification.decision.verdict import Outcome
 from tasks.identification.inference.forward import RunModel, predict_channels
 from tasks.identification.joint.fit import lead_offsets
 from tasks.identification.joint.stops import predict_stop
@@ -35,7 +35,7 @@ class RunPrediction:
 
 
 def predict_runs(
-    outcome: SearchOutcome | JointOutcome,
+    outcome: Outcome | JointOutcome,
 ) -> tuple[tuple[RunPrediction, ...], tuple[RunPrediction, ...]]:
     """Return the training runs and the held-out runs with the predictions of the frozen and the grown model.
 
@@ -45,20 +45,18 @@ def predict_runs(
     """
     if isinstance(outcome, JointOutcome):
         return _predict_stops(outcome)
-    evidence = outcome.start.evidence
+    evidence = outcome.finding.evidence
+    channels = tuple(np.flatnonzero(np.isfinite(evidence.sensors[1])).tolist())
     train, held_out = (
         tuple(
             RunPrediction(
-                model=run.model,
-                channels=tuple(np.flatnonzero(np.isfinite(run.sigma)).tolist()),
-                predicted={
-                    "frozen": predict_channels(run.model, np.zeros(len(EFFECT_TABLE))),
-                    "after": after,
-                },
+                model=run,
+                channels=channels,
+                predicted={"frozen": predict_channels(run, np.zeros(len(EFFECT_TABLE))), "after": after},
             )
             for run, after in zip(runs, outcome.predict_readings(runs), strict=True)
         )
-        for runs in (evidence.train, evidence.held_out)
+        for runs in ([run.model for run in evidence.train], evidence.held_out)
     )
     return train, held_out
 

@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 
 from flows.measured.residuals import MODELS, RunPrediction
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
-from tasks.identification.decision.forms import ResidualSpline, fit_residual_splines
-from tasks.identification.decision.verdict import SearchOutcome
+from tasks.identification.decision.candidates import Candidate
+from tasks.identification.decision.forms import KNOTS, find_scanned_ranges
+from tasks.identification.decision.odds import Explanation, weigh_explanation
+from tasks.identification.decision.verdict import Outcome
 from tasks.identification.inference.quantiles import NORMAL_QUANTILE
 from tasks.identification.joint.fit import JointFit
 from tasks.identification.joint.numbers import SMOOTHED
@@ -89,48 +91,49 @@ def _compute_decelerations(run: RunPrediction) -> NDArray[np.float64]:
     return np.vstack((pressure, slower))[:, np.all(speeds[:, lag:] > STANDING, axis=0)]
 
 
-def make_spline_figures(outcome: SearchOutcome) -> dict[str, Any]:
+def make_spline_figures(outcome: Outcome) -> dict[str, Any]:
     """Return where the residual of the training runs lies: gains of splines, and the spline at the named port.
 
     Parameters
     ----------
     outcome : the verdict and what it stands on
     """
-    frozen = fit_residual_splines(outcome.start.evidence, outcome.start.base)
-    left = (
-        frozen
-        if outcome.end is outcome.start
-        else fit_residual_splines(outcome.end.evidence, outcome.end.base)
-    )
-    after = {(s.port, s.variable): s for s in left}
+    grams, told = outcome.finding.grams, outcome.opened[0].told
+    grids = find_scanned_ranges(outcome.finding.evidence.train)
+    rows = []
+    for form in (c for c in grams.columns.candidates if c.effect is None):
+        rest = [m for m in told if m.effect is not None]
+        alone, named, both = (
+            weigh_explanation(grams, m, spread=False) for m in ([form], rest, [*rest, form])
+        )
+        if alone is not None and named is not None and both is not None:
+            rows.append((form, alone, both, both.gain - named.gain))
+    rows.sort(key=lambda row: -row[1].gain)
     ports = [effect.port for effect in outcome.verdict.effects]
-    shown = next((spline for spline in frozen if spline.port in ports), frozen[0])
+    form, alone, both, _ = next((row for row in rows if row[0].port in ports), rows[0])
     return {
         "gains": [
             {
-                "name": f"{s.port} over {s.variable}".replace("_", " "),
-                "frozen": _shorten(max(s.gain, LEAST_GAIN)),
-                "after": _shorten(max(after[s.port, s.variable].gain, LEAST_GAIN)),
+                "name": f"{f.port} over {f.variable}".replace("_", " "),
+                "frozen": _shorten(max(before.gain, LEAST_GAIN)),
+                "after": _shorten(max(left, LEAST_GAIN)),
             }
-            for s in frozen
+            for f, before, _, left in rows
         ],
         "spline": {
-            "x_name": f"{shown.variable} [{format_unit(VARIABLE_UNITS[shown.variable])}]".replace("_", " "),
-            "y_name": f"{shown.port} [{PORT_UNITS[shown.port]}]".replace("_", " "),
-            "x": _plain(shown.grid),
-            "frozen": _make_band(shown),
-            "after": _make_band(after[shown.port, shown.variable]),
+            "x_name": f"{form.variable} [{format_unit(VARIABLE_UNITS[form.variable])}]".replace("_", " "),
+            "y_name": f"{form.port} [{PORT_UNITS[form.port]}]".replace("_", " "),
+            "x": _plain(np.linspace(*grids[form.variable], KNOTS)),
+            "frozen": _make_band(alone, form),
+            "after": _make_band(both, form),
         },
     }
 
 
-def _make_band(spline: ResidualSpline) -> dict[str, list[float | None]]:
-    reach = NORMAL_QUANTILE * np.sqrt(np.maximum(np.diag(spline.covariance), 0.0))
-    return {
-        "values": _plain(spline.values),
-        "low": _plain(spline.values - reach),
-        "high": _plain(spline.values + reach),
-    }
+def _make_band(explanation: Explanation, form: Candidate) -> dict[str, list[float | None]]:
+    places = explanation.find_places(form)
+    values, reach = explanation.values[places], NORMAL_QUANTILE * explanation.errors[places]
+    return {"values": _plain(values), "low": _plain(values - reach), "high": _plain(values + reach)}
 
 
 def find_alike_numbers(fitted: JointFit) -> list[dict[str, Any]]:

@@ -19,9 +19,10 @@ from flows.measured.verdict_figures import (
 )
 from flows.pages import DATASET_PAGE, make_policy, read_plotly
 from tasks.campaign.campaign import Campaign
-from tasks.identification.decision.verdict import SearchOutcome
+from tasks.identification.decision.verdict import Outcome
 from tasks.identification.joint.verdict import JointOutcome
 from tasks.identification.joint.words import find_separating_run
+from tasks.vehicle.effects.library import Effect
 
 PAGE = Path(__file__).parent / "verdict_page"
 IMPORT = "musync import-measurements RECORDINGS --map MAP.yaml --out CAMPAIGN"
@@ -37,9 +38,7 @@ MISSED = "what is missing cannot be named"
 """Meaning of NOTHING where the runs disagree with the model by more than their noise."""
 
 
-def write_verdict_page(
-    outcome: SearchOutcome | JointOutcome, result: Mapping[str, Any], campaign: Campaign
-) -> str:
+def write_verdict_page(outcome: Outcome | JointOutcome, result: Mapping[str, Any], campaign: Campaign) -> str:
     """Return the page.
 
     Scripts run by their hashes alone: one that got in with a name of the campaign would not, and nothing is fetched.
@@ -61,13 +60,13 @@ def write_verdict_page(
     if isinstance(outcome, JointOutcome):
         told = {"separate": _find_separations(outcome), "alike": find_alike_numbers(outcome.fitted)}
     else:
-        template = "one_effect.html"
+        template = "explanations.html"
         figures |= make_spline_figures(outcome) | {"correlation": result["residual_input_correlation"]}
         told |= {
-            "candidates": _list_candidates(outcome),
+            "tried": outcome.verdict.tried,
             "detectable": [
                 (e.name, e.parameters[0], result["minimum_detectable"].get(e.name))
-                for e in outcome.start.evidence.effects
+                for e in _list_effects(outcome)
             ],
             "error_rates": tell_error_rates([effect["name"] for effect in result["effects"]]),
         }
@@ -139,17 +138,10 @@ def _find_separations(outcome: JointOutcome) -> list[str | None]:
     ]
 
 
-def _list_candidates(outcome: SearchOutcome) -> list[dict[str, Any]]:
-    """Return every candidate that was refined, with what became of it."""
-    rows = []
-    for place, compared in enumerate(outcome.compared, start=1):
-        near = {id(c) for c, _ in compared.near}
-        for candidate, share in ((compared.own, compared.share), *compared.others):
-            what = "named" if candidate is compared.own else "rival" if id(candidate) in near else ""
-            name = f"{place}. {candidate.hypothesis.name}"
-            rows.append({"name": name, "what": what, "share": share, "of": candidate})
-    rows += [{"name": e.name, "what": "not named", "share": None, "of": e} for e in outcome.verdict.tried]
-    return rows
+def _list_effects(outcome: Outcome) -> list[Effect]:
+    """Return every effect that was weighed, once."""
+    candidates = outcome.finding.grams.columns.candidates
+    return list({c.name: c.effect for c in candidates if c.effect is not None}.values())
 
 
 def _format_digits(value: float | None) -> str:

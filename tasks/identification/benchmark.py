@@ -130,7 +130,7 @@ def classify_outcome(verdict: Verdict, truth: str | None, form: tuple[str, str] 
 
     Parameters
     ----------
-    verdict : verdict of `find_missing_effects`
+    verdict : verdict of `judge_runs`
     truth : name of the effect in the data; None where there is none
     form : port and variable of a truth outside the library
     """
@@ -159,7 +159,7 @@ def measure_interval_miss(verdict: Verdict, truth: str, values: Mapping[str, flo
 
     Parameters
     ----------
-    verdict : verdict of `find_missing_effects`
+    verdict : verdict of `judge_runs`
     truth : name of the effect in the data
     values : its parameters by name [units of the table]
     """

@@ -67,99 +67,47 @@ class JointRules:
 
 @dataclass(frozen=True, kw_only=True)
 class DecisionRules:
-    """Thresholds and counts of a decision; values, units and reasons stand in catalogs/decision_rules.yaml.
+    """Numbers of a decision; values, units and reasons stand in catalogs/decision_rules.yaml.
 
     Parameters
     ----------
-    accept_score : score from which an effect may be named: gain / inflation - parameters x log N [1]
-    held_out_gain : fall of the held-out misfit from which an effect may be named [1]
-    rival_span : difference of scores within which two explanations cannot be told apart [1]
-    rival_gain_share : share of the named effect's gain from which another effect counts as a rival [1]
+    named_odds : odds from which something is named, and from which it is larger than what matters [1]
+    slab_width : standard deviation of what a car may lack, over the smallest size that matters [1]
+    spike_width : the same of a number that is not named [1]
+    signature_error : relative error of an effect's signature in a model of the car [1]
+    form_width : standard deviation of a form's values, over the size that matters at its port [1]
+    form_odds : odds against a form outside the library, before any run [1]
+    most_effects : candidates that one explanation can hold [1]
+    beam_width : explanations of each size that grow further [1]
+    most_turns : linearisations of the search at most [1]
+    most_compared : explanations that are compared with the best one [1]
     discrepancy_limit : mean square of a channel's whitened leftover in a run from which its noise is widened [1]
-    foreign_inflation : inflation beside the best effects, and form, from which the car's equations are not the model's
-        [1]
-    disputed_inflation : inflation of a name from which the runs disagree about it, which tells the same [1]
-    win_share : share of bootstrap resamples that the named effect must win [1]
-    bootstrap_resamples : bootstrap resamples of the runs [1]
-    refined_candidates : candidates of a screening that are refined through the simulation [1]
-    refined_look_alikes : nearly collinear effects of the best candidate that are refined too [1]
-    look_alike_cosine : cosine between two library directions, nuisances projected out, from which they are nearly
-        collinear [1]
-    hopeful_share : share of what a name needs, or of the best, that a first and linear estimate must reach [1]
-    trusted_screen_share : share of the best gain below which a linear gain counts without refinement [1]
-    relinearisation_gain : gain from which derivatives taken without an effect no longer hold with it [1]
-    reached_share : share of the linear gain that a first fit must reach to need no other start [1]
-    most_effects : effects that one campaign can name [1]
-    explored_candidates : candidates refined while only the disturbances are to be scaled [1]
-    relinearised_candidates : candidates of a round that are linearised anew, if their gain is large [1]
-    relinearisation_change : relative change of parameters below which a second relinearisation is not needed [1]
-    retune_pull : pull of a session nuisance, in prior sigmas, from which it is a wrong number of the
-        vehicle, and a name beside it is held against a joint fit [1]
-    negligible_share : change of a number that no session re-tunes, below which it is not wrong [1]
     relinearisation_pull : pull, in prior sigmas, from which the runs are linearised anew at the session [1]
-    disagreement : inflation of a named effect from which a single form is compared with it; of the runs without any
-        name, from which speed and accelerometer are asked alone [1]
-    lone_form_share : share of the named effects' gain from which a single form is compared with them [1]
     least_expected_d2 : expected squared distance below which a planned run is not worth driving [1]
     retune_widening : factor on the session's tolerances when a model is re-tuned without any new effect [1]
     error_resamples : bootstrap resamples of the held-out errors [1]
-    worse_limit : ratio of held-out errors from which a channel is worse than under the frozen model [1]
-    retuned_limit : error of the held-out runs, of a channel along the road or of all, over that of the re-tuned model,
-        beyond which nothing is named [1]
-    noticed_share : share of a held-out error below which an effect makes a noticeable difference to it [1]
     longest_lag : longest lag at which residual and brake pressure are correlated [s]
-    interval_widening : factor on the length of intervals for what the likelihood does not hold, such as the noise of
-        the pressure gauge [1]
-    profile_points : points of the profile likelihood tried on each side of an estimate [1]
-    profile_tolerance : relative error of the root deviance at which the profile is followed no further [1]
     step_misfit : misfit by halving the step from which a run counts as sensitive to the step and is left out [1]
     fewest_runs : number of other runs below which runs that are sensitive to the step are used too [1]
     joint : of the joint fit
     """
 
-    accept_score: float
-    held_out_gain: float
-    rival_span: float
-    rival_gain_share: float
-    discrepancy_limit: float
-    foreign_inflation: float
-    disputed_inflation: float
-    win_share: float
-    bootstrap_resamples: int
-    refined_candidates: int
-    refined_look_alikes: int
-    look_alike_cosine: float
-    hopeful_share: float
-    trusted_screen_share: float
-    relinearisation_gain: float
-    reached_share: float
+    named_odds: float
+    slab_width: float
+    spike_width: float
+    signature_error: float
+    form_width: float
+    form_odds: float
     most_effects: int
-    explored_candidates: int
-    relinearised_candidates: int
-    relinearisation_change: float
-    retune_pull: float
-    negligible_share: float
+    beam_width: int
+    most_turns: int
+    most_compared: int
+    discrepancy_limit: float
     relinearisation_pull: float
-    disagreement: float
-    lone_form_share: float
     least_expected_d2: float
     retune_widening: float
     error_resamples: int
-    worse_limit: float
-    retuned_limit: float
-    noticed_share: float
     longest_lag: float
-    interval_widening: float
-    profile_points: int
-    profile_tolerance: float
     step_misfit: float
     fewest_runs: int
     joint: JointRules
-
-    @property
-    def cross_validated_gain(self) -> float:
-        """Return the fall of the misfit by which training runs, each left out in turn, must confirm a name [1].
-
-        They chose the candidate, so they must confirm it by as much as a score asks, which is twice that in misfit.
-        """
-        return 2.0 * self.accept_score

@@ -7,10 +7,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.identification.decision.attribution import Candidate
 from tasks.identification.decision.correlation import Correlation
 from tasks.identification.decision.experiment import Experiment
-from tasks.identification.decision.intervals import Bounds
 from tasks.identification.inference.disturbance import Disturbance
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.slots import Slot
@@ -39,9 +37,9 @@ class NamedEffect:
     ----------
     name, effect_class, port, variable : as in the library, or of the form found
     parameters : estimates
-    score : gain / inflation - parameters x log N, in addition to the other effects [1]
-    gain, inflation, held_out_gain, cross_validated_gain, win_share : terms of the score and of the gates that it
-        passed [1]
+    score : logarithm of the odds of the explanation that it belongs to, against the same without it [1]
+    gain : rise of the log likelihood by it [1]
+    spread : standard deviation from run to run, over its size [1]
     """
 
     name: str
@@ -51,10 +49,21 @@ class NamedEffect:
     parameters: tuple[Parameter, ...]
     score: float
     gain: float
-    inflation: float
-    held_out_gain: float
-    cross_validated_gain: float
-    win_share: float
+    spread: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class OpenOdds:
+    """An explanation that the runs leave open.
+
+    Parameters
+    ----------
+    names : what it names
+    odds : against the first explanation [1]
+    """
+
+    names: tuple[str, ...]
+    odds: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,14 +94,15 @@ class ChannelError:
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
-    """Conclusion of `find_missing_effects`.
+    """Conclusion about a campaign.
 
     Parameters
     ----------
     verdict : kind of verdict
-    effects : named effects, in the order in which they were found
-    rivals : effects that cannot be told from a named one, each after the name of that effect
-    tried : best candidates of the last round that were not accepted
+    effects : named effects, those that gain most first
+    rivals : effects of the other open explanations, each after the name of the effect that it stands in for
+    odds : every open explanation with its odds
+    tried : best candidates that are not named
     error : errors by channel, on held-out runs
     manoeuvre_error : errors of stopping distance [m] and peak pitch [deg], on held-out runs that brake
     correlation : correlation of each channel's residual with brake pressure, on held-out runs
@@ -103,17 +113,17 @@ class Verdict:
     campaign, content_hash, split_hash : name and hashes of the campaign
     theta : float64 full parameter vector of the effects, without session nuisances
     slots : tables of the forms found
-    experiment : planned run that separates the first effect best from its closest alternative
+    experiment : planned run that separates the first explanation best from its closest rival
     step_sensitive : names of runs left out because halving the integration step changes their prediction
     reasons : sentences that explain the verdict
-    disagreement : why single effects could not be told, or by how much nothing that is named explains the runs; else
-        empty
+    disagreement : why nothing that can be named explains the runs; else empty
     misses : the speed of held-out runs is missed by more than its noise
     """
 
     verdict: VerdictName
     effects: tuple[NamedEffect, ...]
     rivals: tuple[tuple[str, NamedEffect], ...]
+    odds: tuple[OpenOdds, ...]
     tried: tuple[NamedEffect, ...]
     error: dict[str, ChannelError]
     manoeuvre_error: dict[str, ChannelError]
@@ -135,7 +145,7 @@ class Verdict:
 
 
 def find_kind(named: Sequence[NamedEffect], rivals: Sequence[tuple[str, NamedEffect]]) -> VerdictName:
-    """Return the kind of a verdict that names no form.
+    """Return the kind of a verdict.
 
     Parameters
     ----------
@@ -147,6 +157,8 @@ def find_kind(named: Sequence[NamedEffect], rivals: Sequence[tuple[str, NamedEff
     if rivals:
         return "SET"
     classes = {effect.effect_class for effect in named}
+    if "form" in classes:
+        return "UNKNOWN_FORM"
     return "FOUND" if "effect" in classes else "RETUNE" if "retune" in classes else "SENSOR"
 
 
@@ -159,11 +171,10 @@ def make_estimate(effect: Effect, parameter: Parameter, error: float) -> NamedEf
     parameter : its estimate
     error : its standard error [its unit]
     """
-    sure = parameter.value / error
+    half_square = 0.5 * (parameter.value / error) ** 2
     return NamedEffect(
         name=effect.name, effect_class=effect.effect_class, port=effect.port, variable=effect.variable,
-        parameters=(parameter,), score=sure**2, gain=0.5 * sure**2, inflation=1.0, held_out_gain=0.0,
-        cross_validated_gain=0.0, win_share=1.0,
+        parameters=(parameter,), score=half_square, gain=half_square,
     )  # fmt: skip
 
 
@@ -181,37 +192,3 @@ def is_within_tolerance(effect: NamedEffect, tolerances: Mapping[str, float], li
         return False
     reach = 0.5 * (number.ci_high - number.ci_low)
     return abs(number.value) < float(np.hypot(limit * tolerances[number.name], reach))
-
-
-def make_named_effect(candidate: Candidate, share: float, interval: Bounds) -> NamedEffect:
-    """Return a candidate in the form in which the verdict reports it.
-
-    Parameters
-    ----------
-    candidate : refined and judged candidate
-    share : bootstrap win share [1]
-    interval : ends of the parameters' 95 % intervals, float64 [K] each
-    """
-    h = candidate.hypothesis
-    values = candidate.fitted.values[-len(h.names) :]
-    return NamedEffect(
-        name=h.name,
-        effect_class=h.effect_class,
-        port=h.port,
-        variable=h.variable,
-        parameters=tuple(
-            Parameter(
-                name=n, value=float(v), ci_low=float(low), ci_high=float(high), lower=float(lo), upper=float(hi),
-                unit=u,
-            )
-            for n, v, low, high, lo, hi, u in zip(
-                h.names, values, *interval, h.lower, h.upper, h.units, strict=True
-            )
-        ),
-        score=candidate.score,
-        gain=candidate.gain,
-        inflation=candidate.inflation,
-        held_out_gain=candidate.held_out_gain,
-        cross_validated_gain=candidate.cross_validated_gain,
-        win_share=share,
-    )  # fmt: skip

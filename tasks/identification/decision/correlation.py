@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.campaign import CHANNELS
-from tasks.identification.inference.evidence import RunEvidence
-from tasks.identification.inference.forward import predict_channels
+from tasks.identification.inference.forward import RunModel, predict_channels
 from tasks.identification.inference.noise import whiten_channels
 from tasks.identification.inference.quantiles import NORMAL_QUANTILE
 from tasks.vehicle.effects.slots import Slot
@@ -37,43 +36,49 @@ class Correlation:
 
 
 def correlate_residual_with_pressure(
-    runs: tuple[RunEvidence, ...], theta: NDArray[np.float64], slots: tuple[Slot, ...], longest_lag: float
+    runs: tuple[RunModel, ...],
+    sensors: tuple[NDArray[np.float64], NDArray[np.float64]],
+    theta: NDArray[np.float64],
+    slots: tuple[Slot, ...],
+    longest_lag: float,
 ) -> dict[str, Correlation]:
     """Return the correlations over the held-out runs; the channel's noise whitens residual and pressure.
 
     Parameters
     ----------
     runs : held-out runs
+    sensors : AR(1) coefficient and standard deviation of every channel's sensor, float64 [7] each
     theta, slots : full parameter vector and slots of the grown model
     longest_lag : longest lag [s]
     """
     plain = np.zeros(len(theta))
     residuals = [
-        [(run.model.measured - predict_channels(run.model, p, slots=s)) for run in runs]
+        [(run.measured - predict_channels(run, p, slots=s)) for run in runs]
         for p, s in ((plain, ()), (theta, slots))
     ]
-    measured = [name for name in CORRELATED if np.isfinite(runs[0].sigma[CHANNELS.index(name)])]
+    measured = [name for name in CORRELATED if np.isfinite(sensors[1][CHANNELS.index(name)])]
     return {
-        name: _correlate_channel(runs, residuals, CHANNELS.index(name), longest_lag)
+        name: _correlate_channel(runs, sensors, residuals, CHANNELS.index(name), longest_lag)
         for name in measured or ["speed"]
     }
 
 
 def _correlate_channel(
-    runs: tuple[RunEvidence, ...],
+    runs: tuple[RunModel, ...],
+    sensors: tuple[NDArray[np.float64], NDArray[np.float64]],
     residuals: list[list[NDArray[np.float64]]],
     channel: int,
     longest_lag: float,
 ) -> Correlation:
     """Return the correlation of one channel's residual with pressure over all runs."""
-    interval = runs[0].model.run.interval
+    interval = runs[0].run.interval
     most = round(longest_lag / interval)
     sums = np.zeros((2, 2 * most + 1))
     powers, pressed, count = np.zeros(2), 0.0, 0
+    rho, sigma = (values[channel : channel + 1] for values in sensors)
     for i, run in enumerate(runs):
-        rho, sigma = run.rho[channel : channel + 1], run.sigma[channel : channel + 1]
-        u = _whiten_channel(run.model.pressure[:, None], rho, sigma)
-        own = None if run.model.sampled is None else run.model.sampled[:, channel : channel + 1]
+        u = _whiten_channel(run.pressure[:, None], rho, sigma)
+        own = None if run.sampled is None else run.sampled[:, channel : channel + 1]
         pressed += float(u @ u)
         count += len(u)
         for j in range(2):

@@ -1,14 +1,12 @@
 """Forms outside the library: splines of the residual over pairs of port and variable, and simple shapes for them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.campaign import CHANNELS
-from tasks.identification.decision.screening import compute_inflation
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.evidence import RunEvidence
 from tasks.identification.inference.fit import Fit
@@ -49,29 +47,6 @@ SHAPES_TRIED = 2
 """Shapes of the grammar that are fitted through the simulation for a spline [1]."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class ResidualSpline:
-    """A spline of one variable at one port, fitted linearly to the residual of a fit.
-
-    Parameters
-    ----------
-    port, variable : port and variable of the spline
-    grid : float64 [K] knots [unit of the variable]
-    values : float64 [K] [unit of the port]
-    covariance : float64 [K, K] [unit of the port squared]
-    gain : rise of the log likelihood, divided by the inflation [1]
-    score : gain less K log N [1]
-    """
-
-    port: str
-    variable: str
-    grid: NDArray[np.float64]
-    values: NDArray[np.float64]
-    covariance: NDArray[np.float64]
-    gain: float
-    score: float
-
-
 KEYS = tuple((port, variable) for port, variables in SCANNED.items() for variable in variables)
 RIDGE = np.repeat([(20.0 * PORT_STEP[port]) ** -2 for port, _ in KEYS], KNOTS)
 """Precision of the broad priors of all knots, in the order of `KEYS`."""
@@ -98,53 +73,6 @@ def find_scanned_ranges(runs: Sequence[RunEvidence]) -> dict[str, tuple[float, f
     fastest = round(RANGE["pressure_rate"][1] * ranges["pressure"][1] / RANGE["pressure"][1], 1)
     ranges["pressure_rate"] = (-fastest, fastest)
     return ranges
-
-
-def fit_residual_splines(
-    evidence: Evidence, at: Fit, splines: tuple[NDArray[np.float64], ...] | None = None
-) -> list[ResidualSpline]:
-    """Fit a spline at every scanned port and variable to the residuals of ``at``; best first.
-
-    Parameters
-    ----------
-    evidence : the runs
-    at : fit whose residuals are used
-    splines : `differentiate_by_splines` at the fit; None if not computed yet
-    """
-    size, n_session = KNOTS * len(KEYS), len(evidence.session_sigma)
-    gram, cross, right = np.zeros((size, size)), np.zeros((size, n_session)), np.zeros(size)
-    session = np.diag(1.0 / np.square(evidence.session_sigma))
-    pull = -at.session / np.square(evidence.session_sigma)
-    slopes = differentiate_by_splines(evidence, at) if splines is None else splines
-    for run, r, columns in zip(evidence.train, at.residuals, slopes, strict=True):
-        q, qr = run.project_on_nuisances(columns), run.project_on_nuisances(r)
-        gram += columns.T @ columns - q.T @ q
-        cross += columns.T @ run.session - q.T @ run.session_q
-        session += run.session.T @ run.session - run.session_q.T @ run.session_q
-        right += columns.T @ r - q.T @ qr
-        pull = pull + run.session.T @ r - run.session_q.T @ qr
-    inverse = np.linalg.inv(session)
-    gram -= cross @ inverse @ cross.T
-    right = right - cross @ inverse @ pull
-    level = compute_inflation(evidence, at, None)
-    ranges, found = find_scanned_ranges(evidence.train), []
-    for i, (port, variable) in enumerate(KEYS):
-        block = slice(KNOTS * i, KNOTS * (i + 1))
-        covariance = np.asarray(np.linalg.inv(gram[block, block] + np.diag(RIDGE[block])), dtype=np.float64)
-        values = covariance @ right[block]
-        gain = 0.5 * float(values @ right[block]) / level
-        found.append(
-            ResidualSpline(
-                port=port,
-                variable=variable,
-                grid=np.linspace(*ranges[variable], KNOTS),
-                values=values,
-                covariance=level * covariance,
-                gain=gain,
-                score=gain - KNOTS * float(np.log(evidence.samples)),
-            )
-        )
-    return sorted(found, key=lambda leftover: -leftover.score)
 
 
 def differentiate_by_splines(evidence: Evidence, at: Fit) -> tuple[NDArray[np.float64], ...]:
@@ -198,40 +126,60 @@ def _differentiate_run(
     return whiten_channels(np.stack(columns, axis=-1), run.rho, run.sigma, run.model.sampled)
 
 
-def make_form_hypotheses(leftover: ResidualSpline, samples: int) -> list[Hypothesis]:
-    """Return the grammar's shapes that fit a spline best, as hypotheses for the simulation.
+def make_spline_hypothesis(
+    port: str, variable: str, grid: NDArray[np.float64], start: NDArray[np.float64]
+) -> Hypothesis:
+    """Return a spline as a hypothesis: its values at the knots.
 
     Parameters
     ----------
-    leftover : spline of the residual
-    samples : N of the score's penalty
+    port, variable : port and variable of the spline
+    grid : float64 [K] knots, equally spaced [unit of the variable]
+    start : float64 [K] first values [unit of the port]
     """
-    scale = float(np.max(np.abs(leftover.grid)))
-    precision = np.linalg.inv(leftover.covariance)
+
+    def build_slots(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[Slot, ...]]:
+        slot = Slot(
+            port=port, variable=variable, origin=grid[0], spacing=grid[1] - grid[0], values=values.copy()
+        )
+        return np.zeros(len(EFFECT_TABLE)), (slot,)
+
+    step = np.full(len(grid), PORT_STEP[port])
+    return Hypothesis(
+        name=f"form {port}({variable})", effect_class="form", port=port, variable=variable,
+        names=tuple(f"knot_{k + 1}" for k in range(len(grid))), units=(PORT_UNITS[port],) * len(grid),
+        lower=-100.0 * step, upper=100.0 * step, step=step, start=start.copy(), build=build_slots,
+    )  # fmt: skip
+
+
+def make_form_hypotheses(
+    port: str,
+    variable: str,
+    grid: NDArray[np.float64],
+    values: NDArray[np.float64],
+    errors: NDArray[np.float64],
+) -> list[Hypothesis]:
+    """Return the grammar's shapes that follow a spline best, as hypotheses for the simulation.
+
+    Parameters
+    ----------
+    port, variable : port and variable of the spline
+    grid : float64 [K] knots [unit of the variable]
+    values, errors : float64 [K] of the spline, and standard deviations [unit of the port]
+    """
+    scale = float(np.max(np.abs(grid)))
     ranked = []
     for name, shape in SHAPES.items():
-        basis = shape(leftover.grid / scale)
-        normal = basis.T @ precision @ basis
-        coefficients = np.linalg.solve(normal, basis.T @ precision @ leftover.values)
-        miss = leftover.values - basis @ coefficients
-        cost = 0.5 * float(miss @ precision @ miss) + basis.shape[1] * np.log(samples)
+        basis = shape(grid / scale)
+        coefficients, *_ = np.linalg.lstsq(basis / errors[:, None], values / errors, rcond=None)
+        miss = (values - basis @ coefficients) / errors
+        cost = float(miss @ miss) + basis.shape[1]
         ranked.append((cost, name, np.asarray(coefficients, dtype=np.float64)))
     ranked.sort(key=lambda entry: entry[0])
     return [
-        _make_form_hypothesis(leftover, name, coefficients, scale)
+        _make_form_hypothesis(port, variable, grid, name, coefficients)
         for _, name, coefficients in ranked[:SHAPES_TRIED]
     ]
-
-
-def sample_form(form: Hypothesis) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return a form at its first values: its variable and its value at the port, float64 [TABLE] each.
-
-    Parameters
-    ----------
-    form : hypothesis of `make_form_hypotheses`
-    """
-    (slot,) = form.build(form.start)[1]
-    return slot.origin + slot.spacing * np.arange(len(slot.values), dtype=np.float64), slot.values
 
 
 def make_form_in_range(name: str, coefficients: tuple[float, ...], low: float, high: float) -> Form:
@@ -256,36 +204,11 @@ def make_form_in_range(name: str, coefficients: tuple[float, ...], low: float, h
     )  # fmt: skip
 
 
-def is_session_number(form: Hypothesis) -> bool:
-    """Return whether a form is a number that every session may be off by: damping, stiffness or brake gain.
-
-    Parameters
-    ----------
-    form : hypothesis of `make_form_hypotheses`
-    """
-    x, y = sample_form(form)
-    line = bool(np.allclose(y, np.interp(0.0, x, y) + (y[-1] - y[0]) / (x[-1] - x[0]) * x))
-    if form.port == "brake_torque":
-        return is_constant(form)
-    return form.port == "suspension_force" and line and abs(float(np.interp(0.0, x, y))) < 1e-9
-
-
-def is_constant(form: Hypothesis) -> bool:
-    """Return whether a form does not depend on its variable.
-
-    Parameters
-    ----------
-    form : hypothesis of `make_form_hypotheses`
-    """
-    return bool(np.ptp(sample_form(form)[1]) == 0.0)
-
-
 def _make_form_hypothesis(
-    leftover: ResidualSpline, name: str, start: NDArray[np.float64], scale: float
+    port: str, variable: str, grid: NDArray[np.float64], name: str, start: NDArray[np.float64]
 ) -> Hypothesis:
     """Return one shape of the grammar as a hypothesis with broad bounds."""
-    port, variable = leftover.port, leftover.variable
-    low, high = float(leftover.grid[0]), float(leftover.grid[-1])
+    low, high, scale = float(grid[0]), float(grid[-1]), float(np.max(np.abs(grid)))
 
     def build_slots(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[Slot, ...]]:
         form = Form(

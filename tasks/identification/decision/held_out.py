@@ -8,11 +8,10 @@ from numpy.typing import NDArray
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
 from tasks.campaign.manoeuvres import MANOEUVRE_UNITS, measure_manoeuvre_errors
 from tasks.identification.decision.answer import ChannelError
-from tasks.identification.inference.campaign_evidence import Evidence
+from tasks.identification.decision.search import Finding
 from tasks.identification.inference.fit import Fit, fit_hypotheses
 from tasks.identification.inference.forward import predict_channels
 from tasks.identification.inference.hypothesis import compose_parameters
-from tasks.identification.inference.linearisation import BODY_CHANNELS
 from tasks.identification.rules import DecisionRules
 from tasks.vehicle.effects.table import EFFECT_TABLE
 
@@ -22,28 +21,31 @@ HALF = 0.5
 """Share of an error below which it is lowered, whatever resamples of few runs say [1]."""
 
 
-def compute_held_out_errors(evidence: Evidence, null: Fit, base: Fit) -> HeldOutErrors:
+def compute_held_out_errors(finding: Finding, fitted: Fit, rules: DecisionRules) -> HeldOutErrors:
     """Return the RMSE on held-out runs under the frozen, the re-tuned and the grown model.
 
     Parameters
     ----------
-    evidence : the runs
-    null : fit without effects, from which re-tuning starts
-    base : fit with the accepted effects
+    finding : the runs; re-tuning starts from the fit without candidates
+    fitted : fit of what is named
+    rules : how far re-tuning may go, and resamples
     """
-    rules = evidence.rules
+    evidence = finding.evidence
     retuned = fit_hypotheses(
-        evidence.train, (), rules.retune_widening * evidence.session_sigma, session=null.session, iterations=8
+        evidence.train,
+        (),
+        rules.retune_widening * evidence.session_sigma,
+        session=finding.null.session,
+        iterations=8,
     )
     models = (
         (np.zeros(len(EFFECT_TABLE)), ()),
         compose_parameters((), np.empty(0), retuned.session),
-        base.compose(),
+        fitted.compose(),
     )
     names, square, braked, manoeuvres = [], [], [], []
     measured = np.isfinite(evidence.train[0].sigma)
-    for run in evidence.held_out:
-        model = run.model
+    for model in evidence.held_out:
         y = np.array([predict_channels(model, theta, slots=slots) for theta, slots in models])
         names.append(model.run.name)
         square.append(model.compute_square_error(y))
@@ -114,44 +116,6 @@ def is_lowered(error: ChannelError) -> bool:
     error : of a channel or figure
     """
     return error.change_high < 0.0 or error.after < HALF * error.frozen
-
-
-def compare_with_retuned(error: Mapping[str, ChannelError]) -> float:
-    """Return the error over that of the re-tuned model, the geometric mean of the channels [1].
-
-    Parameters
-    ----------
-    error : by channel
-    """
-    ratios = [e.after / e.retuned for e in error.values() if e.after > 0.0 and e.retuned > 0.0]
-    return float(np.exp(np.mean(np.log(ratios)))) if ratios else 1.0
-
-
-def is_better_retuned(error: Mapping[str, ChannelError], rules: DecisionRules) -> bool:
-    """Whether re-tuning alone predicts all channels together much better, or every one of them noticeably.
-
-    Parameters
-    ----------
-    error : by channel
-    rules : of the decision
-    """
-    everywhere = all(rules.noticed_share * e.after > e.retuned for e in error.values())
-    return everywhere or compare_with_retuned(error) > rules.retuned_limit
-
-
-def find_missed_channels(error: Mapping[str, ChannelError], limit: float) -> list[str]:
-    """Return the channels of the motion along the road that effects predict much worse than the re-tuned model.
-
-    What a resistance takes from the speed a slope of the session gives back, and the accelerometer feels the slope. A
-    form of the body's motion may be right in all but its shape, which the other channels do not feel.
-
-    Parameters
-    ----------
-    error : by channel
-    limit : ratio of errors beyond which a channel is missed [1]
-    """
-    road = {name: e for name, e in error.items() if name not in BODY_CHANNELS}
-    return [name for name, e in road.items() if e.after > limit * e.retuned > 0.0]
 
 
 def find_worse_channels(

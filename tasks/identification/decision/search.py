@@ -1,282 +1,277 @@
-"""The search: effects are added to the model round by round, and the runs are linearised anew where needed."""
+"""The search: linearise the runs, weigh every explanation, fit the best one through the simulation, and begin again."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.campaign import SESSION
-from tasks.identification.decision.attribution import (
-    Candidate,
-    assess_fit,
-    judge_hypothesis,
-    refine_candidates,
+from tasks.campaign.campaign import SESSION, Campaign
+from tasks.identification.decision.candidates import Candidate, Columns, can_show, list_columns, tell_limit
+from tasks.identification.decision.forms import (
+    KNOTS,
+    RIDGE,
+    differentiate_by_splines,
+    find_scanned_ranges,
+    make_spline_hypothesis,
+    rewhiten_splines,
 )
-from tasks.identification.decision.cross_validation import cross_validate_candidate
-from tasks.identification.decision.forms import RIDGE
-from tasks.identification.decision.session_numbers import (
-    compute_joint_pull,
-    find_alike_numbers,
-    free_session_number,
-)
-from tasks.identification.decision.words import join_phrases
+from tasks.identification.decision.odds import Explanation, RunGrams, search_explanations
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.disturbance import Disturbance
-from tasks.identification.inference.fit import Fit, compute_misfit_by_run, fit_hypotheses, sum_misfit_falls
-from tasks.identification.inference.hypothesis import is_nested
+from tasks.identification.inference.discrepancy import estimate_run_noise, set_run_noise
+from tasks.identification.inference.fit import Fit, fit_hypotheses
+from tasks.identification.inference.forward import prepare_run
+from tasks.identification.inference.hypothesis import Hypothesis, make_library_hypothesis
 from tasks.identification.inference.linearisation import (
     compute_whitened_residuals,
     differentiate_at,
     fit_disturbance,
+    prepare_evidence,
+    rescale_disturbances,
 )
+from tasks.identification.rules import DecisionRules
+from tasks.surface.state import SurfaceParameters
+from tasks.vehicle.effects.library import Effect
+from tasks.vehicle.parameters import Vehicle
+
+Splines = tuple[NDArray[np.float64], ...]
+"""Derivatives of every training run by the knots of all splines, float64 [M, K] each."""
+STEPS = 6
+"""Gauss-Newton steps of a fit [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Round:
-    """One round of the search.
+class Finding:
+    """What the search found.
 
     Parameters
     ----------
-    base : fit before the round
-    tried : candidates that were tried in addition to ``base``
-    accepted : candidate that was accepted
-    evidence : the runs, with derivatives at the accepted candidate
+    evidence : the runs, linearised about ``fitted``
+    null : fit without any candidate
+    fitted : fit of the best explanation through the simulation
+    grams : what the runs say there
+    explanations : the best first; the first is that of ``fitted``
     """
 
-    base: Fit
-    tried: tuple[Candidate, ...]
-    accepted: Candidate
     evidence: Evidence
+    null: Fit
+    fitted: Fit
+    grams: RunGrams
+    explanations: tuple[Explanation, ...]
+
+    @property
+    def best(self) -> Explanation:
+        """Return the explanation with the largest odds."""
+        return self.explanations[0]
 
 
 @dataclass(frozen=True, kw_only=True)
-class SearchState:
-    """State of the search.
-
-    Parameters
-    ----------
-    evidence : the runs, with derivatives that hold at ``base``
-    base : fit of the accepted hypotheses
-    rounds : rounds of the search so far
-    tried : candidates of the last round, none of which was accepted
-    """
+class _Place:
+    """Where the search stands: the runs about a fit, and their derivatives by the splines."""
 
     evidence: Evidence
-    base: Fit
-    rounds: tuple[Round, ...] = ()
-    tried: tuple[Candidate, ...] = ()
+    fitted: Fit
+    splines: Splines
 
 
-def relinearise_candidate(
-    evidence: Evidence, base: Fit, candidate: Candidate, *, gated: bool = True, known: Evidence | None = None
-) -> tuple[Evidence, Candidate]:
-    """Linearise the runs anew at a candidate with a large gain, refit it and judge it there.
+def find_explanations(
+    campaign: Campaign,
+    vehicle: Vehicle,
+    surface: SurfaceParameters,
+    library: tuple[Effect, ...],
+    rules: DecisionRules,
+) -> Finding:
+    """Return the explanations of what a model misses in the training runs, with their odds.
+
+    The first turn takes the single candidate that gains most, so that what it hides comes to light. Every further turn
+    weighs sets of candidates about the fit of the turn before, until the best set is the one that was fitted.
 
     Parameters
     ----------
-    evidence : the runs as differentiated for ``base``
-    base : fit of the hypotheses accepted so far
-    candidate : candidate judged with these derivatives
-    gated : judge it on held-out runs too
-    known : derivatives at the candidate, if an earlier search took them
-
-    Returns
-    -------
-    The runs with derivatives that hold at the candidate, and the candidate.
+    campaign : measured runs; held-out runs are not read
+    vehicle, surface : the model that is judged
+    library : effects that may be named
+    rules : of the decision
     """
-    if candidate.gain < evidence.rules.relinearisation_gain:
-        return evidence, candidate
-    here, fitted = evidence, candidate.fitted
-    for _ in range(2):
-        here = known or differentiate_at(here, fitted, library=True)
-        known = None
-        again = fit_hypotheses(
-            here.train, fitted.parts, here.session_sigma, values=fitted.values, session=fitted.session, iterations=8
-        )  # fmt: skip
-        shift = np.abs(again.values - fitted.values) / np.maximum(np.abs(again.values), 1e-9)
-        fitted = again
-        if np.all(shift < evidence.rules.relinearisation_change):
+    models = [prepare_run(run, vehicle, surface) for run in campaign.train]
+    shown = [
+        effect
+        for effect in library
+        if can_show(effect, vehicle, campaign.channels) and tell_limit(effect, models, rules.joint)
+    ]
+    retuned = [effect for effect in shown if effect.parameters[0].name in SESSION]
+    numbers = tuple(effect for effect in shown if effect.parameters[0].name not in SESSION)
+    evidence, null = prepare_evidence(campaign, vehicle, surface, numbers, rules)
+    place = _settle_scales(
+        _Place(evidence=evidence, fitted=null, splines=differentiate_by_splines(evidence, null))
+    )
+    columns = list_columns(numbers, retuned, evidence.session_sigma, rules)
+    null = place.fitted
+    for turn in range(rules.most_turns):
+        grams = gather_grams(place.evidence, place.fitted, place.splines, columns)
+        found: list[Explanation] = []
+        if turn == 0:
+            found = search_explanations(grams, most=1, width=1, spread=False)
+        if not found or not found[0].members:
+            found = search_explanations(grams, most=rules.most_effects, width=rules.beam_width)
+        if _is_fitted(found[0], place.fitted):
             break
-    base_held_out = None
-    if gated:
-        before, after = (compute_misfit_by_run(runs.held_out, base) for runs in (evidence, here))
-        # by what the misfit of the same fit moves with the derivatives, no fit can be told from another
-        base_held_out = (after[0], after[1] + np.abs(after[0] - before[0]))
-    return here, assess_fit(here, base, base_held_out, candidate.hypothesis, fitted)
-
-
-def search_library(start: SearchState, *, gated: bool, explored: SearchState | None = None) -> SearchState:
-    """Add library effects one by one, the best first.
-
-    Parameters
-    ----------
-    start : state of the search with the hypotheses accepted already
-    gated : accept only candidates that pass every gate; else the one with the largest gain, to see the residual with it
-    explored : earlier search; where its effects appear again, its derivatives are used
-    """
-    state, rules = start, start.evidence.rules
-    met = frozenset(r.accepted.hypothesis.name for r in explored.rounds) if explored else frozenset()
-    for _ in range(rules.most_effects):
-        count = rules.refined_candidates if gated else rules.explored_candidates
-        tried = refine_candidates(state.evidence, state.base, count, gated=gated, also=met)
-        places: dict[str, Evidence] = {}
-        for i, candidate in enumerate(tried[: rules.relinearised_candidates] if gated else tried[:1]):
-            # a large gain may score low only because the fit has not arrived
-            if candidate.score > rules.hopeful_share * max(rules.accept_score, tried[0].score):
-                near, known = candidate, None
-                if explored and candidate.gain >= rules.relinearisation_gain:
-                    near, known = _recall_candidate(explored, candidate)
-                places[candidate.hypothesis.name], tried[i] = relinearise_candidate(
-                    state.evidence, state.base, near, gated=gated, known=known
-                )
-        tried.sort(key=lambda c: -c.score)
-        if gated:
-            tried = _confirm_open(state, tried, places)
-        passing = [
-            c
-            for c in tried
-            if (c.passes and not _is_left_by_names(c, state) if gated else c.score > rules.accept_score)
-        ]
-        if not passing:
-            return replace(state, tried=tuple(tried))
-        # an explanation that pulls a number of the session beyond belief gives way to one that does not
-        credible = [
-            c for c in passing if not c.pulls_session and c.gain > rules.lone_form_share * passing[0].gain
-        ]
-        best = credible[0] if credible else passing[0]
-        simpler = [
-            c
-            for c in passing
-            if is_nested(c.hypothesis, best.hypothesis) and c.score > best.score - rules.rival_span
-        ]
-        best = simpler[0] if simpler else best
-        here = places.get(best.hypothesis.name, state.evidence)
-        if gated and here is not state.evidence:
-            held_out = compute_misfit_by_run(state.evidence.held_out, state.base)
-            tried = [
-                c if c.score < rules.hopeful_share * best.score or c.hypothesis.name in places
-                else judge_hypothesis(here, state.base, held_out, c.hypothesis)
-                for c in tried
-            ]  # fmt: skip
-        state = SearchState(
-            evidence=here,
-            base=best.fitted,
-            rounds=(*state.rounds, Round(base=state.base, tried=tuple(tried), accepted=best, evidence=here)),
-        )
-    return state
-
-
-def _is_left_by_names(candidate: Candidate, state: SearchState) -> bool:
-    """Return whether a candidate may be what names of its port leave over because they are not the car's exactly.
-
-    Where the runs disagree about a name, its own error explains as much as the rules leave open between two
-    explanations: dampers of another law leave on humps what a bump stop would.
-    """
-    rules, port = state.evidence.rules, candidate.hypothesis.port
-    named = [r.accepted for r in state.rounds if r.accepted.hypothesis.port == port]
-    gain = sum(c.gain for c in named if c.inflation > rules.disagreement)
-    return gain > 0.0 and gain >= rules.rival_gain_share * (gain + candidate.gain)
-
-
-def _confirm_open(
-    state: SearchState, tried: list[Candidate], places: Mapping[str, Evidence]
-) -> list[Candidate]:
-    """Return candidates, best first, with those cross-validated that are open and may be accepted.
-
-    Behind the first that passes and is credible, only one that is nested in it may.
-    """
-    confirmed: list[Candidate] = []
-    best: Candidate | None = None
-    for candidate in tried:
-        here = places.get(candidate.hypothesis.name, state.evidence)
-        if best is None or is_nested(candidate.hypothesis, best.hypothesis):
-            candidate = cross_validate_candidate(here, state.base, candidate)
-        if best is None and candidate.passes and not candidate.pulls_session:
-            best = candidate
-        confirmed.append(candidate)
-    return confirmed
-
-
-def _recall_candidate(explored: SearchState, candidate: Candidate) -> tuple[Candidate, Evidence | None]:
-    """Return the candidate at the values to which an earlier search fitted it, and the derivatives taken there."""
-    k = len(candidate.hypothesis.names)
-    for earlier in explored.rounds:
-        known = earlier.accepted
-        if known.hypothesis.name == candidate.hypothesis.name:
-            values = np.concatenate((candidate.fitted.values[:-k], known.fitted.values[-k:]))
-            near = replace(
-                candidate, fitted=replace(candidate.fitted, values=values, session=known.fitted.session)
-            )
-            alone = len(known.fitted.values) == len(values) and known.gain >= known.rules.relinearisation_gain
-            return near, earlier.evidence if alone else None
-    return candidate, None
-
-
-def scale_disturbances(explored: SearchState, splines: tuple[NDArray[np.float64], ...]) -> Disturbance:
-    """Return the scales of the disturbances, fitted beside the effect that explains the runs best.
-
-    Otherwise a large effect that is not named yet would be taken for a disturbance, which then hides it.
-
-    Parameters
-    ----------
-    explored : ungated search under a first guess of the scales
-    splines : `differentiate_by_splines` at its fit
-    """
-    residuals = compute_whitened_residuals(explored.evidence, explored.base)
-    here = explored.evidence
-    return fit_disturbance(
-        here.train, residuals, here.tolerances, here.effects, here.disturbance, splines, RIDGE
+        place = _move_to(found[0], place, null, settle=turn == 0)
+    else:
+        grams = gather_grams(place.evidence, place.fitted, place.splines, columns)
+        found = search_explanations(grams, most=rules.most_effects, width=rules.beam_width)
+    return Finding(
+        evidence=place.evidence, null=null, fitted=place.fitted, grams=grams, explanations=tuple(found)
     )
 
 
-def find_retune(start: SearchState, reasons: list[str]) -> SearchState:
-    """Return the search state with a wrong number of the vehicle named, where the runs pull one too far.
+def gather_grams(evidence: Evidence, fitted: Fit, splines: Splines, columns: Columns) -> RunGrams:
+    """Return what every training run says about all columns, its offsets and disturbances integrated out.
 
     Parameters
     ----------
-    start : state without effects
-    reasons : list to which sentences are appended
+    evidence : the runs, linearised about the fit
+    fitted : the fit
+    splines : derivatives there
+    columns : meaning of the columns
     """
-    evidence, null = start.evidence, start.base
-    judged = []
-    for name in _find_pulled_numbers(evidence, null, reasons):
-        hypothesis = free_session_number(evidence, null, name)
-        if hypothesis is None:
-            continue
-        frozen = null.session.copy()
-        frozen[SESSION.index(name)] = 0.0
-        held_out = compute_misfit_by_run(evidence.held_out, replace(null, session=frozen))
-        found = judge_hypothesis(evidence, null, held_out, hypothesis)
-        gained = sum_misfit_falls(held_out, compute_misfit_by_run(evidence.held_out, found.fitted))
-        judged.append(replace(found, held_out_gain=gained / found.inflation))
-    least = evidence.rules.held_out_gain
-    accepted = [c for c in judged if c.held_out_gain > least and c.gain > 0.0 and not c.fitted.at_bound]
-    if not accepted:
-        return start
-    best = max(accepted, key=lambda c: c.gain)
-    return replace(
-        start,
-        base=best.fitted,
-        rounds=(Round(base=null, tried=tuple(judged), accepted=best, evidence=evidence),),
+    information, score = [], []
+    for run, residual, knots in zip(evidence.train, fitted.residuals, splines, strict=True):
+        every = np.column_stack((run.library, run.others, knots, run.session))
+        seen, left = run.project_on_nuisances(every), run.project_on_nuisances(residual)
+        information.append(every.T @ every - seen.T @ seen)
+        score.append(every.T @ residual - seen.T @ left)
+    centre = _find_centre(fitted, columns)
+    # an explanation without a form has its values at 0, and not where it was fitted
+    forms = np.zeros(columns.count)
+    own = [place for candidate in columns.candidates if candidate.base < 0 for place in candidate.columns]
+    forms[own] = centre[own]
+    known = np.array(information)
+    return RunGrams(
+        information=known, score=np.array(score) + known @ forms, centre=centre - forms, columns=columns
     )
 
 
-def _find_pulled_numbers(evidence: Evidence, null: Fit, reasons: list[str]) -> list[str]:
-    """Return the numbers of the session that the runs pull beyond belief, alone or with those that look alike."""
-    limit, pulled = evidence.rules.retune_pull, []
-    for name, alone in zip(SESSION, null.pulls, strict=True):
-        if alone > limit:
-            reasons.append(f"the runs pull {name} by {alone:.1f} of its tolerances")
-            pulled.append(name)
-    if pulled:
-        return pulled
-    first = SESSION[int(np.argmax(null.pulls))]
-    names = [first, *find_alike_numbers(evidence, first)]
-    if (joint := compute_joint_pull(null, names)) <= limit:
-        return []
-    reasons.append(
-        f"the runs pull {join_phrases(names)}, which they hardly tell apart, together by {joint:.1f} of their"
-        " tolerances"
+def _find_centre(fitted: Fit, columns: Columns) -> NDArray[np.float64]:
+    """Return the value of every column's number in a fit, float64 [C]."""
+    centre, at = np.zeros(columns.count), 0
+    for part in fitted.parts:
+        for candidate in columns.candidates:
+            if candidate.name == part.name and not np.isfinite(candidate.second):
+                own = list(candidate.columns)
+                centre[own] = fitted.values[at : at + len(own)]
+                break
+        else:
+            # an effect of two numbers whose first belongs to another effect: the first column is its derivative now
+            own = [c.columns[0] for c in columns.candidates if part.names[0] == _name_number(c)][:1]
+            centre[own] = fitted.values[at]
+        at += len(part.names)
+    centre[-len(SESSION) :] = fitted.session
+    return centre
+
+
+def _name_number(candidate: Candidate) -> str:
+    return candidate.effect.parameters[0].name if candidate.effect is not None else ""
+
+
+def _is_fitted(explanation: Explanation, fitted: Fit) -> bool:
+    """Whether a fit is that of an explanation; numbers of the session are in every fit."""
+    names = {m.name for m in explanation.members if m.columns[0] < _session_begins(m, fitted)}
+    return names == {part.name for part in fitted.parts}
+
+
+def _session_begins(member: Candidate, fitted: Fit) -> float:
+    retuned = member.effect is not None and member.effect.parameters[0].name in SESSION
+    return -1.0 if retuned else np.inf
+
+
+def make_hypotheses(
+    explanation: Explanation, evidence: Evidence, fitted: Fit | None = None
+) -> tuple[Hypothesis, ...]:
+    """Return the members of an explanation as hypotheses that start at its values; numbers of the session have none.
+
+    Parameters
+    ----------
+    explanation : the members with their values
+    evidence : the runs, whose ranges the splines have
+    fitted : an earlier fit; a second number that it holds is kept
+    """
+    ranges = find_scanned_ranges(evidence.train)
+    parts = []
+    for member in explanation.members:
+        values = explanation.values[explanation.find_places(member)]
+        if member.effect is None:
+            grid = np.linspace(*ranges[member.variable], KNOTS)
+            parts.append(make_spline_hypothesis(member.port, member.variable, grid, values))
+        elif member.effect.parameters[0].name not in SESSION:
+            second = member.second
+            if not np.isfinite(second) and fitted is not None:
+                second = _find_second(member.name, fitted)
+            parts.append(make_library_hypothesis(member.effect, float(values[0]), second))
+    return tuple(parts)
+
+
+def _find_second(name: str, fitted: Fit) -> float:
+    """Return the second number of an effect in a fit; NaN where the fit has none."""
+    at = 0
+    for part in fitted.parts:
+        if part.name == name and len(part.names) == 2:
+            return float(fitted.values[at + 1])
+        at += len(part.names)
+    return np.nan
+
+
+def widen_session(explanation: Explanation, sigma: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the session's prior sigmas, with the slab where an explanation names one of its numbers, float64 [7].
+
+    Parameters
+    ----------
+    explanation : its members
+    sigma : float64 [7] tolerances
+    """
+    wide = sigma.copy()
+    for member in explanation.members:
+        if member.effect is not None and member.effect.parameters[0].name in SESSION:
+            wide[SESSION.index(member.effect.parameters[0].name)] = member.slab
+    return wide
+
+
+def _move_to(explanation: Explanation, place: _Place, null: Fit, *, settle: bool) -> _Place:
+    """Return the runs about the fit of an explanation, with the scales of noise and disturbances taken anew."""
+    parts = make_hypotheses(explanation, place.evidence, place.fitted)
+    sigma = widen_session(explanation, place.evidence.session_sigma)
+    fitted = fit_hypotheses(place.evidence.train, parts, sigma, session=null.session, iterations=STEPS)
+    evidence = differentiate_at(place.evidence, fitted)
+    fitted = _refit(evidence, fitted)
+    moved = _Place(evidence=evidence, fitted=fitted, splines=differentiate_by_splines(evidence, fitted))
+    return _settle_scales(moved) if settle else moved
+
+
+def _refit(evidence: Evidence, fitted: Fit) -> Fit:
+    """Return the same fit under the present derivatives and scales."""
+    return fit_hypotheses(
+        evidence.train, fitted.parts, fitted.session_sigma, values=fitted.values, session=fitted.session,
+        iterations=STEPS,
+    )  # fmt: skip
+
+
+def _settle_scales(place: _Place) -> _Place:
+    """Return the same runs with the scales of disturbances and noise that they ask for, every candidate free."""
+    for change in (_scale_disturbances, _scale_noise, _scale_disturbances):
+        place = change(place)
+    return place
+
+
+def _scale_noise(place: _Place) -> _Place:
+    evidence = set_run_noise(place.evidence, estimate_run_noise(place.evidence, place.fitted))
+    splines = rewhiten_splines(place.splines, place.evidence, evidence)
+    return _Place(evidence=evidence, fitted=_refit(evidence, place.fitted), splines=splines)
+
+
+def _scale_disturbances(place: _Place) -> _Place:
+    here = place.evidence
+    residuals = compute_whitened_residuals(here, place.fitted)
+    scales = fit_disturbance(
+        here.train, residuals, here.tolerances, here.effects, here.disturbance, place.splines, RIDGE
     )
-    return [first]
+    evidence = rescale_disturbances(here, scales)
+    return replace(place, evidence=evidence, fitted=_refit(evidence, place.fitted))

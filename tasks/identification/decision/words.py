@@ -1,11 +1,15 @@
 """A verdict in plain words: what the car does that the model does not, and what that does to the error."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from math import log
 
 from tasks.identification.decision.answer import ChannelError, NamedEffect
-from tasks.identification.decision.attribution import Candidate
+from tasks.identification.decision.candidates import Candidate
 from tasks.identification.decision.held_out import is_lowered
+from tasks.identification.decision.odds import Explanation, find_odds
+from tasks.identification.decision.told import OpenExplanation
 from tasks.identification.inference.hypothesis import moves_speed
+from tasks.identification.rules import DecisionRules
 from tasks.vehicle.effects.library import Effect, say_number
 from tasks.vehicle.parameters import Vehicle
 
@@ -106,45 +110,66 @@ def _say_errors(figures: Mapping[str, ChannelError], *, retuned: bool = False) -
     )
 
 
-def say_rejection(tried: Sequence[Candidate]) -> str:
-    """Return by which rule the best of the candidates was refused, with its figure and what to do.
+def tell_open_explanations(
+    opened: Sequence[OpenExplanation], explanations: Sequence[Explanation], rules: DecisionRules
+) -> list[str]:
+    """Return a sentence on the explanations that the runs leave open, with their odds.
 
     Parameters
     ----------
-    tried : candidates of which none was accepted
+    opened : the first being the one that is told
+    explanations : all that were weighed, the best first
+    rules : the odds of a name
     """
+    if len(opened) < 2:
+        return []
+    listed = [
+        f"{join_phrases(sorted(o.names)) if o.names else 'nothing'} ({say_number(find_odds(o.log_odds))} : 1)"
+        for o in opened[1:]
+    ]
+    first = join_phrases(sorted(opened[0].names)) if opened[0].names else "nothing"
+    return [
+        f"of {len(explanations)} explanations these runs leave {len(opened)} open within {rules.named_odds:g} : 1;"
+        f" against {first}: {'; '.join(listed)}"
+    ]
+
+
+def say_not_named(
+    tried: Sequence[NamedEffect], best: Explanation, told: Sequence[Candidate], rules: DecisionRules
+) -> list[str]:
+    """Return why nothing is named: the best candidate's odds, or that it is smaller than what matters.
+
+    Parameters
+    ----------
+    tried : candidates that are not named, the best first
+    best : the explanation with the largest odds
+    told : its members that are large enough to be told
+    rules : the odds of a name
+    """
+    small = [member.name for member in best.members if member not in told]
+    if small and best.log_odds > log(rules.named_odds):
+        return [
+            f"the runs show {join_phrases(small)}, smaller than what matters, or not surely larger: not named"
+        ]
     if not tried:
-        return "no effect of the library explains enough of what the model leaves over to be tried"
-    best = max(tried, key=lambda c: c.score)
-    name, rules = best.hypothesis.name, best.rules
-    if best.score <= rules.accept_score:
-        return f"the best candidate, {name}, scores {best.score:.1f}; a name needs {rules.accept_score:g}"
-    shown = f"{name} scores {best.score:.1f} on the training runs (a name needs {rules.accept_score:g}), but"
-    if best.fitted.at_bound:
-        return f"{shown} with a number at the end of its range: not named"
-    gain = f"gain {best.held_out_gain:.1f}, a name needs {rules.held_out_gain:g}"
-    if not best.is_open:
-        return f"{shown} the held-out runs contradict it: {gain}"
-    return (
-        f"{shown} neither the held-out runs nor the training runs, each predicted from the others, confirm it: {gain},"
-        f" cross-validated {best.cross_validated_gain:.1f} of {rules.cross_validated_gain:g}; record another run that"
-        " excites it"
-    )
+        return ["no effect of the library explains anything of what the model leaves over"]
+    odds = find_odds(tried[0].score)
+    return [
+        f"the best candidate, {tried[0].name}, has odds of {say_number(odds)} : 1 against nothing; a name needs"
+        f" {rules.named_odds:g} : 1"
+    ]
 
 
-def say_confirmation(named: Candidate) -> str | None:
-    """Return what confirms a name that the held-out runs neither confirm nor contradict; None if they confirm it.
+def tell_driven(drive: float) -> str:
+    """Return the sentence on runs that begin at their brake.
 
     Parameters
     ----------
-    named : the accepted candidate
+    drive : acceleration before the brake that the model leaves open [m/s2]
     """
-    if named.cross_validated_gain <= named.rules.cross_validated_gain:
-        return None
     return (
-        f"the held-out runs neither confirm nor contradict {named.hypothesis.name} (gain {named.held_out_gain:.1f});"
-        " the training runs, each predicted from the others, confirm it"
-        f" (gain {named.cross_validated_gain:.1f}, a name needs {named.rules.cross_validated_gain:g})"
+        f"before the brake the car was driven with {drive:.2f} m/s2, and no channel says by what: each stop on a flat"
+        " road is judged from its brake on; log the throttle or the engine's torque, or coast for a second before it"
     )
 
 

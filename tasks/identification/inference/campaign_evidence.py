@@ -8,17 +8,19 @@ from numpy.typing import NDArray
 from tasks.campaign.campaign import Tolerances
 from tasks.identification.inference.disturbance import Disturbance
 from tasks.identification.inference.evidence import RunEvidence
+from tasks.identification.inference.forward import RunModel
 from tasks.identification.rules import DecisionRules
 from tasks.vehicle.effects.library import Effect
 
 
 @dataclass(frozen=True, kw_only=True)
 class Evidence:
-    """Training and held-out runs with the library by which they were differentiated.
+    """Training runs with the library by which they were differentiated, and held-out runs.
 
     Parameters
     ----------
-    train, held_out : training and held-out runs
+    train : training runs
+    held_out : held-out runs, which no fit and no choice reads
     effects : library of effects
     tolerances, disturbance : priors of session, offsets and disturbances
     sensors : AR(1) coefficient and standard deviation of every channel's sensor, float64 [7] each
@@ -27,7 +29,7 @@ class Evidence:
     """
 
     train: tuple[RunEvidence, ...]
-    held_out: tuple[RunEvidence, ...]
+    held_out: tuple[RunModel, ...]
     effects: tuple[Effect, ...]
     tolerances: Tolerances
     disturbance: Disturbance
@@ -39,8 +41,3 @@ class Evidence:
     def session_sigma(self) -> NDArray[np.float64]:
         """Return the prior sigmas of the session, float64 [7]."""
         return np.array(self.tolerances.session)
-
-    @property
-    def samples(self) -> int:
-        """Return the number of measured training values, N of the score."""
-        return sum(int(run.model.count_samples()[np.isfinite(run.sigma)].sum()) for run in self.train)

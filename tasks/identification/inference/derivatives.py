@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.campaign import CHANNELS, Tolerances
-from tasks.identification.inference.disturbance import DISTURBED, INITIAL_SPEED, KNOT_SPACING, Disturbance
+from tasks.identification.inference.disturbance import DISTURBED, KNOT_SPACING, Disturbance
 from tasks.identification.inference.evidence import (
     SESSION_INDEX,
     RunEvidence,
-    move_by_offsets,
     set_disturbance_prior,
 )
 from tasks.identification.inference.forward import (
@@ -172,32 +171,6 @@ def _prepare_quotients(
         return (compute_instrument_readings(model, theta, moved) - y) / step
 
     return simulated, compute_quotient
-
-
-def differentiate_about_offsets(
-    run: RunEvidence,
-    base: NDArray[np.float64],
-    slots: tuple[Slot, ...],
-    offsets: NDArray[np.float64],
-    tolerances: Tolerances,
-    disturbance: Disturbance,
-) -> RunEvidence:
-    """Differentiate a run again about a point that its own offsets and disturbances belong to.
-
-    Parameters
-    ----------
-    run : the run; the derivatives by the library are kept
-    base : float64 [len(EFFECT_TABLE)] parameters at which derivatives are taken
-    slots : forms that belong to that point
-    offsets : float64 [D] the run's offsets and disturbance knots
-    tolerances, disturbance : prior of its offsets and disturbances
-    """
-    moved, forms = move_by_offsets(base, slots, offsets, run.knots)
-    faster = offsets[INITIAL_SPEED] * (1.0 + float(base[PARAMETER_INDEX["speed_scale"]]))
-    model = replace(run.model, initial_speed=run.model.initial_speed + faster)
-    fresh = differentiate_run(model, run.rho, run.sigma, moved, (), tolerances, disturbance, forms)
-    kept = replace(fresh, model=run.model, library=run.library, others=run.others, origin=offsets)
-    return set_disturbance_prior(kept, tolerances, disturbance)
 
 
 def list_second_values(effects: tuple[Effect, ...]) -> list[tuple[int, float]]:

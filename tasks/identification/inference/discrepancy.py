@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.evidence import RunEvidence, set_disturbance_prior
 from tasks.identification.inference.fit import Fit
-from tasks.identification.inference.linearisation_points import LinearisedRun, linearise_at, linearise_runs
+from tasks.identification.inference.linearisation_points import LinearisedRun, linearise_at
 from tasks.identification.inference.noise import (
     correlate_with_next,
     rewhiten_channels,
@@ -39,21 +39,15 @@ class RunNoise:
 def estimate_run_noise(evidence: Evidence, at: Fit) -> dict[str, RunNoise]:
     """Return by run the noise of each channel: its sensor's, or what a fit and its disturbances leave over.
 
-    Held-out runs too: their noise is read at the same fit, and is the same for every explanation.
-
     Parameters
     ----------
     evidence : the runs
     at : fit whose leftover is taken
     """
-    runs = (*evidence.train, *evidence.held_out)
-    points = (
-        *linearise_at(evidence.train, at.parts, at.values, at.session, at.offsets),
-        *linearise_runs(evidence.held_out, at.parts, at.values, at.session),
-    )
+    points = linearise_at(evidence.train, at.parts, at.values, at.session, at.offsets)
     return {
         run.model.run.name: _estimate_noise(run, point, evidence)
-        for run, point in zip(runs, points, strict=True)
+        for run, point in zip(evidence.train, points, strict=True)
     }
 
 
@@ -80,11 +74,7 @@ def set_run_noise(evidence: Evidence, noise: Mapping[str, RunNoise]) -> Evidence
         )  # fmt: skip
         return set_disturbance_prior(changed, evidence.tolerances, evidence.disturbance)
 
-    return replace(
-        evidence,
-        train=tuple(rewhiten(run) for run in evidence.train),
-        held_out=tuple(rewhiten(run) for run in evidence.held_out),
-    )
+    return replace(evidence, train=tuple(rewhiten(run) for run in evidence.train))
 
 
 def _estimate_noise(run: RunEvidence, point: LinearisedRun, evidence: Evidence) -> RunNoise:

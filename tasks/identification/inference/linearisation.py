@@ -1,6 +1,6 @@
 """Linearisation of all runs about a fit, and the scales of their disturbances."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -12,7 +12,6 @@ from tasks.campaign.campaign import SESSION, Campaign, Tolerances
 from tasks.campaign.gauge import denoise_pressure
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.derivatives import (
-    differentiate_about_offsets,
     differentiate_by_library,
     differentiate_run,
 )
@@ -88,7 +87,7 @@ def prepare_evidence(
         null = fit_hypotheses(runs, (), session_sigma, session=null.session, iterations=6)
     evidence = Evidence(
         train=tuple(differentiate_by_library(run, base, effects) for run in runs),
-        held_out=differentiate_runs(held_out, base), effects=effects,
+        held_out=tuple(held_out), effects=effects,
         tolerances=tolerances, disturbance=guess, sensors=(rho, sigma), rules=rules,
         step_sensitive=tuple(run.name for run in campaign.runs if run.name not in used),
     )  # fmt: skip
@@ -121,85 +120,20 @@ def compute_step_misfit(model: RunModel, rho: NDArray[np.float64], sigma: NDArra
     return float(np.sum(whiten_channels(change, rho, sigma, model.sampled) ** 2))
 
 
-def differentiate_at(evidence: Evidence, at: Fit, *, library: bool) -> Evidence:
+def differentiate_at(evidence: Evidence, at: Fit) -> Evidence:
     """Return the same runs with derivatives taken about a fit.
 
     Parameters
     ----------
     evidence : the runs
     at : fit, the new linearisation point
-    library : take the library's derivatives anew too; else the old ones are kept
     """
     theta, slots = at.compose()
-
-    def differentiate_again(run: RunEvidence, effects: tuple[Effect, ...]) -> RunEvidence:
-        fresh = differentiate_run(
-            run.model, run.rho, run.sigma, theta, effects, evidence.tolerances, evidence.disturbance, slots
-        )
-        if effects:
-            return fresh
-        kept = replace(fresh, library=run.library, others=run.others)
-        return set_disturbance_prior(kept, evidence.tolerances, evidence.disturbance)
-
-    return replace(
-        evidence,
-        train=tuple(differentiate_again(run, evidence.effects if library else ()) for run in evidence.train),
-        held_out=tuple(differentiate_again(run, ()) for run in evidence.held_out),
-    )
-
-
-def hold_session(evidence: Evidence, names: Sequence[str]) -> Evidence:
-    """Return the same runs with some of the session's numbers held at the vehicle's values.
-
-    Parameters
-    ----------
-    evidence : the runs
-    names : of `SESSION`
-    """
-    held = {name: UNSEEN * evidence.tolerances.session[SESSION.index(name)] for name in names}
-    return replace(evidence, tolerances=evidence.tolerances.with_session(held))
-
-
-def observe_channels(evidence: Evidence, campaign: Campaign, at: Fit) -> Evidence:
-    """Return the same runs with all channels of a campaign, without the library: to compare models, not to search.
-
-    The disturbances are a first guess: scales that were fitted without a channel would take its residual for them.
-
-    Parameters
-    ----------
-    evidence : the runs, with some of the channels
-    campaign : that they are of
-    at : fit without effects, the new linearisation point
-    """
-    rho, sigma = estimate_channel_noise(campaign)
-    seen = {name: campaign.tolerances.session[SESSION.index(name)] for name in SUSPENSION}
-    tolerances = evidence.tolerances.with_session(seen)
-    base, guess = compose_parameters((), np.empty(0), at.session)[0], Disturbance()
-    train, held_out = (
-        tuple(differentiate_run(r.model, rho, sigma, base, (), tolerances, guess) for r in runs)
-        for runs in (evidence.train, evidence.held_out)
-    )
-    return replace(
-        evidence, train=train, held_out=held_out, effects=(), tolerances=tolerances, disturbance=guess,
-        sensors=(rho, sigma),
-    )  # fmt: skip
-
-
-def differentiate_about_fit(evidence: Evidence, at: Fit) -> Evidence:
-    """Return the runs with the derivatives of the training runs about a fit and about their own offsets there.
-
-    Parameters
-    ----------
-    evidence : the runs; the derivatives by the library and those of the held-out runs are kept
-    at : fit, the new linearisation point
-    """
-    theta, slots = at.compose()
-    here = evidence.tolerances, evidence.disturbance
+    here = evidence.effects, evidence.tolerances, evidence.disturbance
     return replace(
         evidence,
         train=tuple(
-            differentiate_about_offsets(run, theta, slots, offsets, *here)
-            for run, offsets in zip(evidence.train, at.offsets, strict=True)
+            differentiate_run(run.model, run.rho, run.sigma, theta, *here, slots) for run in evidence.train
         ),
     )
 
@@ -216,9 +150,6 @@ def rescale_disturbances(evidence: Evidence, disturbance: Disturbance) -> Eviden
         evidence,
         disturbance=disturbance,
         train=tuple(set_disturbance_prior(run, evidence.tolerances, disturbance) for run in evidence.train),
-        held_out=tuple(
-            set_disturbance_prior(run, evidence.tolerances, disturbance) for run in evidence.held_out
-        ),
     )
 
 

@@ -2,17 +2,11 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 
-import numpy as np
-
-from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
-from tasks.identification.decision.disputes import ForeignCarError
-from tasks.identification.inference.noise import estimate_channel_noise
-from tasks.identification.joint.fit import JointFit, fit_jointly, measure_misfit, suggest_starts
-from tasks.identification.joint.numbers import GAIN, JointNumber, choose_numbers
-from tasks.identification.joint.stops import Stop, make_stop
+from tasks.campaign.campaign import SESSION, Campaign
+from tasks.identification.joint.fit import JointFit, fit_jointly
+from tasks.identification.joint.numbers import GAIN, JointNumber
+from tasks.identification.joint.stops import Stop
 from tasks.identification.rules import JointRules
-from tasks.surface.state import SurfaceParameters
-from tasks.vehicle.parameters import Vehicle
 
 FIRST = ("lag", "drag_area", "speed_delay")
 """Numbers that are free beside those of every car while the best start is looked for."""
@@ -72,48 +66,3 @@ def fit_first_numbers(
     """
     few = tuple(n for n in shown if not n.removable or (n.name in FIRST and not n.stands_in))
     return fit_jointly(train, few, starts)[0]
-
-
-def calibrate_gain(
-    campaign: Campaign,
-    vehicle: Vehicle,
-    surface: SurfaceParameters,
-    numbers: Sequence[JointNumber],
-    rules: JointRules,
-) -> dict[str, tuple[float, float]]:
-    """Return the numbers of the session that the file hardly knows, each with a first value and its prior's sigma.
-
-    That is the brake's gain, as a change of the file's. Mass, and wheel radius where no wheel speed was measured, are
-    held at the file's: a deceleration hardly tells them from the gain. Nothing is returned for a file that knows it.
-
-    Parameters
-    ----------
-    campaign : measured runs with their tolerances
-    vehicle, surface : the model as it stands
-    numbers : that a joint fit may move
-    rules : of the joint fit
-
-    Raises
-    ------
-    ForeignCarError
-        If the runs differ from the calibrated model by much more than their sensors' noise: single effects cannot be
-        told then.
-    """
-    if not is_gain_unknown(campaign, rules):
-        return {}
-    train = [make_stop(run, vehicle, surface, campaign.channels, rules) for run in campaign.train]
-    shown = choose_numbers(numbers, campaign, [stop.model for stop in train], rules)
-    fitted = fit_first_numbers(train, shown, suggest_starts(train))
-    noise = estimate_channel_noise(campaign)[1]
-    misfit = measure_misfit(fitted, train)
-    seen = np.flatnonzero(np.isfinite(misfit))
-    if np.any(misfit[seen] > rules.foreign_misfit * noise[seen]):
-        worst = int(seen[np.argmax(misfit[seen] / noise[seen])])
-        raise ForeignCarError(
-            f"no brake gain makes the car the model's: the {CHANNELS[worst].replace('_', ' ')} misses by"
-            f" {misfit[worst] / noise[worst]:.1f} times its noise (at most {rules.foreign_misfit:g})"
-        )
-    gain = next(number for number in shown if number.name == GAIN)
-    wheels = any(name.startswith("wheel_speed") for name in campaign.channels)
-    held = ("mass",) if wheels else ("mass", "wheel_radius")
-    return {GAIN: (fitted.by_name[GAIN], gain.sigma)} | dict.fromkeys(held, (0.0, HELD))

@@ -21,7 +21,7 @@ class Effect:
     enters : its term in words and symbols
     says : the finding in plain words, with its numbers in braces: {lag}, {anti_dive:percent}, {mass:share}, {fade:fall}
     parameters : one or two rows of the table; all 0 (or the first 0) is the plain model
-    alone : a search of single effects tries it; else only a joint fit of several numbers does
+    matters : smallest size of its first number that matters to an engineer [unit of the table]
     """
 
     name: str
@@ -30,7 +30,7 @@ class Effect:
     enters: str
     says: str
     parameters: tuple[EffectParameter, ...]
-    alone: bool = True
+    matters: float
 
     @property
     def port(self) -> str:

@@ -1,0 +1,203 @@
+"""Named effects of an explanation, fitted alone through the simulation, with their intervals."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import log
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.campaign.campaign import SESSION
+from tasks.identification.decision.answer import NamedEffect, Parameter
+from tasks.identification.decision.candidates import Candidate
+from tasks.identification.decision.forms import KNOTS, find_scanned_ranges, make_form_hypotheses
+from tasks.identification.decision.odds import Explanation, RunGrams, weigh_explanation
+from tasks.identification.decision.search import Finding, make_hypotheses, widen_session
+from tasks.identification.decision.told import OpenExplanation
+from tasks.identification.inference.fit import Fit, fit_hypotheses
+from tasks.identification.inference.hypothesis import Hypothesis
+from tasks.identification.inference.quantiles import NORMAL_QUANTILE
+from tasks.identification.rules import DecisionRules
+
+STEPS = 8
+"""Gauss-Newton steps of a last fit [1]."""
+
+
+def fit_told(finding: Finding, opened: OpenExplanation) -> Fit:
+    """Return the fit of what an explanation tells, and nothing else, through the simulation.
+
+    A form is fitted in the shape of the grammar that follows its spline best.
+
+    Parameters
+    ----------
+    finding : the runs and what was fitted to them
+    opened : the explanation
+    """
+    kept = keep_members(opened.explanation, opened.told)
+    evidence, parts = finding.evidence, make_hypotheses(kept, finding.evidence, finding.fitted)
+    sigma = widen_session(kept, evidence.session_sigma)
+
+    def fit(hypotheses: tuple[Hypothesis, ...]) -> Fit:
+        return fit_hypotheses(
+            evidence.train, hypotheses, sigma, session=finding.fitted.session, iterations=STEPS
+        )
+
+    ranges = find_scanned_ranges(evidence.train)
+    trials = [parts]
+    for i, part in enumerate(parts):
+        if part.effect_class == "form":
+            member = next(m for m in opened.told if m.name == part.name)
+            places = kept.find_places(member)
+            grid = np.linspace(*ranges[part.variable], KNOTS)
+            shapes = make_form_hypotheses(
+                part.port, part.variable, grid, kept.values[places], kept.errors[places]
+            )
+            trials = [(*parts[:i], shape, *parts[i + 1 :]) for shape in shapes]
+    return min((fit(trial) for trial in trials), key=lambda fitted: fitted.objective)
+
+
+def keep_members(explanation: Explanation, members: Sequence[Candidate]) -> Explanation:
+    """Return an explanation with some of its members alone, at the same values.
+
+    Parameters
+    ----------
+    explanation : with all members
+    members : those that are kept
+    """
+    places = [explanation.find_places(m) for m in explanation.members]
+    kept = [
+        (m, s, c)
+        for m, s, c in zip(explanation.members, places, explanation.spreads, strict=True)
+        if m in members
+    ]
+    take = np.concatenate(
+        [np.empty(0, dtype=np.int64), *(np.arange(s.start, s.stop) for _, s, _ in kept)]
+    ).astype(int)
+    return replace(
+        explanation, members=tuple(m for m, *_ in kept), values=explanation.values[take],
+        errors=explanation.errors[take], spreads=tuple(c for *_, c in kept),
+    )  # fmt: skip
+
+
+def name_members(opened: OpenExplanation, grams: RunGrams, fitted: Fit | None) -> list[NamedEffect]:
+    """Return what an explanation tells in the form in which the verdict reports it, what gains most first.
+
+    Parameters
+    ----------
+    opened : the explanation
+    grams : what the runs say
+    fitted : fit of what it tells; None to report the values of the explanation
+    """
+    named = []
+    for member in opened.told:
+        rest = [m for m in opened.explanation.members if m is not member]
+        without = weigh_explanation(grams, rest)
+        score = opened.explanation.log_odds - (0.0 if without is None else without.log_odds)
+        gain = opened.explanation.gain - (0.0 if without is None else without.gain)
+        spread = opened.explanation.spreads[opened.explanation.members.index(member)]
+        name, parameters = _list_parameters(member, opened.explanation, fitted)
+        named.append(
+            NamedEffect(
+                name=name,
+                effect_class=member.effect_class,
+                port=member.port,
+                variable=member.variable,
+                parameters=parameters,
+                score=score,
+                gain=gain,
+                spread=spread,
+            )  # fmt: skip
+        )
+    return sorted(named, key=lambda effect: -effect.gain)
+
+
+def _list_parameters(
+    member: Candidate, explanation: Explanation, fitted: Fit | None
+) -> tuple[str, tuple[Parameter, ...]]:
+    """Return the name and the parameters of a member: of the last fit, with the errors of the explanation."""
+    places = explanation.find_places(member)
+    value, error = explanation.values[places], explanation.errors[places]
+    if member.effect is None:
+        return _list_form_parameters(member, value, error, fitted)
+    first = member.effect.parameters[0]
+    values, errors = np.array([value[0]]), np.array([error[0]])
+    if fitted is not None and first.name not in SESSION:
+        values, errors = _find_part(member.name, fitted)
+        errors = np.concatenate((error, errors[1:]))
+    if fitted is not None and first.name in SESSION:
+        values = np.array([fitted.session[SESSION.index(first.name)]])
+    rows = member.effect.parameters[: len(values)]
+    return member.name, tuple(
+        _make_parameter(row.name, v, e, row.lower, row.upper, row.unit)
+        for row, v, e in zip(rows, values, errors, strict=True)
+    )
+
+
+def _list_form_parameters(
+    member: Candidate, value: NDArray[np.float64], error: NDArray[np.float64], fitted: Fit | None
+) -> tuple[str, tuple[Parameter, ...]]:
+    """Return a form's name and coefficients, or the values at its knots where it was not fitted."""
+    part = (
+        None
+        if fitted is None
+        else next((p for p in fitted.parts if p.port == member.port and p.effect_class == "form"), None)
+    )
+    if part is None or fitted is None:
+        return member.name, tuple(
+            _make_parameter(f"knot_{k + 1}", v, e, -np.inf, np.inf, "")
+            for k, (v, e) in enumerate(zip(value, error, strict=True))
+        )
+    values, errors = _find_part(part.name, fitted)
+    # the shape's own errors know nothing of the small errors everywhere: the spline's do
+    wider = max(1.0, float(np.median(error)) / max(float(np.median(errors)), 1e-300))
+    return part.name, tuple(
+        _make_parameter(n, v, wider * e, low, high, u)
+        for n, v, e, low, high, u in zip(
+            part.names, values, errors, part.lower, part.upper, part.units, strict=True
+        )
+    )
+
+
+def _find_part(name: str, fitted: Fit) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return values and standard errors of a part of a fit."""
+    at = 0
+    for part in fitted.parts:
+        own = slice(at, at + len(part.names))
+        if part.name == name:
+            return fitted.values[own], np.sqrt(np.maximum(np.diag(fitted.covariance)[own], 0.0))
+        at = own.stop
+    raise KeyError(name)
+
+
+def _make_parameter(
+    name: str, value: float, error: float, lower: float, upper: float, unit: str
+) -> Parameter:
+    reach = NORMAL_QUANTILE * float(error)
+    return Parameter(
+        name=name, value=float(value), ci_low=float(np.clip(value - reach, lower, upper)),
+        ci_high=float(np.clip(value + reach, lower, upper)), lower=float(lower), upper=float(upper), unit=unit,
+    )  # fmt: skip
+
+
+def find_detectable_sizes(finding: Finding, rules: DecisionRules) -> dict[str, float]:
+    """Return the smallest first parameter of each effect that would be named at the odds of a name.
+
+    Infinite where the bounds exclude that size [unit of the parameter].
+
+    Parameters
+    ----------
+    finding : what the runs say
+    rules : the odds
+    """
+    sizes: dict[str, float] = {}
+    for candidate in finding.grams.columns.candidates:
+        if candidate.effect is None or candidate.name in sizes:
+            continue
+        alone = weigh_explanation(finding.grams, [candidate], spread=False)
+        if alone is None:
+            continue
+        error = float(alone.errors[0])
+        needed = log(rules.named_odds) - candidate.log_prior + log(max(candidate.slab / error, 1.0))
+        size = max(np.sqrt(2.0 * needed) * error, candidate.matters + NORMAL_QUANTILE * error)
+        sizes[candidate.name] = size if size <= max(candidate.upper, -candidate.lower) else np.inf
+    return sizes

@@ -1,0 +1,348 @@
+"""Odds of explanations: the evidence of every set of candidates from one small matrix a run.
+
+About a linearisation point the misfit of run i is m_i - 2 b_i'x + x'H_i x, with the run's offsets and disturbances
+integrated out. With Gaussian priors the evidence of an explanation is a determinant and a quadratic form (MacKay 1992,
+doi:10.1162/neco.1992.4.3.415). What differs from run to run in the direction of an explanation is a random effect: its
+variance is that of DerSimonian and Laird (1986, doi:10.1016/0197-2456(86)90046-2), and runs that disagree count less.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf, log
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_solve, cholesky, solve_triangular
+
+from tasks.identification.decision.candidates import Candidate, Columns
+
+ALONG_ROAD = {"longitudinal_force", "brake_torque"}
+"""Ports whose forces a car feels alike."""
+PORT_OF_NUMBER = {
+    "retuned_pressure_gain": "brake_torque", "retuned_pitch_gain": "pitch_moment",
+    "retuned_suspension_damping": "suspension_force", "retuned_suspension_stiffness": "suspension_force",
+    "retuned_friction_level": "friction", "retuned_wet_friction": "friction", "retuned_snow_friction": "friction",
+    "retuned_grade": "longitudinal_force",
+}  # fmt: skip
+"""Port at which a number of the vehicle's file acts."""
+SAME_VARIABLE = {"speed": "wheel_speed", "wheel_speed": "speed"}
+"""Variables that differ by the slip of the tyres alone."""
+FEWEST = 3
+"""Runs that must inform a direction for their scatter to say something [1]."""
+INFORMED = 1e-6
+"""Share of the best informed run's information from which a run informs a direction [1]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunGrams:
+    """What the runs say about all columns, about a linearisation point.
+
+    Parameters
+    ----------
+    information : float64 [R, C, C] of every run, its offsets and disturbances integrated out
+    score : float64 [R, C] the same of its residual
+    centre : float64 [C] values of the columns' numbers about which it is linearised
+    columns : meaning of the columns
+    """
+
+    information: NDArray[np.float64]
+    score: NDArray[np.float64]
+    centre: NDArray[np.float64]
+    columns: Columns
+
+
+@dataclass(frozen=True, kw_only=True)
+class Explanation:
+    """A set of candidates with what the runs say about it.
+
+    Parameters
+    ----------
+    members : the candidates; none is the model with its small errors alone
+    log_odds : logarithm of the odds against no member, priors included [1]
+    gain : rise of the log likelihood against no member, without spread of the runs [1]
+    values : float64 [K] of each member's columns, one after the other [their units]
+    errors : float64 [K] their standard deviations
+    spreads : standard deviation from run to run of each member, over its size [1]
+    session : float64 [7] numbers of the session
+    everything : float64 [C] mean of every column's number; 0 where it takes no part
+    """
+
+    members: tuple[Candidate, ...]
+    log_odds: float
+    gain: float
+    values: NDArray[np.float64]
+    errors: NDArray[np.float64]
+    spreads: tuple[float, ...]
+    session: NDArray[np.float64]
+    everything: NDArray[np.float64]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the names of the members."""
+        return tuple(member.name for member in self.members)
+
+    def find_places(self, member: Candidate) -> slice:
+        """Return where a member's numbers stand in ``values``.
+
+        Parameters
+        ----------
+        member : one of the members
+        """
+        at = 0
+        for other in self.members:
+            if other is member:
+                break
+            at += len(other.columns)
+        return slice(at, at + len(member.columns))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Prior:
+    """Columns of one explanation with their priors: float64 or int64 [K] each, and the members' places among them."""
+
+    columns: NDArray[np.int64]
+    precision: NDArray[np.float64]
+    centre: NDArray[np.float64]
+    places: tuple[NDArray[np.int64], ...]
+
+
+def weigh_explanation(
+    grams: RunGrams, members: Sequence[Candidate], *, spread: bool = True
+) -> Explanation | None:
+    """Return what the runs say about an explanation; None where a number would lie beyond its bounds.
+
+    Parameters
+    ----------
+    grams : of the runs
+    members : of the explanation
+    spread : count what differs from run to run
+    """
+    prior, nobody = _arrange(grams, members), _arrange(grams, ())
+    information = grams.information[:, prior.columns[:, None], prior.columns[None, :]]
+    score = grams.score[:, prior.columns]
+    total, right = information.sum(axis=0), score.sum(axis=0)
+    mean, factor, evidence = _integrate(total, right, prior)
+    plain = _integrate(*_take(grams, nobody), nobody)[2]
+    gain, spreads = evidence - plain, [0.0] * len(members)
+    if spread and members:
+        left = score - information @ mean
+        directions = []
+        for i, places in enumerate(prior.places):
+            along = np.zeros(len(mean))
+            along[places] = mean[places] + prior.centre[places]
+            size = np.einsum("i,rij,j->r", along, information, along)
+            spreads[i] = float(np.sqrt(estimate_spread(size, left @ along)))
+            directions.append(along * spreads[i])
+        total, right = _admit_spread(information, score, np.array(directions).T)
+        mean, factor, evidence = _integrate(total, right, prior)
+        kept = np.arange(len(nobody.columns))
+        gain_with_spread = evidence - _integrate(total[np.ix_(kept, kept)], right[kept], nobody)[2]
+    else:
+        gain_with_spread = gain
+    at = np.concatenate([np.empty(0, dtype=np.int64), *prior.places]).astype(np.int64)
+    values = (mean + prior.centre)[at]
+    bounds = [(m.lower, m.upper) for m in members for _ in m.columns]
+    if any(not low - 1e-12 <= x <= high + 1e-12 for x, (low, high) in zip(values, bounds, strict=True)):
+        return None
+    inverse = solve_triangular(factor, np.eye(len(mean)), lower=True, check_finite=False)
+    everything = np.zeros(grams.columns.count)
+    everything[prior.columns] = mean + prior.centre
+    return Explanation(
+        members=tuple(members), log_odds=gain_with_spread + sum(m.log_prior for m in members), gain=gain, values=values,
+        errors=np.sqrt(np.einsum("ij,ij->j", inverse, inverse))[at], spreads=tuple(spreads),
+        session=everything[-7:], everything=everything,
+    )  # fmt: skip
+
+
+def search_explanations(grams: RunGrams, *, most: int, width: int, spread: bool = True) -> list[Explanation]:
+    """Return explanations of up to some members, the best first; no member at all is always among them.
+
+    Sets grow by one candidate at a time from the best of those before (beam search).
+
+    Parameters
+    ----------
+    grams : of the runs
+    most : members of an explanation
+    width : sets of each size that grow further
+    spread : count what differs from run to run
+    """
+    found = {(): weigh_explanation(grams, ())}
+    beam: list[tuple[int, ...]] = [()]
+    candidates = grams.columns.candidates
+    seen = np.einsum("rii->i", grams.information)
+    shown = [j for j, c in enumerate(candidates) if float(seen[list(c.columns)].max()) * c.slab**2 > 1.0]
+    for _ in range(most):
+        grown: dict[tuple[int, ...], Explanation] = {}
+        for known in beam:
+            for j in shown:
+                candidate, key = candidates[j], tuple(sorted((*known, j)))
+                if key in grown or any(_exclude_each_other(candidate, candidates[i]) for i in known):
+                    continue
+                weighed = weigh_explanation(grams, [candidates[i] for i in key], spread=spread)
+                if weighed is not None:
+                    grown[key] = weighed
+        found |= grown
+        beam = sorted(grown, key=lambda key: -grown[key].log_odds)[:width]
+    return sorted((e for e in found.values() if e is not None), key=lambda e: -e.log_odds)
+
+
+def _exclude_each_other(one: Candidate, other: Candidate) -> bool:
+    """Whether two candidates are the same number, two forms, or a form and what it can stand for."""
+    if one.base >= 0 and other.base >= 0:
+        return one.base == other.base
+    if one.base < 0 and other.base < 0:
+        return True
+    form, known = (one, other) if one.base < 0 else (other, one)
+    return can_stand_for(form, known)
+
+
+def can_stand_for(form: Candidate, known: Candidate) -> bool:
+    """Return whether a form can take the place of an effect or number: it acts where that does, by the same variable.
+
+    What holds the car back at its wheels and what holds its body back are one force along the road, and a number of
+    the file is a constant at its port.
+
+    Parameters
+    ----------
+    form : the form
+    known : of the library
+    """
+    port = PORT_OF_NUMBER.get(known.name, known.port)
+    at_port = form.port == port or {form.port, port} <= ALONG_ROAD
+    return at_port and known.variable in (form.variable, "constant", SAME_VARIABLE.get(form.variable))
+
+
+def compare_explanations(
+    grams: RunGrams, one: Explanation, other: Explanation, signature_error: float
+) -> float:
+    """Return the logarithm of the odds of one explanation against another [1].
+
+    What the runs disagree about on the line from one to the other counts as a random effect there: two explanations
+    that half of the runs decide either way are not told apart, however much each run gains. No model has the signature
+    of an effect exactly as the car does; what its relative error leaves over is no evidence (model discrepancy, Kennedy
+    and O'Hagan 2001, doi:10.1111/1467-9868.00294).
+
+    Parameters
+    ----------
+    grams : of the runs
+    one, other : the explanations
+    signature_error : relative error of the signature of an effect [1]
+    """
+    used = np.flatnonzero((one.everything != 0.0) | (other.everything != 0.0))
+    information = grams.information[:, used[:, None], used[None, :]]
+    along = (other.everything - one.everything)[used]
+    left = grams.score[:, used] - information @ (one.everything - grams.centre)[used]
+    size, pull = np.einsum("i,rij,j->r", along, information, along), left @ along
+    plain = float(np.sum(0.5 * size - pull))
+    spread = estimate_spread(size, pull)
+    informed = size > 0.0
+    weight = np.zeros(len(size))
+    weight[informed] = 1.0 / (1.0 / size[informed] + spread)
+    place = np.divide(pull, size, out=np.zeros(len(size)), where=informed)
+    robust = float(np.sum(weight * (0.5 - place)))
+    prior = sum(m.log_prior for m in one.members) - sum(m.log_prior for m in other.members)
+    odds = one.gain - other.gain + prior - plain + robust
+    return temper_odds(odds, max(one.gain, other.gain), signature_error)
+
+
+def temper_odds(log_odds: float, gain: float, signature_error: float) -> float:
+    """Return the logarithm of odds without what an error of the signature alone may make [1].
+
+    Parameters
+    ----------
+    log_odds : by the runs' noise alone [1]
+    gain : rise of the log likelihood by the signature [1]
+    signature_error : its relative error in a model of the car [1]
+    """
+    return log_odds / (1.0 + signature_error**2 * max(gain, 0.0))
+
+
+def estimate_spread(size: NDArray[np.float64], pull: NDArray[np.float64]) -> float:
+    """Return the variance from run to run of the amplitude of a direction (DerSimonian and Laird) [1].
+
+    Parameters
+    ----------
+    size : float64 [R] what each run says about an amplitude of one
+    pull : float64 [R] its score, so that pull / size is its own estimate
+    """
+    informed = size > INFORMED * max(float(size.max()), 1e-300)
+    if np.count_nonzero(informed) < FEWEST:
+        return 0.0
+    weight, own = size[informed], pull[informed] / size[informed]
+    sum_of_weights = float(weight.sum())
+    mean = float(weight @ own) / sum_of_weights
+    heterogeneity = float(weight @ (own - mean) ** 2)
+    scale = sum_of_weights - float(weight @ weight) / sum_of_weights
+    return max(0.0, (heterogeneity - (len(own) - 1)) / scale) if scale > 0.0 else 0.0
+
+
+def find_odds(log_odds: float) -> float:
+    """Return odds from their logarithm, without overflow [1].
+
+    Parameters
+    ----------
+    log_odds : logarithm of the odds [1]
+    """
+    return float(np.exp(min(log_odds, log(1e12)))) if log_odds > -inf else 0.0
+
+
+def _arrange(grams: RunGrams, members: Sequence[Candidate]) -> _Prior:
+    """Return the columns of an explanation: those of every number, and those of its members instead or besides."""
+    base = grams.columns
+    columns, deviations, centre = base.base.copy(), base.spike.copy(), grams.centre[base.base].copy()
+    further: list[int] = []
+    wide: list[float] = []
+    places = []
+    for member in members:
+        if member.base < 0:
+            begin = len(columns) + len(further)
+            places.append(np.arange(begin, begin + len(member.columns)))
+            further += member.columns
+            wide += [member.slab] * len(member.columns)
+        else:
+            (columns[member.base],), deviations[member.base] = member.columns, member.slab
+            centre[member.base] = grams.centre[member.columns[0]]
+            places.append(np.array([member.base]))
+    columns = np.concatenate((columns, np.array(further, dtype=np.int64)))
+    return _Prior(
+        columns=columns,
+        precision=np.concatenate((deviations, wide)) ** -2.0,
+        centre=np.concatenate((centre, grams.centre[further])),
+        places=tuple(places),
+    )
+
+
+def _take(grams: RunGrams, prior: _Prior) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return information and score of all runs for the columns of an explanation."""
+    total = grams.information[:, prior.columns[:, None], prior.columns[None, :]].sum(axis=0)
+    return total, grams.score[:, prior.columns].sum(axis=0)
+
+
+def _integrate(
+    information: NDArray[np.float64], score: NDArray[np.float64], prior: _Prior
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Return mean about the linearisation point, Cholesky factor of the precision, and log evidence."""
+    k = len(score)
+    precision, centre = prior.precision[:k], prior.centre[:k]
+    inner = information + np.diag(precision)
+    factor = cholesky(0.5 * (inner + inner.T), lower=True, check_finite=False)
+    right = score - precision * centre
+    mean = cho_solve((factor, True), right, check_finite=False)
+    evidence = 0.5 * float(right @ mean) - float(np.log(np.diag(factor)).sum())
+    evidence += 0.5 * float(np.log(precision).sum()) - 0.5 * float(precision @ centre**2)
+    return mean, factor, evidence
+
+
+def _admit_spread(
+    information: NDArray[np.float64], score: NDArray[np.float64], directions: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return information and score of all runs where each may lie off along the directions, float64 [K, D]."""
+    total, right = information.sum(axis=0), score.sum(axis=0)
+    told = directions[:, np.any(directions != 0.0, axis=0)]
+    if not told.size:
+        return total, right
+    seen = information @ told
+    inner = np.linalg.inv(np.eye(told.shape[1]) + told.T @ seen)
+    total = total - np.einsum("rik,rkl,rjl->ij", seen, inner, seen, optimize=True)
+    right = right - np.einsum("rik,rkl,rl->i", seen, inner, score @ told, optimize=True)
+    return total, right

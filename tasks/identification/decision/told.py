@@ -1,0 +1,107 @@
+"""What an explanation tells: members large enough to matter, and which explanations the runs leave open."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import log
+
+import numpy as np
+from scipy.special import ndtri
+
+from tasks.identification.decision.candidates import Candidate
+from tasks.identification.decision.odds import Explanation, RunGrams, can_stand_for, compare_explanations, temper_odds
+from tasks.identification.rules import DecisionRules
+
+Told = frozenset[str]
+"""Names of the members that an explanation tells."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OpenExplanation:
+    """An explanation that the runs leave open.
+
+    Parameters
+    ----------
+    explanation : the best of those that tell the same
+    told : its members that are told, those that gain most first
+    log_odds : logarithm of its odds against the first that is open; 0 for that one [1]
+    """
+
+    explanation: Explanation
+    told: tuple[Candidate, ...]
+    log_odds: float
+
+    @property
+    def names(self) -> Told:
+        """Return the names of what it tells."""
+        return frozenset(member.name for member in self.told)
+
+
+def tell_members(explanation: Explanation, rules: DecisionRules) -> tuple[Candidate, ...]:
+    """Return the members that are larger than what matters, at the odds of a name.
+
+    Parameters
+    ----------
+    explanation : its members with values and errors
+    rules : the odds
+    """
+    reach = float(ndtri(rules.named_odds / (1.0 + rules.named_odds)))
+    told = []
+    for member in explanation.members:
+        places = explanation.find_places(member)
+        certain = np.abs(explanation.values[places]) - reach * explanation.errors[places]
+        if float(certain.max()) > member.matters:
+            told.append(member)
+    return tuple(told)
+
+
+def list_open_explanations(
+    grams: RunGrams, explanations: Iterable[Explanation], rules: DecisionRules
+) -> list[OpenExplanation]:
+    """Return the explanations that the runs leave open, the first being the one that they tell.
+
+    Explanations that tell the same count once, by the best of them. The simplest of those within the odds of a name is
+    the first: a member whose odds do not speak for it is not told. One that tells all that the first does and more is
+    no other explanation.
+
+    Parameters
+    ----------
+    grams : of the runs
+    explanations : the best first
+    rules : the odds
+    """
+    ranked = list(explanations)[: rules.most_compared]
+    by_told: dict[Told, OpenExplanation] = {}
+    for explanation in ranked:
+        told = tell_members(explanation, rules)
+        against = -compare_explanations(grams, ranked[0], explanation, rules.signature_error)
+        # neither the runs that disagree about a member, nor those that disagree between two explanations, may be for it
+        against = min(against, temper_odds(explanation.log_odds - ranked[0].log_odds, ranked[0].gain, rules.signature_error))
+        known = by_told.get(frozenset(m.name for m in told))
+        if known is None or against > known.log_odds:
+            found = OpenExplanation(explanation=explanation, told=told, log_odds=against)
+            by_told[found.names] = found
+    span = log(rules.named_odds)
+    most = max(found.log_odds for found in by_told.values())
+    within = [found for found in by_told.values() if found.log_odds >= most - span]
+    best = max(within, key=lambda found: found.log_odds)
+    simplest = min(
+        (f for f in within if f.names <= best.names or _has_form(best) > _has_form(f)),
+        key=lambda found: (_has_form(found), len(found.names), -found.log_odds),
+    )
+    others = [f for f in within if not f.names >= simplest.names and not _holds_again(f, simplest)]
+    others.sort(key=lambda found: -found.log_odds)
+    return [
+        OpenExplanation(explanation=f.explanation, told=f.told, log_odds=f.log_odds - simplest.log_odds)
+        for f in (simplest, *others)
+    ]
+
+
+def _has_form(opened: OpenExplanation) -> bool:
+    return any(member.effect is None for member in opened.told)
+
+
+def _holds_again(other: OpenExplanation, first: OpenExplanation) -> bool:
+    """Whether a form of another explanation is what the first names, without its law."""
+    forms = [member for member in other.told if member.effect is None]
+    known = [member for member in first.told if member.effect is not None]
+    return any(can_stand_for(form, member) for form in forms for member in known)
