@@ -8,13 +8,13 @@ everywhere, which every model of another car has, are therefore no discovery.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf, log, nan
+from math import log, nan
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.campaign import SESSION
-from tasks.identification.decision.forms import KEYS, KNOTS, PORT_STEP
+from tasks.identification.decision.forms import FORM_BOUND, KEYS, KNOTS, PORT_STEP
 from tasks.identification.inference.derivatives import list_second_values
 from tasks.identification.inference.forward import RunModel
 from tasks.identification.joint.numbers import reaches_limit, saturates_tyres
@@ -159,7 +159,8 @@ def list_columns(
         Candidate(
             name=f"form {port}({variable})", effect_class="form", port=port, variable=variable, effect=None, second=nan,
             columns=tuple(range(splines + KNOTS * i, splines + KNOTS * (i + 1))), base=-1,
-            slab=rules.form_width * PORT_STEP[port], lower=-inf, upper=inf, matters=PORT_STEP[port],
+            slab=rules.form_width * PORT_STEP[port], lower=-FORM_BOUND * PORT_STEP[port],
+            upper=FORM_BOUND * PORT_STEP[port], matters=PORT_STEP[port],
             log_prior=-log(CLASSES * len(KEYS)) - log(rules.form_odds),
         )
         for i, (port, variable) in enumerate(KEYS)

@@ -43,6 +43,8 @@ RANGE = {
 """Range over which a variable is scanned, where no run of a campaign goes further [unit of the variable]."""
 FURTHER = 1.05
 """Share of a range beyond which a variable goes further, and not only its noise [1]."""
+FORM_BOUND = 100.0
+"""Largest value of a form, over the size that matters at its port [1]."""
 SHAPES_TRIED = 2
 """Shapes of the grammar that are fitted through the simulation for a spline [1]."""
 
@@ -148,7 +150,7 @@ def make_spline_hypothesis(
     return Hypothesis(
         name=f"form {port}({variable})", effect_class="form", port=port, variable=variable,
         names=tuple(f"knot_{k + 1}" for k in range(len(grid))), units=(PORT_UNITS[port],) * len(grid),
-        lower=-100.0 * step, upper=100.0 * step, step=step, start=start.copy(), build=build_slots,
+        lower=-FORM_BOUND * step, upper=FORM_BOUND * step, step=step, start=start.copy(), build=build_slots,
     )  # fmt: skip
 
 
@@ -221,6 +223,6 @@ def _make_form_hypothesis(
     step = np.full(k, PORT_STEP[port])
     return Hypothesis(
         name=name_form(port, variable, name, scale), effect_class="form", port=port, variable=variable,
-        names=("a", "b")[:k], units=(PORT_UNITS[port],) * k, lower=-100.0 * step, upper=100.0 * step,
+        names=("a", "b")[:k], units=(PORT_UNITS[port],) * k, lower=-FORM_BOUND * step, upper=FORM_BOUND * step,
         step=step, start=start.copy(), build=build_slots,
     )  # fmt: skip

@@ -18,6 +18,7 @@ from tasks.identification.inference.fit import Fit, fit_hypotheses
 from tasks.identification.inference.hypothesis import Hypothesis
 from tasks.identification.inference.quantiles import NORMAL_QUANTILE
 from tasks.identification.rules import DecisionRules
+from tasks.vehicle.effects.ports import PORT_UNITS
 
 STEPS = 8
 """Gauss-Newton steps of a last fit [1]."""
@@ -144,7 +145,7 @@ def _list_form_parameters(
     )
     if part is None or fitted is None:
         return member.name, tuple(
-            _make_parameter(f"knot_{k + 1}", v, e, -np.inf, np.inf, "")
+            _make_parameter(f"knot_{k + 1}", v, e, member.lower, member.upper, PORT_UNITS[member.port])
             for k, (v, e) in enumerate(zip(value, error, strict=True))
         )
     values, errors = _find_part(part.name, fitted)

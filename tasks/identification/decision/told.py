@@ -8,7 +8,13 @@ import numpy as np
 from scipy.special import ndtri
 
 from tasks.identification.decision.candidates import Candidate
-from tasks.identification.decision.odds import Explanation, RunGrams, can_stand_for, compare_explanations, temper_odds
+from tasks.identification.decision.odds import (
+    Explanation,
+    RunGrams,
+    can_stand_for,
+    compare_explanations,
+    temper_odds,
+)
 from tasks.identification.rules import DecisionRules
 
 Told = frozenset[str]
@@ -75,7 +81,10 @@ def list_open_explanations(
         told = tell_members(explanation, rules)
         against = -compare_explanations(grams, ranked[0], explanation, rules.signature_error)
         # neither the runs that disagree about a member, nor those that disagree between two explanations, may be for it
-        against = min(against, temper_odds(explanation.log_odds - ranked[0].log_odds, ranked[0].gain, rules.signature_error))
+        against = min(
+            against,
+            temper_odds(explanation.log_odds - ranked[0].log_odds, ranked[0].gain, rules.signature_error),
+        )
         known = by_told.get(frozenset(m.name for m in told))
         if known is None or against > known.log_odds:
             found = OpenExplanation(explanation=explanation, told=told, log_odds=against)
