@@ -107,7 +107,7 @@ def name_members(opened: OpenExplanation, grams: RunGrams, fitted: Fit | None) -
                 score=score,
                 gain=gain,
                 spread=spread,
-            )  # fmt: skip
+            )
         )
     return sorted(named, key=lambda effect: -effect.gain)
 

@@ -98,7 +98,7 @@ def judge_runs(
     tried = _list_tried(finding, first)
     reasons = tell_open_explanations(opened, finding.explanations, rules)
     if not named:
-        reasons += say_not_named(tried, finding.best, tell_members(finding.best, rules), rules)
+        reasons += say_not_named(tried, finding.best, tell_members(finding.grams, finding.best, rules), rules)
     reasons += [tell_driven(drive)] if driven else []
     reasons += tell_log_faults(campaign, named, [rival.name for _, rival in rivals])
     reasons += tell_present_effects(vehicle)
