@@ -34,6 +34,7 @@ def braked_clips() -> dict[str, StudyClip]:
     draw, found = np.random.Generator(np.random.Philox(5)), {}
     while len(found) < 2:
         clip = draw_braked_clip(draw)
+        assert not judge(clip)
         found.setdefault(clip.rides[2], clip)
     return found
 
@@ -51,7 +52,6 @@ def test_an_injected_error_breaks_a_law_that_names_its_place_and_size(
     braked_clips: dict[str, StudyClip], name: str, mode: str
 ) -> None:
     clip = braked_clips[mode]
-    assert not judge(clip)
     worst = judge(clip, ERRORS[name](clip))[0]
     assert worst.excess > 2
     assert worst.size > 0
