@@ -176,10 +176,11 @@ def list_abandoned(folder: Path, names: Container[str]) -> list[Path]:
     names : that the whole ones would have
     """
     halves = ((path, _HALF.fullmatch(path.name)) for path in (folder.iterdir() if folder.is_dir() else ()))
-    return [path for path, half in halves if half and half[1] in names and not _is_alive(int(half[2]))]
+    return [path for path, half in halves if half and half[1] in names and not is_alive(int(half[2]))]
 
 
-def _is_alive(process: int) -> bool:
+def is_alive(process: int) -> bool:
+    """Whether a process of this machine has that number."""
     try:
         os.kill(process, 0)
     except (ProcessLookupError, OverflowError):
