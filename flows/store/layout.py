@@ -15,6 +15,7 @@ from catalogs.documents import read_json_document
 from flows.store.arrays import arrays_of
 
 STAGED_TABLES = ("ticks", "frames")
+STAGING = ".staging"
 PARTIAL = ".musync-partial"
 """End of the name of a file that is being written."""
 _HALF = re.compile(rf"(.+)\.(\d+)(?:-\d+)?{re.escape(PARTIAL)}", re.DOTALL)
@@ -66,7 +67,7 @@ class Layout:
     @property
     def staging(self) -> Path:
         """Clips that are made but not yet sealed into the dataset."""
-        return self.root / ".staging"
+        return self.root / STAGING
 
     def receipt(self, clip_id: str) -> Path:
         """Written last for each clip: where it exists, the clip is complete."""
