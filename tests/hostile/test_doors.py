@@ -151,12 +151,13 @@ def test_the_password_stands_in_no_command_line_and_nothing_of_the_folder_is_run
     assert not (served.folder / "trapped").exists()
 
 
-def test_the_server_ends_with_a_schedule_that_is_killed(served):
+def test_the_server_ends_with_a_schedule_that_is_killed_and_leaves_no_password(served):
     family = served.process.children(recursive=True)
     assert any("flows.running.prefect_server" in process.cmdline() for process in family)
     served.process.send_signal(signal.SIGKILL)
     _, alive = psutil.wait_procs(family, timeout=20)
     assert not [process.cmdline() for process in alive]
+    assert not [*served.home.glob("password-*")]
 
 
 def test_a_home_of_somebody_else_is_refused(tmp_path, monkeypatch):
