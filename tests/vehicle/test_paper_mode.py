@@ -13,7 +13,7 @@ from tasks.surface.weather import Weather, surface_state
 from tasks.vehicle import reference
 from tasks.vehicle.paper import paper_mode
 from tasks.vehicle.paper.low_speed import BrakedStop
-from tasks.vehicle.paper.paper_mode import LEAST_PASSES, SETTLED, StepGrid, run_paper_mode, simulate_body
+from tasks.vehicle.paper.paper_mode import LITERAL_PASSES, SETTLED, StepGrid, run_paper_mode, simulate_body
 from tasks.vehicle.paper.wheels import build_wheels, simulate_stop
 from tasks.vehicle.parameters import compute_surface_response
 from tests.vehicle.conftest import HUMP, command
@@ -167,7 +167,7 @@ def test_passes_go_on_until_the_station_settles(vehicle, monkeypatch):
         ).last_change
 
     assert change(10.6 / 3.6, False, brake, hump) < SETTLED
-    monkeypatch.setattr(paper_mode, "MOST_PASSES", LEAST_PASSES)
+    monkeypatch.setattr(paper_mode, "MOST_PASSES", LITERAL_PASSES)
     assert change(10.6 / 3.6, False, brake, hump) > 1e-3
     assert change(40 / 3.6, True, command().profile, HUMP) < SETTLED
 

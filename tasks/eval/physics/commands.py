@@ -16,7 +16,7 @@ LAST_PASS = 2e-6
 """Way between the last two passes over a road feature [m]."""
 
 LITERAL_PASS = 1e-2
-"""The same where the published steps are taken literally: they swing about a stop, and no pass settles them [m]."""
+"""The same where the published steps are taken literally: they swing about a stop, and five passes are all [m]."""
 
 
 def command_laws(ticks: Mapping[str, Floats], facts: Mapping[str, Any]) -> list[Law | None]:
