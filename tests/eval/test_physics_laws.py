@@ -58,6 +58,14 @@ def test_an_injected_error_breaks_a_law_that_names_its_place_and_size(
     assert worst.of in worst.columns
 
 
+@pytest.mark.parametrize("car", ["multibody-grown", "bmw-m8"])
+def test_a_wheel_inertia_that_is_five_per_cent_off_breaks_the_wheels_torque_balance(car: str) -> None:
+    clip = make_clip(STOP, load_vehicle(car), "coupled", duration_s=6.0)
+    assert not judge(clip)
+    broken = {law.name: law.size for law in judge(clip, ERRORS["wheel inertia 5 % high"](clip))}
+    assert broken["wheel torque balance, f"] == pytest.approx(1 - 1 / 1.05, rel=0.1)
+
+
 @pytest.mark.parametrize("effect", ["relaxation_length", "fade"])
 def test_a_law_that_an_effect_takes_away_is_named_and_all_others_are_judged(effect: str) -> None:
     vehicle = load_vehicle("multibody-staged")
