@@ -47,14 +47,14 @@ def tell_verdict(
     rivals : that cannot be told from them
     library : effects that may be named
     error, manoeuvres : on runs to which no number was fitted
-    suggested : what the training runs show and the held-out runs neither confirm nor contradict, if nothing is named
+    suggested : the best candidate, if nothing is named
     misses : whether the runs disagree with the model, and with what is named, by more than their noise
     own : what the vehicle's own numbers that the runs moved say of the car
     """
     if not effects and suggested is not None:
         return (
-            "These runs prove nothing that the model lacks. The training runs suggest that"
-            f" {say_effect(suggested, library)}; the held-out runs do not confirm it."
+            "These runs prove nothing that the model lacks. They suggest that"
+            f" {say_effect(suggested, library)}, at odds that are too small for a name."
         )
     if not effects:
         nothing = (
@@ -112,7 +112,9 @@ def _say_change(figures: Mapping[str, ChannelError]) -> str:
     lower = {name: e for name, e in figures.items() if e.after <= e.frozen}
     higher = {name: e for name, e in figures.items() if e.after > e.frozen}
     phrases = [f"lowers the error {_say_errors(lower, retuned=True)}"] if lower else []
-    phrases += [f"raises {'that' if lower else 'the error'} {_say_errors(higher, retuned=True)}"] if higher else []
+    phrases += (
+        [f"raises {'that' if lower else 'the error'} {_say_errors(higher, retuned=True)}"] if higher else []
+    )
     return join_phrases(phrases)
 
 
