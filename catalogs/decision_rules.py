@@ -41,6 +41,8 @@ class JointRulesEntry(CatalogueEntry):
     equal_prediction_share: Level
     same_fit_errors: Level
     wrong_number_tolerances: Level
+    rival_gain_share: Share
+    worse_limit: Level
 
 
 class DecisionRulesEntry(CatalogueEntry):

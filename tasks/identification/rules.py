@@ -36,6 +36,8 @@ class JointRules:
         good [1]
     same_fit_errors : standard errors within which the numbers of two fits are the same [1]
     wrong_number_tolerances : tolerances from which a number of the vehicle file is wrong [1]
+    rival_gain_share : share of the named number's gain from which another counts as a rival [1]
+    worse_limit : ratio of held-out errors from which a channel is worse than under the frozen model [1]
     """
 
     unknown_gain_tolerance: float
@@ -63,6 +65,8 @@ class JointRules:
     equal_prediction_share: float
     same_fit_errors: float
     wrong_number_tolerances: float
+    rival_gain_share: float
+    worse_limit: float
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,7 @@ variance is that of DerSimonian and Laird (1986, doi:10.1016/0197-2456(86)90046-
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, log
 
 import numpy as np
@@ -169,7 +169,7 @@ def search_explanations(
     spread : count what differs from run to run
     forms : try forms too
     """
-    found = {(): weigh_explanation(grams, ())}
+    found: dict[tuple[int, ...], Explanation | None] = {(): weigh_explanation(grams, ())}
     beam: list[tuple[int, ...]] = [()]
     candidates = grams.columns.candidates
     seen = np.einsum("rii->i", grams.information)  # of all runs
@@ -264,6 +264,29 @@ def temper_odds(log_odds: float, gain: float, signature_error: float) -> float:
     signature_error : its relative error in a model of the car [1]
     """
     return log_odds / (1.0 + signature_error**2 * max(gain, 0.0))
+
+
+def keep_members(explanation: Explanation, members: Sequence[Candidate]) -> Explanation:
+    """Return an explanation with some of its members alone, at the same values.
+
+    Parameters
+    ----------
+    explanation : with all members
+    members : those that are kept
+    """
+    places = [explanation.find_places(m) for m in explanation.members]
+    kept = [
+        (m, s, c)
+        for m, s, c in zip(explanation.members, places, explanation.spreads, strict=True)
+        if m in members
+    ]
+    take = np.concatenate(
+        [np.empty(0, dtype=np.int64), *(np.arange(s.start, s.stop) for _, s, _ in kept)]
+    ).astype(int)
+    return replace(
+        explanation, members=tuple(m for m, *_ in kept), values=explanation.values[take],
+        errors=explanation.errors[take], spreads=tuple(c for *_, c in kept),
+    )  # fmt: skip
 
 
 def estimate_spread(size: NDArray[np.float64], pull: NDArray[np.float64]) -> float:

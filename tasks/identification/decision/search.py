@@ -1,6 +1,7 @@
 """The search: linearise the runs, weigh every explanation, fit the best one through the simulation, and begin again."""
 
 from dataclasses import dataclass, replace
+from math import log
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,14 @@ from tasks.identification.decision.forms import (
     make_spline_hypothesis,
     rewhiten_splines,
 )
-from tasks.identification.decision.odds import Explanation, RunGrams, search_explanations
+from tasks.identification.decision.odds import (
+    Explanation,
+    RunGrams,
+    compare_explanations,
+    keep_members,
+    search_explanations,
+)
+from tasks.identification.decision.told import tell_members
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.discrepancy import estimate_run_noise, set_run_noise
 from tasks.identification.inference.fit import Fit, fit_hypotheses
@@ -142,17 +150,28 @@ def _refine_first(found: list[Explanation], place: _Place, null: Fit) -> Explana
 def _settle_explanation(
     place: _Place, null: Fit, columns: Columns, rules: DecisionRules, *, forms: bool
 ) -> tuple[_Place, RunGrams, list[Explanation]]:
-    """Return where the best explanation is the one that was fitted, what the runs say there, and all explanations.
+    """Return where what the best explanation tells is fitted, what the runs say there, and all explanations.
 
     Forms come after the library: what an effect of the library explains is no form.
     """
     for turn in range(rules.most_turns):
         grams = gather_grams(place.evidence, place.fitted, place.splines, columns)
         found = search_explanations(grams, most=rules.most_effects, width=rules.beam_width, forms=forms)
-        if _is_fitted(found[0], place.fitted) or turn == rules.most_turns - 1:
+        told = keep_members(found[0], tell_members(grams, found[0], rules))
+        here = next((e for e in found if _is_fitted(e, place.fitted)), None)
+        if turn == rules.most_turns - 1 or _is_fitted(told, place.fitted):
             break
-        place = _move_to(found[0], place, null, settle=False)
+        if forms and here is not None and not _is_worth_it(found[0], here, grams, rules):
+            break
+        place = _move_to(told, place, null, settle=False)
     return place, grams, found
+
+
+def _is_worth_it(best: Explanation, here: Explanation, grams: RunGrams, rules: DecisionRules) -> bool:
+    """Whether an explanation with a form is so much more likely than the fitted one that it takes its place."""
+    return best is not here and compare_explanations(grams, best, here, rules.signature_error) > log(
+        rules.named_odds
+    )
 
 
 def gather_grams(evidence: Evidence, fitted: Fit, splines: Splines, columns: Columns) -> RunGrams:

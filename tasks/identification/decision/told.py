@@ -41,6 +41,11 @@ class OpenExplanation:
         """Return the names of what it tells."""
         return frozenset(member.name for member in self.told)
 
+    @property
+    def numbers(self) -> Told:
+        """Return the numbers of what it tells: a drag with and without a wind is one number."""
+        return frozenset(m.name if m.effect is None else m.effect.parameters[0].name for m in self.told)
+
 
 def tell_members(grams: RunGrams, explanation: Explanation, rules: DecisionRules) -> tuple[Candidate, ...]:
     """Return the members that the runs tell at the odds of a name: to be there, and to be larger than what matters.
@@ -100,7 +105,7 @@ def list_open_explanations(
         (f for f in within if f.names <= best.names or _has_form(best) > _has_form(f)),
         key=lambda found: (_has_form(found), len(found.names), -found.log_odds),
     )
-    apart = [f for f in within if not f.names >= simplest.names and not _holds_again(f, simplest)]
+    apart = [f for f in within if not f.numbers >= simplest.numbers and not _holds_again(f, simplest)]
     # of explanations that add to one another the simplest stands for all
     others = [f for f in apart if not any(g.names < f.names for g in apart)]
     others.sort(key=lambda found: -found.log_odds)

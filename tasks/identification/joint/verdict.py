@@ -128,7 +128,7 @@ def judge_jointly(
     selected = drop_feigned_numbers(train, selected, find_feigned, joint, reasons)
 
     def find_rivals(fitted: JointFit, named: Sequence[JointNumber]) -> list[Substitute]:
-        found = find_substitutes(train, fitted, named, shown, rules.rival_gain_share)
+        found = find_substitutes(train, fitted, named, shown, joint.rival_gain_share)
         found = drop_contradicted_readings(train, found)
         return [rival for rival in found if rival.name not in {n.name for n in find_feigned(rival.fitted)}]
 
@@ -146,7 +146,7 @@ def judge_jointly(
         left = _predict(retuned, retuned, train, held_out, rules)
     tolerances = collect_tolerances(campaign, shown)
     effects, calibrated = name_numbers(left.fitted, tolerances, joint)
-    if effects and (worse := find_worse_channels(left.error, rules.worse_limit, speed_decides=False)):
+    if effects and (worse := find_worse_channels(left.error, joint.worse_limit, speed_decides=False)):
         reasons.append(
             f"the vehicle's file predicts {', '.join(worse)} of the held-out runs better than what was fitted: nothing"
             " is named"
@@ -182,6 +182,7 @@ def judge_jointly(
         verdict=find_kind(effects, rivals),
         effects=tuple(effects),
         rivals=tuple(rivals),
+        odds=(),
         tried=(),
         error=left.error,
         manoeuvre_error=left.manoeuvres,
