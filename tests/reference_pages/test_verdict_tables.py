@@ -1,4 +1,4 @@
-"""Tables of the page on a verdict's rules: every number with its meaning and reason, each where the page asks for it."""
+"""Tables of the page on a verdict's rules: every number with meaning and reason, each where the page asks for it."""
 
 import re
 
