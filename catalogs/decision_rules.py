@@ -19,7 +19,6 @@ class JointRulesEntry(CatalogueEntry):
     unknown_gain_tolerance: Level
     fewest_runs: Count
     foreign_misfit: Level
-    questioned_misfit: Level
     missed_share: Share
     noticed_share: Share
     driven_acceleration: Annotated[Scalar, require_quantity("m s-2", above=0)]

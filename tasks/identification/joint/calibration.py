@@ -1,4 +1,4 @@
-"""The brake's gain, found before anything else: of a car that its file knows but for it, single effects can be told."""
+"""Campaigns that need a joint fit, and its first numbers: the brake's gain before anything else."""
 
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -15,7 +15,7 @@ HELD = 1e-5
 
 
 def needs_joint_fit(campaign: Campaign, rules: JointRules) -> bool:
-    """Whether a campaign says too little to look for one effect at a time, or has what only a joint fit knows.
+    """Whether a campaign has too few runs for odds of explanations, or has what only a joint fit knows.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def is_gain_unknown(campaign: Campaign, rules: JointRules) -> bool:
 
 
 def has_few_runs(campaign: Campaign, rules: JointRules) -> bool:
-    """Whether there are too few training or held-out runs to look for one effect at a time.
+    """Whether there are too few training or held-out runs for odds of explanations.
 
     Parameters
     ----------
