@@ -19,7 +19,6 @@ class JointRulesEntry(CatalogueEntry):
     unknown_gain_tolerance: Level
     fewest_runs: Count
     foreign_misfit: Level
-    questioned_misfit: Level
     missed_share: Share
     noticed_share: Share
     driven_acceleration: Annotated[Scalar, require_quantity("m s-2", above=0)]
@@ -40,6 +39,8 @@ class JointRulesEntry(CatalogueEntry):
     better_prediction_share: Level
     equal_prediction_share: Level
     same_fit_errors: Level
+    rival_gain_share: Share
+    worse_limit: Level
     wrong_number_tolerances: Level
 
 

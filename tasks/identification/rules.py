@@ -12,7 +12,6 @@ class JointRules:
     unknown_gain_tolerance : tolerance of the brake gain from which a vehicle file hardly knows its car [1]
     fewest_runs : training or held-out runs below which effects cannot be screened one by one [1]
     foreign_misfit : misfit of a calibrated car over its sensors' noise from which its equations are not the model's [1]
-    questioned_misfit : error of the held-out speed over its noise from which a name is held against a joint fit [1]
     missed_share : share of some channel's held-out error that a name must leave at most, where stops are missed by more
         than `foreign_misfit` with it [1]
     noticed_share : the same where they are not, and where the gain was not known [1]
@@ -35,13 +34,14 @@ class JointRules:
     equal_prediction_share : share of the held-out misfit of all channels up to which a fit without a number is as
         good [1]
     same_fit_errors : standard errors within which the numbers of two fits are the same [1]
+    rival_gain_share : share of a named number's gain from which another number counts as its rival [1]
+    worse_limit : ratio of held-out errors from which a channel is worse than under the vehicle's file [1]
     wrong_number_tolerances : tolerances from which a number of the vehicle file is wrong [1]
     """
 
     unknown_gain_tolerance: float
     fewest_runs: int
     foreign_misfit: float
-    questioned_misfit: float
     missed_share: float
     noticed_share: float
     driven_acceleration: float
@@ -62,6 +62,8 @@ class JointRules:
     better_prediction_share: float
     equal_prediction_share: float
     same_fit_errors: float
+    rival_gain_share: float
+    worse_limit: float
     wrong_number_tolerances: float
 
 

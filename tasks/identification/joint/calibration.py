@@ -1,4 +1,4 @@
-"""The brake's gain, found before anything else: of a car that its file knows but for it, single effects can be told."""
+"""Whether a campaign needs the joint fit, and the first numbers of that."""
 
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -10,8 +10,6 @@ from tasks.identification.rules import JointRules
 
 FIRST = ("lag", "drag_area", "speed_delay")
 """Numbers that are free beside those of every car while the best start is looked for."""
-HELD = 1e-5
-"""Sigma of a number that stays as the file has it [1]."""
 
 
 def needs_joint_fit(campaign: Campaign, rules: JointRules) -> bool:

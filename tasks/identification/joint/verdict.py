@@ -102,9 +102,6 @@ def judge_jointly(
     surface: SurfaceParameters,
     numbers: Sequence[JointNumber],
     rules: DecisionRules,
-    *,
-    disagreement: str = "",
-    names_numbers: bool = True,
 ) -> JointOutcome:
     """Calibrate a car on its training runs, take away what does not earn its place, and name what is left.
 
@@ -114,21 +111,19 @@ def judge_jointly(
     vehicle, surface : the model that is judged
     numbers : that a fit may move
     rules : of the decision
-    disagreement : why single effects could not be told; empty where they were not looked for
-    names_numbers : whether numbers of the vehicle's file may be named without any other name; else they are calibrated
     """
     joint = rules.joint
     stops = [make_stop(run, vehicle, surface, campaign.channels, joint) for run in campaign.runs]
     train = tuple(stop for stop in stops if not stop.model.run.held_out)
     held_out = tuple(stop for stop in stops if stop.model.run.held_out)
     shown = choose_numbers(numbers, campaign, [stop.model for stop in train], joint)
-    reasons = [disagreement] if disagreement else []
+    reasons: list[str] = []
     selected, agreeing = select_numbers(campaign, train, held_out, shown, joint, reasons)
     find_feigned = make_driver_check(campaign, vehicle, surface, train, joint)
     selected = drop_feigned_numbers(train, selected, find_feigned, joint, reasons)
 
     def find_rivals(fitted: JointFit, named: Sequence[JointNumber]) -> list[Substitute]:
-        found = find_substitutes(train, fitted, named, shown, rules.rival_gain_share)
+        found = find_substitutes(train, fitted, named, shown, joint.rival_gain_share)
         found = drop_contradicted_readings(train, found)
         return [rival for rival in found if rival.name not in {n.name for n in find_feigned(rival.fitted)}]
 
@@ -146,7 +141,7 @@ def judge_jointly(
         left = _predict(retuned, retuned, train, held_out, rules)
     tolerances = collect_tolerances(campaign, shown)
     effects, calibrated = name_numbers(left.fitted, tolerances, joint)
-    if effects and (worse := find_worse_channels(left.error, rules.worse_limit, speed_decides=False)):
+    if effects and (worse := find_worse_channels(left.error, joint.worse_limit, speed_decides=False)):
         reasons.append(
             f"the vehicle's file predicts {', '.join(worse)} of the held-out runs better than what was fitted: nothing"
             " is named"
@@ -165,12 +160,6 @@ def judge_jointly(
     disputed = {substitute.of for substitute in substitutes}
     effects += [e for e in calibrated if e.parameters[0].name in disputed]
     calibrated = [e for e in calibrated if e not in effects]
-    if not names_numbers and all(e.effect_class == "retune" for e in effects):
-        reasons += [
-            f"{effect.name} is told as a number of the vehicle's own: other physics may stand behind it"
-            for effect in effects
-        ]
-        effects, calibrated, substitutes = [], [*effects, *calibrated], ()
     rivals = name_rivals(fitted, substitutes, effects, joint)
     reasons += tell_what_was_used(campaign, train, agreeing, joint)
     reasons += tell_rivals(effects, rivals, shown)
@@ -182,6 +171,7 @@ def judge_jointly(
         verdict=find_kind(effects, rivals),
         effects=tuple(effects),
         rivals=tuple(rivals),
+        odds=(),
         tried=(),
         error=left.error,
         manoeuvre_error=left.manoeuvres,
@@ -198,7 +188,6 @@ def judge_jointly(
         experiment=None,
         step_sensitive=(),
         reasons=tuple(reasons),
-        disagreement=disagreement,
     )  # fmt: skip
     verdict = tell_miss(verdict, campaign, joint.foreign_misfit, left.follows)
     if verdict.misses:
