@@ -42,6 +42,8 @@ class JointRulesEntry(CatalogueEntry):
     rival_gain_share: Share
     worse_limit: Level
     wrong_number_tolerances: Level
+    rival_gain_share: Share
+    worse_limit: Level
 
 
 class DecisionRulesEntry(CatalogueEntry):

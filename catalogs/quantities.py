@@ -1,6 +1,7 @@
 """Catalogue values at the file edge: each is written as value, unit and source, and is checked when read."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -103,8 +104,9 @@ def read_entry(model: type[Entry], path: Path, kind: str) -> Entry:
     return parse_entry(model, read_content(path, kind, LARGEST_YAML), path, kind)
 
 
-def parse_entry(model: type[Entry], content: bytes, place: object, kind: str) -> Entry:
-    """Check the content of one YAML file.
+@lru_cache(maxsize=64)
+def parse_entry(model: type[Entry], content: bytes, place: Hashable, kind: str) -> Entry:
+    """Check the content of one YAML file; the same content of the same place is checked once.
 
     Parameters
     ----------

@@ -40,7 +40,18 @@ def source_hash() -> str:
 
 def code_version() -> dict[str, str]:
     """The project's version and the hash of its source."""
-    return {"version": importlib.metadata.version("musync-gs"), "source_sha256": source_hash()}
+    return {"version": installed_version("musync-gs"), "source_sha256": source_hash()}
+
+
+@lru_cache
+def installed_version(library: str) -> str:
+    """Version of an installed library; asked once, since Python reads all that the library says of itself.
+
+    Parameters
+    ----------
+    library : name on the index
+    """
+    return importlib.metadata.version(library)
 
 
 @lru_cache
@@ -79,7 +90,7 @@ def git_commit(root: Path = SOURCE_ROOT) -> dict[str, Any] | None:
 def library_versions() -> dict[str, str]:
     """Installed versions of the libraries whose arithmetic or encoding reaches the data."""
     return {"python": platform.python_version()} | {
-        name: importlib.metadata.version(name) for name in RECORDED_LIBRARIES
+        name: installed_version(name) for name in RECORDED_LIBRARIES
     }
 
 

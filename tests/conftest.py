@@ -50,10 +50,18 @@ def pytest_collection(session):
 
 
 def compile_kernels(shared: Path) -> None:
-    """Compile each of the large kernels that no other worker has compiled or is compiling."""
+    """Compile each of the large kernels that no other worker has compiled or is compiling.
+
+    The second worker does three while the first imports, which then does the fourth: the longest.
+    """
     from tests import kernels
 
-    for job in (kernels.compile_rasteriser, kernels.compile_vehicle, kernels.compile_weather):
+    for job in (
+        kernels.compile_rasteriser,
+        kernels.compile_vehicle,
+        kernels.compile_pose_solver,
+        kernels.compile_rain,
+    ):
         try:
             (shared / job.__name__).mkdir()
         except FileExistsError:

@@ -6,6 +6,8 @@ import numpy as np
 
 from catalogs.vehicles import load_vehicle
 from flows.making.generate import generate_dataset
+from tasks.eval.poses.rigid import project_points
+from tasks.eval.poses.solve_pnp import PnpLimits, solve_pnp
 from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tasks.surface.road_profile import FLAT_ROAD
 from tasks.surface.state import SurfaceState
@@ -13,10 +15,21 @@ from tasks.vehicle.brake import BrakeCommand
 from tasks.vehicle.rollout import Controls, simulate_scenario
 from tests.toy_street import toy_street, write_toy_grid
 
+GRID = """\
+name: toy
+scene: {folder}/scene
+camera: {folder}/camera.yaml
+frames: 2
+frame_rate_hz: 10
+scenarios:
+  clip: {{weather: rain, precipitation_mm_h: 50, initial_speed_km_h: 40, hazard_center_m: 4, hazard_length_m: 3.7,
+          hazard_height_m: 0.075}}
+"""
+K = np.array([[80.0, 0.0, 48.0], [0.0, 80.0, 32.0], [0.0, 0.0, 1.0]])
+
 
 def compile_rasteriser(_: Path) -> None:
     """Draw a picture."""
-    K = np.array([[80.0, 0.0, 48.0], [0.0, 80.0, 32.0], [0.0, 0.0, 1.0]])
     rasterise_view(prepare_gaussians(toy_street().gaussians), np.eye(4), K, 96, 64)
 
 
@@ -34,6 +47,13 @@ def compile_vehicle(_: Path) -> None:
         )  # fmt: skip
 
 
-def compile_weather(folder: Path) -> None:
-    """Make a dataset with snow."""
-    generate_dataset(write_toy_grid(folder, frames=2), str(folder / "data"), runner="threads", workers=1)
+def compile_pose_solver(_: Path) -> None:
+    """Place a camera by points."""
+    points = np.random.default_rng(1).uniform((-2, -2, 4), (2, 2, 9), (40, 3))
+    limits = PnpLimits(min_inliers=8, noise_floor=0.05, noise_ceiling=2.0)
+    solve_pnp(points, project_points(points, K), np.eye(4), K, limits)
+
+
+def compile_rain(folder: Path) -> None:
+    """Make a dataset with rain, on a road that mirrors."""
+    generate_dataset(write_toy_grid(folder, GRID), str(folder / "data"), runner="threads", workers=1)

@@ -31,7 +31,7 @@ if __name__ == "__main__":
         (place / "grid.yaml").write_text(GRID)
         killed = kill_study(place / "grid.yaml", place, asked.kills, asked.seed)
         flipped = flip_study(place / "whole", asked.flips)
-        filled = full_disk_study(place / "grid.yaml", place, place / "whole", asked.disks)
+        filled = full_disk_study(place / "grid.yaml", place / "filled", place / "whole", asked.disks)
         commands = kill_commands(place / "commands")
         disturbed = disturb_runs(place / "disturbed", asked.stop)
         disturbed["many readers"] = read_while_written(place / "read", asked.clips, asked.readers)
@@ -47,7 +47,7 @@ if __name__ == "__main__":
         killed["equal"] == killed["runs_finished"] > 0
         and killed["half_clips"] == 0
         and flipped["named"] == flipped["flips"]
-        and filled["told"] == filled["equal"] == filled["disks"]
+        and all(row["told"] == row["equal"] == row["disks"] for row in filled.values())
         and all(row["equal"] == row["kills"] > 0 for row in commands.values())
         and all(row["right"] for row in disturbed.values())
     )

@@ -8,47 +8,62 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from benchmarks.crashes.commands import write_recordings
 from benchmarks.crashes.kills import files_of
-from benchmarks.crashes.processes import finish_run
+from benchmarks.crashes.processes import finish_command
 
 ROOM = 2**30
 """Of the file system once it has been freed [B]."""
 
 
-def full_disk_study(grid: Path, place: Path, whole: Path, disks: int, seed: int = 4) -> dict[str, Any]:
-    """Make a dataset on small file systems of random sizes, then give them room and run the same command again.
+def full_disk_study(
+    grid: Path, place: Path, whole: Path, disks: int, seed: int = 4
+) -> dict[str, dict[str, Any]]:
+    """Let commands write to small file systems of random sizes, then give these room and run the same command again.
 
     Parameters
     ----------
     grid : grid file
     place : empty folder to mount in; needs the right to mount
-    whole : folder of the same dataset, made undisturbed
-    disks : how many [1]
+    whole : folder of the dataset of the grid, made undisturbed
+    disks : how many, for each command [1]
     seed : of their sizes
 
     Returns
     -------
-    ``disks``; ``told``, those on which the run ended with exit code 2 and a sentence about the disk; ``equal``, those
-    on which the same command then gave the bytes of the undisturbed run; ``plans``, those that had a plan by then.
+    By command: ``disks``; ``told``, those on which it ended with exit code 2 and a sentence about the disk; ``equal``,
+    those on which the same command then gave the bytes of an undisturbed one.
     """
+    place.mkdir()
+    write_recordings(place, place)
+    commands = {
+        "generate": ["generate", str(grid), "--runner", "threads"],
+        "import-measurements": ["import-measurements", str(place / "log"), "--map", str(place / "map.yaml")],
+        "export": ["export", str(whole), "--to", "kitti"],
+    }
     draw = random.Random(seed)
-    wanted = files_of(whole)
-    size = sum(path.stat().st_size for path in whole.rglob("*") if path.is_file())
-    found = {"disks": disks, "told": 0, "equal": 0, "plans": 0}
+    return {name: _fill_disks(place / name, words, disks, draw) for name, words in commands.items()}
+
+
+def _fill_disks(place: Path, words: list[str], disks: int, draw: random.Random) -> dict[str, Any]:
+    place.mkdir()
+    finish_command(*words, "--out", str(place / "whole"))
+    wanted = files_of(place / "whole")
+    size = sum(path.stat().st_size for path in (place / "whole").rglob("*") if path.is_file())
+    found = {"disks": disks, "told": 0, "equal": 0}
     for turn in range(disks):
-        # half of them below 300 kB, where plan, inputs and metadata are written
-        bound = 300_000 if turn % 2 else size
+        # half of them small, where plan, inputs and metadata are written
+        bound = min(300_000, size // 3) if turn % 2 else size
         with _small_disk(place / f"disk-{turn}", draw.randrange(4096, bound)) as disk:
-            code, said = finish_run(grid, disk / "data")
+            code, said = finish_command(*words, "--out", str(disk / "data"))
             told = code == 2 and "the disk is full" in said and "Traceback" not in said
             found["told"] += told
-            found["plans"] += (disk / "data" / "plan.json").is_file()
             _remount_disk(disk, ROOM)
-            again, said_again = finish_run(grid, disk / "data")
-            equal = again == 0 and files_of(disk / "data") == wanted
+            again, said_again = finish_command(*words, "--out", str(disk / "data"))
+            equal = again == 0 and files_of(disk / "data") == wanted and [*disk.iterdir()] == [disk / "data"]
             found["equal"] += equal
-            print(f"disk {turn + 1} of {disks}: {'told' if told else said}, {'equal' if equal else said_again}",
-                file=sys.stderr)  # fmt: skip
+            print(f"{place.name}, disk {turn + 1} of {disks}: {'told' if told else said},"
+                f" {'equal' if equal else said_again}", file=sys.stderr)  # fmt: skip
     return found
 
 

@@ -11,6 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 
 Process = subprocess.Popen[bytes]
+MUSYNC = (sys.executable, "-m", "flows.cli")
 PATIENCE_S = 60.0
 """How long a cluster may take to start [s]."""
 
@@ -33,13 +34,26 @@ def start_run(
     settings : further variables of its environment
     """
     place = ["--scheduler", scheduler] if scheduler else ["--runner", "processes", "--workers", "2"]
-    return _start_process([*_generate(grid, folder), *place, *options], settings)
+    return _start_process([*MUSYNC, *_generate(grid, folder), *place, *options], settings)
+
+
+def finish_command(*words: str, before: Callable[[], object] | None = None) -> tuple[int, str]:
+    """Run a command; return its exit code and what it said on its error stream.
+
+    Parameters
+    ----------
+    words : of the command, without ``musync``
+    before : what its process does first
+    """
+    command = [*MUSYNC, *words]
+    done = subprocess.run(command, capture_output=True, text=True, env=_clean(), preexec_fn=before)
+    return done.returncode, done.stderr
 
 
 def finish_run(
     grid: Path, folder: Path, *options: str, before: Callable[[], object] | None = None
 ) -> tuple[int, str]:
-    """Make a dataset in threads; return the exit code of the command and what it said on its error stream.
+    """Make a dataset in threads, as `finish_command` does.
 
     Parameters
     ----------
@@ -48,9 +62,7 @@ def finish_run(
     options : further ones of the command
     before : what its process does first
     """
-    command = [*_generate(grid, folder), "--runner", "threads", *options]
-    done = subprocess.run(command, capture_output=True, text=True, env=_clean(), preexec_fn=before)
-    return done.returncode, done.stderr
+    return finish_command(*_generate(grid, folder), "--runner", "threads", *options, before=before)
 
 
 def list_children(process: Process) -> list[int]:
@@ -109,7 +121,7 @@ class Cluster:
 
 
 def _generate(grid: Path, folder: Path) -> list[str]:
-    return [sys.executable, "-m", "flows.cli", "generate", str(grid), "--out", str(folder)]
+    return ["generate", str(grid), "--out", str(folder)]
 
 
 def _clean() -> dict[str, str]:

@@ -86,13 +86,31 @@ def study_errors(seed: int) -> dict[str, dict[str, Any] | None]:
     """
     draw, said = np.random.Generator(np.random.Philox(seed)), {}
     for name, error in ERRORS.items():
-        while judge(clip := draw_braked_clip(draw)) or not np.isfinite(clip.facts["stop_time"]):
-            pass
-        broken = judge(clip, error(clip))
+        while True:
+            clip = draw_braked_clip(draw)
+            if (
+                not judge(clip)
+                and np.isfinite(clip.facts["stop_time"])
+                and changes(clip, tables := error(clip))
+            ):
+                break
+        broken = judge(clip, tables)
         said[name] = {"clip": clip.name, **describe(broken[0])} if broken else None
         print(f"{name:36} {said[name] or 'NOT FOUND ' + clip.name}")
     print(f"{sum(row is not None for row in said.values())} of {len(said)} errors found")
     return said
+
+
+def changes(clip: StudyClip, tables: tuple[Any, Any]) -> bool:
+    """Return whether an error changes a clip: a slip that stays below the clip level is none.
+
+    Parameters
+    ----------
+    clip : as its generator states it
+    tables : ticks and frames with the error
+    """
+    pairs = ((clip.ticks, tables[0]), (clip.frames, tables[1]))
+    return any(not np.array_equal(made[k], table[k], equal_nan=True) for table, made in pairs for k in table)
 
 
 def describe(law: Law) -> dict[str, Any]:

@@ -10,9 +10,9 @@ from catalogs.entries import find_entry
 from catalogs.low_speed import load_low_speed
 from catalogs.scenario import Scenario, find_scenario_problems
 from catalogs.surfaces import load_surface
-from catalogs.tyres import load_tyre
+from catalogs.tyres import load_tyre, tyre_entries
 from catalogs.vehicles import load_vehicle
-from flows.judging.physics_constants import make_constants, read_property_file
+from flows.judging.physics_constants import make_constants
 from flows.making.clip import collect_motion_figures
 from flows.making.driving import collect_surface_figures, simulate_drive
 from tasks.eval.physics.constants import Constants
@@ -135,9 +135,9 @@ def _read_constants(vehicle: Vehicle, mode: Mode) -> Constants:
         f.name: value for f in fields(vehicle) if isinstance(value := getattr(vehicle, f.name), float | int)
     }
     steady = load_low_speed()
-    magic = None if vehicle.tyre is None else read_property_file(find_entry("tyre", TYRE).read_bytes())
+    tyre = None if vehicle.tyre is None else tyre_entries(find_entry("tyre", TYRE).read_bytes())
     return make_constants(
-        car, vehicle, load_surface("dense-asphalt"), mode=mode, ticks_per_frame=100.0, steady=steady, magic=magic
+        car, vehicle, load_surface("dense-asphalt"), mode=mode, ticks_per_frame=100.0, steady=steady, tyre=tyre
     )  # fmt: skip
 
 

@@ -215,11 +215,15 @@ def import_package(package: str, kind: str, extra: str) -> ModuleType:
     Raises
     ------
     InputError
-        If it is not installed.
+        If it is not installed, or something that it needs is not.
     """
     try:
         return import_module(package)
-    except ImportError:
+    except ImportError as error:
+        needs = f"reading {kind} needs the package {package}"
+        if isinstance(error, ModuleNotFoundError) and error.name == package:
+            raise InputError(f'{needs}: install it with pip install "musync-gs[{extra}]"') from None
         raise InputError(
-            f'reading {kind} needs the package {package}: install it with pip install "musync-gs[{extra}]"'
+            f"{needs}, which is installed and does not load ({shorten(error)}): install what it lacks, or all of it"
+            f" again with pip install --force-reinstall {package}"
         ) from None

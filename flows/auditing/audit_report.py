@@ -1,10 +1,11 @@
 """The report of an audit: its sentence, its lines for people, and a page that can be filed by itself."""
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 
 from flows.auditing.verify import describe_files, describe_signature
 from flows.pages import DATASET_PAGE, make_policy
@@ -126,9 +127,8 @@ def write_audit_page(result: Mapping[str, Any]) -> str:
     ----------
     result : of `flows.auditing.audit.audit_dataset`
     """
-    pages = Environment(loader=FileSystemLoader(PAGE), autoescape=True, undefined=StrictUndefined)
     style = "\n".join(sheet.read_text() for sheet in (DATASET_PAGE / "report.css", PAGE / "page.css"))
-    return pages.get_template("audit.html").render(
+    return _read_template().render(
         result=result,
         tools=compare_tools(result["tools_recorded"], result["tools_here"]),
         remedies=list_remedies(result),
@@ -136,6 +136,12 @@ def write_audit_page(result: Mapping[str, Any]) -> str:
         style=style,
         policy=make_policy(style=style),
     )
+
+
+@lru_cache
+def _read_template() -> Template:
+    pages = Environment(loader=FileSystemLoader(PAGE), autoescape=True, undefined=StrictUndefined)
+    return pages.get_template("audit.html")
 
 
 def compare_tools(recorded: Mapping[str, Any], here: Mapping[str, Any]) -> list[tuple[str, str, str]]:

@@ -7,8 +7,7 @@ from typing import Any
 from flows.auditing.verify import compare_files
 from flows.making.gathering import table_parts, write_part
 from flows.making.generate import create_frame_arrays, fan_out, open_workers
-from flows.making.grid_inputs import input_sources
-from flows.making.input_changes import recorded_input
+from flows.making.input_changes import recorded_inputs
 from flows.making.plan import Plan, read_plan
 from flows.making.seal import SHEET, preview_sheet
 from flows.making.summaries import SUMMARIES, summarise_clips
@@ -159,19 +158,17 @@ def _prepare_scratch(layout: Layout, scratch: Layout, manifest: Manifest) -> Pla
     plan = plan_of(manifest)
     write_json(scratch.plan, plan.as_json())
     write_json(scratch.inputs / "grid.json", plan.settings.model_dump(mode="json"))
-    sources = input_sources(plan.settings)
-    problems = []
-    for name, digest in manifest["inputs"].items():
-        content = recorded_input(layout, sources, name, digest)
-        if content is None:
-            problems.append(
-                f"{layout.inputs / name}: damaged, and the catalogue here has no entry with its bytes"
-                f" (SHA-256 {digest[:12]}...): put the file back and repair again"
-            )
-            continue
+    inputs = recorded_inputs(layout, manifest)
+    if lost := manifest["inputs"].keys() - inputs.keys():
+        raise InputError(
+            [
+                f"{layout.inputs / name}: damaged, and nothing here has or gives its bytes"
+                f" (SHA-256 {manifest['inputs'][name][:12]}...): put the file back and repair again"
+                for name in sorted(lost)
+            ]
+        )
+    for name, content in inputs.items():
         write_atomically(scratch.inputs / name, content)
-    if problems:
-        raise InputError(problems)
     create_frame_arrays(scratch, plan)
     return read_plan(scratch.root)
 

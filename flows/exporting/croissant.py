@@ -1,7 +1,8 @@
 """Croissant: the dataset's tables with metadata that machine-learning tools and dataset search read.
 
-``croissant.json`` (JSON-LD, Croissant 1.0) describes the Parquet files of ``telemetry/``, copied as they are: SHA-256
-of each, and each column with its meaning and unit as our schema has them. Names, units and signs are ours (ISO 8855,
+``croissant.json`` (JSON-LD, Croissant 1.0) describes the Parquet files of ``telemetry/``, copied as they are (those of
+an older dataset with NULL for NaN): SHA-256 of each, and each column with its meaning and unit as our schema has them.
+Names, units and signs are ours (ISO 8855,
 pitch positive nose-down). A record set is one file: ``clips``, ``pairs``, ``ticks-WEATHER-0000``,
 ``frames-WEATHER-0000``. Columns that hold lists (``T_world_rig``) are in the files and not in the record sets. Pictures
 are not exported.
@@ -9,7 +10,6 @@ are not exported.
 Format: http://mlcommons.org/croissant/1.0
 """
 
-import shutil
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -19,6 +19,8 @@ import pyarrow.parquet as pq
 from catalogs.variants import warn_of_variant
 from flows.exporting.dataset import ExportedDataset
 from flows.store.layout import write_json
+from flows.store.telemetry import copy_table
+from manifests.canonical import sha256_of_file
 from tasks.conventions import CHANNELS_BY_NAME
 
 CONFORMS_TO = "http://mlcommons.org/croissant/1.0"
@@ -52,9 +54,9 @@ def write_croissant(dataset: ExportedDataset, folder: Path) -> None:
     for name in tables:
         source, target = dataset.layout.root / name, folder / name
         target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(source, target)
-        files.append(_describe_file(name, source.stat().st_size, dataset.manifest["artifacts"][name]))
-        records.append(_describe_records(name, pq.read_schema(source)))
+        copy_table(source, target)
+        files.append(_describe_file(name, target))
+        records.append(_describe_records(name, pq.read_schema(target)))
     for _ in dataset:  # their rows are in the tables already
         pass
     write_json(
@@ -77,15 +79,15 @@ def _describe_dataset(dataset: ExportedDataset) -> dict[str, Any]:
     }
 
 
-def _describe_file(name: str, size: int, digest: str) -> dict[str, Any]:
+def _describe_file(name: str, path: Path) -> dict[str, Any]:
     return {
         "@type": "cr:FileObject",
         "@id": name,
         "name": name,
         "contentUrl": name,
-        "contentSize": f"{size} B",
+        "contentSize": f"{path.stat().st_size} B",
         "encodingFormat": PARQUET,
-        "sha256": digest,
+        "sha256": sha256_of_file(path),
     }
 
 

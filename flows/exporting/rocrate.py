@@ -3,7 +3,8 @@
 ``manifest.json``, ``plan.json``, ``inputs/`` and ``telemetry/`` are copied as they are, so that recorded hashes hold;
 ``ro-crate-metadata.json`` (JSON-LD) names each file with size and SHA-256 and says that the run of muSync made the
 tables from the inputs; ``prov.json`` (PROV-JSON) says the same in PROV's words: entities, one activity, one software
-agent. The date is that of the export. Pictures are not exported.
+agent. The date is that of the export. Pictures are not exported. Tables of an older dataset hold NaN where others hold
+NULL, and the crate's description says so.
 
 Formats: https://www.researchobject.org/ro-crate/1.1 and https://www.w3.org/Submission/prov-json
 """
@@ -13,9 +14,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import pyarrow.parquet as pq
+
 from catalogs.variants import warn_of_variant
 from flows.exporting.dataset import ExportedDataset
 from flows.store.layout import write_json
+from flows.store.missing import has_nulls
 from manifests.canonical import sha256_of_file
 
 METADATA = "ro-crate-metadata.json"
@@ -48,7 +52,7 @@ def write_rocrate(dataset: ExportedDataset, folder: Path) -> None:
         "@context": f"{VERSION}/context",
         "@graph": [
             _describe_itself(),
-            _describe_root(dataset, names),
+            _describe_root(dataset, names, tables),
             *files,
             *_describe_run(dataset, inputs, tables),
         ],
@@ -104,14 +108,16 @@ def _describe_itself() -> dict[str, Any]:
     }
 
 
-def _describe_root(dataset: ExportedDataset, names: list[str]) -> dict[str, Any]:
+def _describe_root(dataset: ExportedDataset, names: list[str], tables: list[str]) -> dict[str, Any]:
     facts = dataset.plan.settings
+    holds_nan = not all(has_nulls(pq.read_schema(dataset.layout.root / name)) for name in tables)
+    absent = "The tables hold NaN where a value is not represented. " if holds_nan else ""
     return {
         "@id": "./",
         "@type": "Dataset",
         "name": f"muSync dataset {dataset.name}",
         "description": f"{len(dataset)} simulated drives on {facts.scene} with {facts.vehicle}: telemetry and record."
-        f" {warn_of_variant(facts.variant)}".rstrip(),
+        f" {absent}{warn_of_variant(facts.variant)}".rstrip(),
         "identifier": dataset.manifest["run_id"],
         "datePublished": datetime.now(UTC).date().isoformat(),
         "license": "not stated",

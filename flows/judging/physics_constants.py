@@ -1,6 +1,5 @@
 """What the physics judge takes as given: numbers of a dataset's frozen car, tyre and pavement."""
 
-import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -10,20 +9,16 @@ import numpy as np
 from catalogs.documents import read_yaml
 from catalogs.low_speed import load_kept_low_speed
 from catalogs.surfaces import load_surface
-from catalogs.tyres import VERSIONS, tyre_entries
+from catalogs.tyres import tyre_entries
 from catalogs.vehicles import load_vehicle, vehicle_tyre_source
 from flows.making.plan import TICK_RATE_HZ
 from flows.store.layout import Layout
 from flows.store.sealed import read_plan_record, recorded_grid
 from tasks.errors import InputError
-from tasks.eval.physics.constants import Constants, TyreNumbers, TyreTables
-from tasks.eval.physics.tyres import read_tyre_numbers
+from tasks.eval.physics.constants import Constants, TyreTables
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.paper.low_speed import SteadyStop
 from tasks.vehicle.parameters import Vehicle
-
-NUMBER = r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"
-"""A number of a tyre property file."""
 
 
 def read_constants(root: Path) -> Constants:
@@ -49,15 +44,16 @@ def read_constants(root: Path) -> Constants:
     car = read_yaml(files["vehicle"], "catalogue entry")
     settings = recorded_grid(read_plan_record(layout)["grid"], layout.plan)
     mode, steady = settings.vehicle_mode, load_kept_low_speed(layout.inputs)
+    tyre = vehicle_tyre_source(files["vehicle"])
     return make_constants(
         _convert_numbers(car), vehicle, pavement, mode=mode, ticks_per_frame=TICK_RATE_HZ / settings.frame_rate_hz,
-        steady=steady, magic=_read_tyre(files["vehicle"]),
+        steady=steady, tyre=None if tyre is None else tyre_entries(tyre.read_bytes()),
     )  # fmt: skip
 
 
 def make_constants(
     car: Mapping[str, float], vehicle: Vehicle, pavement: SurfaceParameters, *, mode: str, ticks_per_frame: float,
-    steady: SteadyStop | None, magic: TyreNumbers | None = None,
+    steady: SteadyStop | None, tyre: Mapping[str, str] | None = None,
 ) -> Constants:  # fmt: skip
     """Return what the judge takes as given.
 
@@ -69,7 +65,7 @@ def make_constants(
     mode : paper or coupled
     ticks_per_frame : ticks from one frame to the next [1]
     steady : how the end of a stop is kept steady; None takes the published rule literally
-    magic : the Magic Formula of the tyre; None for Burckhardt's curves
+    tyre : entries of the tyre's property file; None for Burckhardt's curves
     """
     grows = mode == "coupled"
     return Constants(
@@ -80,29 +76,11 @@ def make_constants(
         steady_limit=0.0 if steady is None else steady.explicit_limit,
         held_share=0.0 if steady is None else steady.held_share,
         low_speed_rule=steady is None or steady.pitch_rule,
-        magic=magic,
+        tyre=tyre,
         # the paper's mode knows no effect
         effects={name: value for name, value in vehicle.effects.items() if value and grows},
         forms=tuple((form.port, form.variable) for form in vehicle.forms if grows),
     )  # fmt: skip
-
-
-def _read_tyre(vehicle: Path) -> TyreNumbers | None:
-    """Return the numbers of the tyre that the kept vehicle names; None where it names none."""
-    source = vehicle_tyre_source(vehicle)
-    return None if source is None else read_property_file(source.read_bytes())
-
-
-def read_property_file(content: bytes) -> TyreNumbers:
-    """Return the numbers of a tyre property file as the judge takes them.
-
-    Parameters
-    ----------
-    content : of the file
-    """
-    entries = tyre_entries(content)
-    numbers = {name: float(value) for name, value in entries.items() if re.fullmatch(NUMBER, value)}
-    return read_tyre_numbers(numbers, newer=VERSIONS[entries["FITTYP"]] == "MF 6.1")
 
 
 def _convert_numbers(entry: dict[str, Any]) -> dict[str, float]:

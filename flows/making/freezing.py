@@ -246,7 +246,7 @@ def ticks_of(plan: Plan, asked: GridFile) -> dict[str, str]:
     steady = (
         cut_low_speed(load_low_speed(), plan.settings.variant) if plan.settings.keeps_stops_steady else None
     )
-    grade = grade_of(asked)
+    grade = grade_of(asked.scene)
     rides = (
         simulate_drive(
             cut_coupling(clip.scenario, plan.settings.variant),

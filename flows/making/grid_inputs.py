@@ -137,7 +137,7 @@ def read_grid_inputs(grid: Grid, tick_rate_hz: int) -> tuple[dict[str, bytes], d
     sound = not problems
     if scene:
         problems += _find_route_problems(grid)
-        if grid.poses is None and not (grade := grade_of(grid.settings)).is_level:
+        if grid.poses is None and not (grade := grade_of(grid.settings.scene)).is_level:
             inputs[ROAD_GRADE] = write_road_grade(grade, scene["name"])
     if sound:
         problems += cap_problems(_find_feature_problems(grid))
@@ -251,9 +251,9 @@ def _find_feature_problems(grid: Grid) -> list[str]:
     return list(problems.values())
 
 
-def grade_of(settings: GridFile) -> RoadGrade:
-    """Return the grade of the road in a grid's scene."""
-    return sample_grade(load_scene(settings.scene).route)
+def grade_of(scene: str) -> RoadGrade:
+    """Return the grade of the road in a scene, which is named as of `catalogs.scenes.load_scene`."""
+    return sample_grade(load_scene(scene).route)
 
 
 def _find_route_problems(grid: Grid) -> list[str]:

@@ -1,17 +1,19 @@
 """Compare the inputs, parameters, scene and tools that made a dataset with those at hand."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from catalogs.road_grade import ROAD_GRADE, write_road_grade
 from catalogs.scenes import scene_identity
 from catalogs.sentences import cap_problems
-from flows.making.grid_inputs import READERS, input_sources
+from flows.making.grid_inputs import READERS, grade_of, input_sources
 from flows.making.places import find_scene, noted_place
 from flows.store.address import send_files
 from flows.store.layout import Layout, write_atomically
 from flows.store.sealed import read_plan_record, recorded_grid, refuse_changed_files
-from manifests.canonical import sha256_of, sha256_of_file
+from manifests.canonical import sha256_of
 from manifests.explain import find_input_differences, find_parameter_differences, tools_here
 from manifests.records import Manifest
 from tasks.errors import InputError
@@ -43,12 +45,7 @@ def input_changes(layout: Layout, manifest: Manifest) -> list[dict[str, Any]]:
         "grid": plan["grid"],
         "inputs": {name: sha256_of([content]) for name, content in present.items()},
     }
-    sources = input_sources(recorded_grid(manifest["grid"], layout.manifest))
-    recorded = {
-        name: content
-        for name, digest in manifest["inputs"].items()
-        if (content := recorded_input(layout, sources, name, digest)) is not None
-    }
+    recorded = recorded_inputs(layout, manifest)
     return find_input_differences(manifest, here, recorded, present) + find_parameter_differences(
         manifest, plan
     )
@@ -66,29 +63,37 @@ def scene_changes(layout: Layout, manifest: Manifest) -> list[dict[str, Any]]:
     return find_input_differences(manifest, {**manifest, "scene": {"sha256": found}}, {}, {})
 
 
-def recorded_input(
-    layout: Layout, sources: Mapping[str, Callable[[], Path]], name: str, digest: str
-) -> bytes | None:
-    """The recorded bytes of an input, from the dataset, the catalogue or where it lay; None if none has them.
+def recorded_inputs(layout: Layout, manifest: Manifest) -> dict[str, bytes]:
+    """The recorded bytes of the inputs, by name; those that nothing at hand has or gives are left out.
 
     Parameters
     ----------
-    layout : of the dataset
-    sources : `flows.making.grid_inputs.input_sources` of its grid
-    name, digest : of the input
+    layout, manifest : of a sealed dataset
     """
-    for find in (lambda: layout.inputs / name, sources.get(name), lambda: noted_place(digest)):
-        try:
-            file = find() if find is not None else None
-            if file is None or not file.is_file():
-                continue
-            if sha256_of_file(file) == digest:
-                return file.read_bytes()
-            if name in READERS and sha256_of([content := READERS[name](file)]) == digest:
-                return content
-        except InputError:
-            continue
-    return None
+    sources = input_sources(recorded_grid(manifest["grid"], layout.manifest))
+    found: dict[str, bytes] = {}
+    for name, digest in manifest["inputs"].items():
+        candidates = _read_candidates(layout, manifest, name, sources.get(name))
+        content = next((one for one in candidates if sha256_of([one]) == digest), None)
+        if content is not None:
+            found[name] = content
+    return found
+
+
+def _read_candidates(
+    layout: Layout, manifest: Manifest, name: str, find_source: Callable[[], Path] | None
+) -> Iterator[bytes]:
+    """Yield what may be an input: from the dataset, the catalogue, where it lay, or the scene that it follows from."""
+    for find in (lambda: layout.inputs / name, find_source, lambda: noted_place(manifest["inputs"][name])):
+        with suppress(InputError):
+            file = None if find is None else find()
+            if file is not None and file.is_file():
+                yield file.read_bytes()
+                if name in READERS:
+                    yield READERS[name](file)
+    if name == ROAD_GRADE:
+        with suppress(InputError):
+            yield write_road_grade(grade_of(find_scene(manifest["scene"])), manifest["scene"]["name"])
 
 
 def read_kept(layout: Layout, recorded: Mapping[str, str]) -> dict[str, bytes]:

@@ -12,7 +12,7 @@ from catalogs.campaigns import read_campaign
 from catalogs.effects import LIBRARY_FILE, load_effects
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_tolerances, load_vehicle, vehicle_content
-from flows.measured.closing_ledger import record_reading
+from flows.measured.closing_ledger import count_readings, record_reading
 from flows.measured.friction_pulls import compute_friction_pulls, tell_friction_pulls
 from flows.measured.grown_vehicle import grown_vehicle, tyre_beside
 from flows.measured.residuals import compute_residual_rmse, predict_runs
@@ -40,7 +40,8 @@ def close_loop(
 ) -> dict[str, Any]:
     """Trace what a measured campaign shows that the model lacks, and write the model with it.
 
-    The split is hashed and written before anything is fitted; every reading of held-out runs goes into a ledger.
+    The split is hashed and written before anything is fitted. Every reading of held-out runs goes into a ledger before
+    a result is written; a call that ends before it has one has read nothing.
 
     Parameters
     ----------
@@ -62,9 +63,10 @@ def close_loop(
     beside = tyre_beside(name)
     results = Outputs(out, "close-loop", "split.json", "verdict.json", "report.html", grown, *beside)
     results.write_json("split.json", split_of(measured))
-    earlier = record_reading(measured, sha256_of([vehicle_content(name)]))
+    count_readings(measured)  # a faulty ledger is told of before the fit
     measured = replace(measured, tolerances=measured.tolerances.with_session(session_tolerances(name)))
     outcome = judge_campaign(measured, model, road, load_effects())
+    earlier = record_reading(measured, sha256_of([vehicle_content(name)]))
     result = verdict_json(outcome.verdict) | tell_search(outcome)
     result = tell_friction_pulls(result, measured.tolerances.friction)
     result["held_out_readings_before"] = earlier

@@ -16,29 +16,19 @@ LEDGER = Path(".musync") / "held-out-readings.jsonl"
 
 
 def record_reading(campaign: Campaign, vehicle_sha256: str) -> int:
-    """Write down that a campaign has been read, and count the earlier readings of its held-out runs.
-
-    A run is known by the speed that it measured, so that neither another name, comment, tolerance or split of the
-    same runs nor another way of writing them makes a reading the first one. What was fitted before is no blind test.
+    """Write down that the results of a campaign are read, and return `count_readings` as it was before.
 
     Parameters
     ----------
     campaign : that was read
     vehicle_sha256 : of the vehicle file it was held against
 
-    Returns
-    -------
-    Number of readings before this one that had a held-out run of it among their runs.
-
     Raises
     ------
     InputError
         If the ledger is no such file.
     """
-    # a link that the user has named is theirs to follow; one that lies in the working folder is not
-    path = Path(os.environ["MUSYNC_LEDGER"]).resolve() if "MUSYNC_LEDGER" in os.environ else LEDGER
-    known = read_lines(path, {"content_sha256"})
-    held_out = {hash_speed(run) for run in campaign.held_out}
+    before = count_readings(campaign)
     entry = {
         "campaign": campaign.name,
         "content_sha256": campaign.content_hash,
@@ -48,11 +38,35 @@ def record_reading(campaign: Campaign, vehicle_sha256: str) -> int:
         "source_sha256": code_version()["source_sha256"],
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
     }
-    append_line(path, entry)
+    append_line(_find_ledger(), entry)
+    return before
+
+
+def count_readings(campaign: Campaign) -> int:
+    """Return the number of readings so far that had a held-out run of a campaign among their runs.
+
+    A run is known by the speed that it measured, so that neither another name, comment, tolerance or split of the
+    same runs nor another way of writing them makes a reading the first one. What was fitted before is no blind test.
+
+    Parameters
+    ----------
+    campaign : that is to be read
+
+    Raises
+    ------
+    InputError
+        If the ledger is no such file.
+    """
+    held_out = {hash_speed(run) for run in campaign.held_out}
     return sum(
         not held_out.isdisjoint(e.get("speed_sha256", ())) or e["content_sha256"] == campaign.content_hash
-        for e in known
+        for e in read_lines(_find_ledger(), {"content_sha256"})
     )
+
+
+def _find_ledger() -> Path:
+    # a link that the user has named is theirs to follow; one that lies in the working folder is not
+    return Path(os.environ["MUSYNC_LEDGER"]).resolve() if "MUSYNC_LEDGER" in os.environ else LEDGER
 
 
 def hash_speed(run: Run) -> str:

@@ -63,6 +63,8 @@ def connect_sealed(
     for table, names in tables.items():
         refuse_footer(next(iter(names.values())), most[table])
     connection = duckdb.connect(config=_SETTINGS if allow_files else _SETTINGS | _CLOSED)
+    # where Python runs no file, DuckDB would print one to standard output, among the answers
+    connection.execute("SET enable_progress_bar = false")
     paths = {name: path for names in tables.values() for name, path in names.items()}
     connection.register_filesystem(TableFiles(paths, most))
     if not allow_files:

@@ -25,8 +25,8 @@ from flows.running.progress import progress_bar
 from flows.running.runner import open_executor, run_unordered
 from flows.store.address import open_for_reading
 from flows.store.frames import read_clip
-from flows.store.layout import Layout
-from flows.store.outputs import Outputs, read_marker
+from flows.store.layout import Layout, list_abandoned
+from flows.store.outputs import MARKER, Outputs, read_marker
 from flows.store.sealed import read_manifest, recorded_grid, refuse_changed_clips
 from flows.store.telemetry import read_columns
 from manifests.siblings import iterate_pairs
@@ -225,7 +225,8 @@ def _choose_folder(layout: Layout, out: str | None) -> Path:
     if out is None and beside.is_symlink():
         raise InputError(f"{beside}: is a link; name the page's folder with --out")
     folder = Path(out).resolve() if out else beside
-    if folder.is_dir() and any(folder.iterdir()) and COMMAND not in read_marker(folder).values():
+    halves = list_abandoned(folder, {MARKER})  # a report that was killed at its very beginning
+    if folder.is_dir() and {*folder.iterdir()} - {*halves} and COMMAND not in read_marker(folder).values():
         raise InputError(
             f"{folder}: must be new, empty or an earlier report; it holds other files, or a report of an earlier"
             " version, which kept no list of its files: move it away or name another folder"

@@ -13,6 +13,7 @@ from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
+from flows.store.layout import STAGING
 from tasks.errors import InputError
 from tasks.kernel_cache import cache_root
 
@@ -138,15 +139,21 @@ def input_sentence(error: BaseException, given: Sequence[str]) -> str | None:
         sentence = NAMED.get(error.errno or 0)
     if sentence is None:
         return None
-    return f"{cut_middle(path, 200)}: {sentence}" if path else sentence
+    return f"{cut_middle(_name_place(path), 200)}: {sentence}" if path else sentence
 
 
 def disk_full_sentence(error: BaseException) -> str | None:
     """The sentence for a disk, quota or file size limit that is used up; None for any other error."""
     if isinstance(error, OSError) and error.errno in FULL:
-        place = f"{error.filename}: " if error.filename else ""
+        place = f"{_name_place(str(error.filename))}: " if error.filename else ""
         return place + FULL[error.errno]
     return None
+
+
+def _name_place(path: str) -> str:
+    """The path, or the dataset's folder in place of what lies in its staging folder, of which no user has heard."""
+    place = Path(path)
+    return next((str(above.parent) for above in (place, *place.parents) if above.name == STAGING), path)
 
 
 def keep_traceback(error: BaseException, given: Sequence[str]) -> Path | None:

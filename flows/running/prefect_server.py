@@ -101,6 +101,7 @@ def prefect_api(*, pages: bool) -> Iterator[None]:
     # bound here and handed on: no other process can come between and ask the clients for their password
     with socket.create_server(("127.0.0.1", 0), backlog=2048) as door:
         address = f"http://127.0.0.1:{door.getsockname()[1]}"
+        password = _name_password_file(door)
         # the pipe ends with this process; without -P a prefect.py in the working folder would be run
         server = subprocess.Popen(
             [sys.executable, "-P", "-m", "flows.running.prefect_server", str(door.fileno()), str(int(pages))],
@@ -111,7 +112,6 @@ def prefect_api(*, pages: bool) -> Iterator[None]:
             start_new_session=True,
         )
     os.environ[API] = f"{address}/api"
-    password = Path(os.environ[HOME]) / f"password-{address.rpartition(':')[2]}"
     try:
         _wait_until_healthy(server, f"{address}/api/health")
         if pages:
@@ -127,6 +127,11 @@ def prefect_api(*, pages: bool) -> Iterator[None]:
             server.kill()
         password.unlink(missing_ok=True)
         del os.environ[API]
+
+
+def _name_password_file(door: socket.socket) -> Path:
+    """Where the password of the server at a socket lies for its user."""
+    return Path(os.environ[HOME]) / f"password-{door.getsockname()[1]}"
 
 
 def _wait_until_healthy(server: "subprocess.Popen[bytes]", address: str) -> None:
@@ -153,8 +158,11 @@ def serve(door: int, pages: bool) -> None:
     pages : as of `prefect_api`
     """
 
+    listener = socket.socket(fileno=door)
+
     def wait() -> None:
         sys.stdin.buffer.read()
+        _name_password_file(listener).unlink(missing_ok=True)  # whoever wrote it may have been killed
         os.kill(os.getpid(), signal.SIGTERM)
         time.sleep(STOP_S)
         os._exit(1)
@@ -164,7 +172,7 @@ def serve(door: int, pages: bool) -> None:
     from prefect.server.api.server import create_app
 
     app = create_app(ephemeral=not pages, final=True)
-    uvicorn.Server(uvicorn.Config(app, log_level="error")).run([socket.socket(fileno=door)])
+    uvicorn.Server(uvicorn.Config(app, log_level="error")).run([listener])
 
 
 if __name__ == "__main__":

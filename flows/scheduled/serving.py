@@ -94,13 +94,14 @@ def serve_flow(flow: Flow[..., Any], every: str, options: dict[str, Any]) -> Non
         concurrency_limit=AT_ONCE,
         entrypoint_type=EntrypointType.MODULE_PATH,
     )
+    renew_runs(cast(UUID, deployment), shown)  # Prefect's type is that of both its ways to call it
     try:
         asyncio.run(runner.run())
     except (KeyboardInterrupt, asyncio.CancelledError):
         pass  # it was asked to stop
     finally:
         _stop_runs()
-        cancel_runs(cast(UUID, deployment))  # Prefect's type is that of both its ways to call it
+        cancel_runs(cast(UUID, deployment))
 
 
 def read_options(parameters: Mapping[str, Any]) -> dict[str, Any]:
@@ -125,6 +126,20 @@ def _stop_runs() -> None:
         run.kill()
 
 
+def renew_runs(deployment: UUID, parameters: dict[str, Any]) -> None:
+    """Give runs that are due the parameters of today: a flow refuses those that it has no longer.
+
+    Parameters
+    ----------
+    deployment : whose runs
+    parameters : of its flow
+    """
+    with get_client(sync_client=True) as client:
+        for run in client.read_flow_runs(flow_run_filter=_runs_in(deployment, [StateType.SCHEDULED])):
+            if run.parameters != parameters:
+                client.update_flow_run(run.id, parameters=parameters)
+
+
 def cancel_runs(deployment: UUID) -> None:
     """Mark what the server still takes for under way as cancelled: its process is no more, or never began.
 
@@ -132,14 +147,17 @@ def cancel_runs(deployment: UUID) -> None:
     ----------
     deployment : whose runs
     """
-    under_way = FlowRunFilter(
-        deployment_id=FlowRunFilterDeploymentId(any_=[deployment]),
-        state=FlowRunFilterState(type=FlowRunFilterStateType(any_=UNDER_WAY)),
-    )
     message = "the schedule was stopped; committed clips are kept, and its next run makes what is missing"
     try:
         with get_client(sync_client=True) as client:
-            for run in client.read_flow_runs(flow_run_filter=under_way):
+            for run in client.read_flow_runs(flow_run_filter=_runs_in(deployment, UNDER_WAY)):
                 client.set_flow_run_state(run.id, Cancelled(message=message), force=True)
     except (httpx.HTTPError, PrefectException):
         logging.getLogger(__name__).warning("the server could not be told that the schedule was stopped")
+
+
+def _runs_in(deployment: UUID, states: list[StateType]) -> FlowRunFilter:
+    return FlowRunFilter(
+        deployment_id=FlowRunFilterDeploymentId(any_=[deployment]),
+        state=FlowRunFilterState(type=FlowRunFilterStateType(any_=states)),
+    )

@@ -15,6 +15,7 @@ from catalogs.documents import read_json_document
 from flows.store.arrays import arrays_of
 
 STAGED_TABLES = ("ticks", "frames")
+STAGING = ".staging"
 PARTIAL = ".musync-partial"
 """End of the name of a file that is being written."""
 _HALF = re.compile(rf"(.+)\.(\d+)(?:-\d+)?{re.escape(PARTIAL)}", re.DOTALL)
@@ -66,7 +67,7 @@ class Layout:
     @property
     def staging(self) -> Path:
         """Clips that are made but not yet sealed into the dataset."""
-        return self.root / ".staging"
+        return self.root / STAGING
 
     def receipt(self, clip_id: str) -> Path:
         """Written last for each clip: where it exists, the clip is complete."""
@@ -176,10 +177,11 @@ def list_abandoned(folder: Path, names: Container[str]) -> list[Path]:
     names : that the whole ones would have
     """
     halves = ((path, _HALF.fullmatch(path.name)) for path in (folder.iterdir() if folder.is_dir() else ()))
-    return [path for path, half in halves if half and half[1] in names and not _is_alive(int(half[2]))]
+    return [path for path, half in halves if half and half[1] in names and not is_alive(int(half[2]))]
 
 
-def _is_alive(process: int) -> bool:
+def is_alive(process: int) -> bool:
+    """Whether a process of this machine has that number."""
     try:
         os.kill(process, 0)
     except (ProcessLookupError, OverflowError):

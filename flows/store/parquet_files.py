@@ -73,18 +73,3 @@ def refuse_footer(path: Path, most: int, remedy: str = SEALED) -> None:
     if len({*names}) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise InputError(f"{path}: each column must stand once; {shorten(twice)} stands twice: {remedy}")
-
-
-def refuse_rows(path: Path, clip_id: str, rows: int) -> None:
-    """Raise `InputError` for a staged table that does not hold just the rows of one clip.
-
-    Parameters
-    ----------
-    path : of the table
-    clip_id : whose rows
-    rows : how many [1]
-    """
-    refuse_footer(path, rows, STAGED)
-    names = call_reader(path, pq.read_table, path, remedy=STAGED, columns=["clip_id"], **CHECKED)["clip_id"]
-    if len(names) != rows or names.unique().to_pylist() != [clip_id]:
-        raise InputError(f"{path}: must hold {rows} rows of clip {clip_id} and no others: {STAGED}")

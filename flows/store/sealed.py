@@ -12,10 +12,11 @@ from catalogs.grids.form import BEFORE
 from catalogs.sentences import cap_problems, describe_rules, shorten_value
 from flows.store.arrays import arrays_of
 from flows.store.layout import RECORD, STAGED_TABLES, Layout, read_json
-from flows.store.parquet_files import refuse_rows
+from flows.store.telemetry import content_hash, labelled_field, read_table, table_columns
 from manifests.canonical import sha256_of_file
 from manifests.manifest import MANIFEST_FORMAT, head_of_sealed, is_sealed
 from manifests.records import Manifest, ManifestHead, PlanRecord, Receipt, check_record
+from tasks.conventions import FRAME_CHANNELS, TICK_CHANNELS
 from tasks.errors import InputError
 
 PLAN_FORMAT = "musync-plan/2"
@@ -227,7 +228,7 @@ def read_receipt(layout: Layout, clip_id: str) -> Receipt:
 def is_committed(layout: Layout, planned: Mapping[str, Any], rows: Mapping[str, int]) -> bool:
     """Whether a clip need not be made again: its receipt is sound and of the plan, and its files are of the receipt.
 
-    Held against it are the hashes of its pictures, and the rows and the clip of its tables. In an object store
+    Held against it are the hashes of its pictures, and rows, values and labels of its tables. In an object store
     the receipt is sent last and stands for the rest. That the values follow from the inputs is seen by an audit alone.
 
     Parameters
@@ -245,11 +246,35 @@ def is_committed(layout: Layout, planned: Mapping[str, Any], rows: Mapping[str, 
             return False
         if layout.origin is None:
             for table in STAGED_TABLES:
-                refuse_rows(layout.staged(clip_id, table), clip_id, rows[table])
+                if not _is_table_of(layout.staged(clip_id, table), table, receipt, rows[table]):
+                    return False
             refuse_changed_files(layout, receipt["artifacts"])
     except (InputError, OSError):
         return False
     return True
+
+
+def _is_table_of(path: Path, table: str, receipt: Receipt, rows: int) -> bool:
+    """Whether a staged table has the values and labels of a receipt; raises `InputError` if it cannot be read."""
+    held = read_table(path, most=rows)
+    columns = table_columns(held)
+    if len(held) != rows or content_hash(table, columns) != receipt["content"][table]:
+        return False
+    names = {
+        "clip_id": receipt["clip_id"],
+        "label": receipt["label"],
+        "weather": receipt["scenario"]["weather"],
+    }
+    repeated = names | receipt["figures"]
+    hashed = {channel.name for channel in (*FRAME_CHANNELS, *TICK_CHANNELS)}
+    return all(
+        labelled_field(field.name, field.type).equals(field, check_metadata=True)
+        and (
+            field.name in hashed
+            or (field.name in repeated and held[field.name].unique().to_pylist() == [repeated[field.name]])
+        )
+        for field in held.schema
+    )
 
 
 def recorded_grid(content: Mapping[str, Any], place: object) -> GridFile:

@@ -1,6 +1,7 @@
 """The staging folder of a dataset: what muSync puts there, by the form of its name, and taking just that away again."""
 
 import errno
+import os
 import re
 import shutil
 import tempfile
@@ -9,14 +10,15 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from flows.store.address import remove_files
-from flows.store.layout import PARTIAL, STAGED_TABLES, Layout
+from flows.store.layout import PARTIAL, STAGED_TABLES, Layout, is_alive
 from flows.store.lock import sole_writer
 from manifests.canonical import ID_LENGTH
 from tasks.errors import InputError
 
 BEGUN = "begun"
 """Written before anything else: until there is a plan, `inputs` and `frames.zarr` beside it are muSync's own."""
-_SCRATCH = re.compile(r"scratch-\w+")
+_SCRATCH = re.compile(r"scratch-(?:(\d+)-)?\w+")
+"""The number is that of the process that made it."""
 _PLAN_HALF_WRITTEN = re.compile(rf"plan\.json\.\d+-\d+{re.escape(PARTIAL)}")
 _STAGED = re.compile(
     rf"{BEGUN}|[0-9a-f]{{{ID_LENGTH}}}\.(json|({'|'.join(STAGED_TABLES)})\.parquet)|.*{re.escape(PARTIAL)}"
@@ -46,7 +48,9 @@ def abandoned_scratch(layout: Layout) -> list[Path]:
     return sorted(
         path
         for path in _list_entries(layout)
-        if _SCRATCH.fullmatch(path.name) and path.is_dir() and _is_abandoned(Layout(path))
+        if (named := _SCRATCH.fullmatch(path.name))
+        and path.is_dir()
+        and _is_abandoned(Layout(path), named[1])
     )
 
 
@@ -100,14 +104,16 @@ def scratch_dataset(layout: Layout) -> Iterator[Layout]:
     """
     try:
         layout.staging.mkdir(exist_ok=True)
-        folder = Path(tempfile.mkdtemp(prefix="scratch-", dir=layout.staging))
+        folder = Path(tempfile.mkdtemp(prefix=f"scratch-{os.getpid()}-", dir=layout.staging))
     except OSError as error:
         if error.errno not in {errno.EROFS, errno.EACCES, errno.EPERM}:
             raise
         folder = Path(tempfile.mkdtemp(prefix="musync-scratch-"))
     scratch = Layout(folder)
     try:
-        with sole_writer(scratch):  # without a lock it is left over from a killed run
+        with sole_writer(
+            scratch
+        ):  # without a lock it is left over from a killed run, or its maker is about to lock it
             yield scratch
     except InputError as error:
         raise InputError([said.replace(str(folder), str(layout)) for said in error.problems]) from error
@@ -117,10 +123,10 @@ def scratch_dataset(layout: Layout) -> Iterator[Layout]:
             layout.staging.rmdir()
 
 
-def _is_abandoned(scratch: Layout) -> bool:
-    """Whether no live run holds a scratch folder; one without a lock is just being made."""
+def _is_abandoned(scratch: Layout, maker: str | None) -> bool:
+    """Whether no live run holds a scratch folder; one without a lock is just being made, while its maker lives."""
     if not (scratch.staging / "lock").is_file():
-        return False
+        return maker is not None and not is_alive(int(maker))
     try:
         with sole_writer(scratch):
             return True

@@ -1,5 +1,6 @@
 """Telemetry as Arrow tables and Parquet files, labelled from the one table of conventions."""
 
+import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import islice
 from pathlib import Path
@@ -63,6 +64,15 @@ def write_tables(tables: Iterable[pa.Table], path: Path) -> None:
     path : of the file, which is there whole or not at all
     """
     write_pieces(path, encode_tables(tables))
+
+
+def copy_table(source: Path, target: Path) -> None:
+    """Copy a sealed Parquet file; that of an older dataset is written again, with NULL where a value is NaN."""
+    with call_reader(source, pq.ParquetFile, source, pre_buffer=False, **CHECKED) as file:
+        if has_nulls(file.schema_arrow):
+            shutil.copyfile(source, target)
+        else:
+            write_tables(map(null_missing, map(file.read_row_group, range(file.num_row_groups))), target)
 
 
 def encode_tables(tables: Iterable[pa.Table]) -> Iterator[bytes]:

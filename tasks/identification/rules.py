@@ -37,6 +37,8 @@ class JointRules:
     rival_gain_share : share of a named number's gain from which another number counts as its rival [1]
     worse_limit : ratio of held-out errors from which a channel is worse than under the vehicle's file [1]
     wrong_number_tolerances : tolerances from which a number of the vehicle file is wrong [1]
+    rival_gain_share : share of the named number's gain from which another counts as a rival [1]
+    worse_limit : ratio of held-out errors from which a channel is worse than under the frozen model [1]
     """
 
     unknown_gain_tolerance: float
@@ -65,6 +67,8 @@ class JointRules:
     rival_gain_share: float
     worse_limit: float
     wrong_number_tolerances: float
+    rival_gain_share: float
+    worse_limit: float
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,11 +8,9 @@ import pytest
 from benchmarks.physics_judge.__main__ import draw_braked_clip, judge
 from benchmarks.physics_judge.clips import TYRE, StudyClip, draw_clip, make_clip
 from benchmarks.physics_judge.errors import ERRORS
-from catalogs.entries import find_entry
 from catalogs.scenario import Scenario
 from catalogs.tyres import load_tyre
 from catalogs.vehicles import load_vehicle
-from flows.judging.physics_constants import read_property_file
 from tasks.eval.physics.audit import audit_clip
 from tasks.eval.physics.constants import DT
 from tasks.eval.physics.tyres import find_curve
@@ -34,6 +32,7 @@ def braked_clips() -> dict[str, StudyClip]:
     draw, found = np.random.Generator(np.random.Philox(5)), {}
     while len(found) < 2:
         clip = draw_braked_clip(draw)
+        assert not judge(clip)
         found.setdefault(clip.rides[2], clip)
     return found
 
@@ -51,11 +50,18 @@ def test_an_injected_error_breaks_a_law_that_names_its_place_and_size(
     braked_clips: dict[str, StudyClip], name: str, mode: str
 ) -> None:
     clip = braked_clips[mode]
-    assert not judge(clip)
     worst = judge(clip, ERRORS[name](clip))[0]
     assert worst.excess > 2
     assert worst.size > 0
     assert worst.of in worst.columns
+
+
+@pytest.mark.parametrize("car", ["multibody-grown", "bmw-m8"])
+def test_a_wheel_inertia_that_is_five_per_cent_off_breaks_the_wheels_torque_balance(car: str) -> None:
+    clip = make_clip(STOP, load_vehicle(car), "coupled", duration_s=6.0)
+    assert not judge(clip)
+    broken = {law.name: law.size for law in judge(clip, ERRORS["wheel inertia 5 % high"](clip))}
+    assert broken["wheel torque balance, f"] == pytest.approx(1 - 1 / 1.05, rel=0.1)
 
 
 @pytest.mark.parametrize("effect", ["relaxation_length", "fade"])
@@ -77,7 +83,6 @@ def test_the_judges_magic_formula_is_that_of_the_property_file() -> None:
     curve = find_curve(clip.facts, clip.constants)
     tyre = compute_surface_response(vehicle, "rain", clip.facts["surface_friction"]).tyre
     assert isinstance(tyre, MagicFormulaTyre)
-    assert clip.constants.magic == read_property_file(find_entry("tyre", TYRE).read_bytes())
     assert curve.target_slip == pytest.approx(tyre.target_slip, abs=1e-12)
     for slip, load in ((0.01, 2000.0), (0.05, 8000.0), (0.9, 40000.0)):
         expected = compute_magic_formula_friction(slip, load, tyre)

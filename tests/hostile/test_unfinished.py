@@ -65,9 +65,20 @@ def staged_link(stage: Stage) -> None:
     path.symlink_to(stage.victim / "clips.parquet")
 
 
-def change_rows(stage: Stage, change: Callable[[pa.Table], pa.Table]) -> None:
-    path = stage.dataset.staged(clip_of(stage, 0), "frames")
+def change_rows(stage: Stage, change: Callable[[pa.Table], pa.Table], table: str = "frames") -> None:
+    path = stage.dataset.staged(clip_of(stage, 0), table)
     write_parquet(change(pq.read_table(path)), path)
+
+
+def change_column(table: pa.Table, name: str, value: Any = None, unit: str = "") -> pa.Table:
+    """Give a column one value in every row, or another unit."""
+    place = table.schema.get_field_index(name)
+    field, column = table.schema.field(place), table[name]
+    if unit:
+        field = field.with_metadata(field.metadata | {b"units": unit.encode()})
+    if value is not None:
+        column = pa.array([value] * len(table), field.type)
+    return table.set_column(place, field, column)
 
 
 def lock_link(stage: Stage) -> None:
@@ -103,6 +114,16 @@ RECEIPTS: dict[str, Callable[[Stage], object]] = {
     ),
     "whose rows are too many": lambda s: change_rows(s, lambda table: pa.concat_tables([table, table])),
     "whose rows are too few": lambda s: change_rows(s, lambda table: table.slice(1)),
+    "whose ticks have another value": lambda s: change_rows(s, lambda t: change_column(t, "speed", 1.0), "ticks"),
+    "whose frames have another value": lambda s: change_rows(s, lambda t: change_column(t, "pitch", 0.5)),
+    "whose frames have another grip": lambda s: change_rows(s, lambda t: change_column(t, "surface_friction", 0.1)),
+    "whose frames have another weather": lambda s: change_rows(s, lambda t: change_column(t, "weather", "snow")),
+    "whose ticks have another unit": lambda s: change_rows(
+        s, lambda t: change_column(t, "speed", unit="km/h"), "ticks"
+    ),
+    "whose ticks have a column more": lambda s: change_rows(
+        s, lambda t: t.append_column("wisdom", pa.array([1.0] * len(t))), "ticks"
+    ),
     "whose rows are missing": lambda s: s.dataset.staged(clip_of(s, 0), "frames").unlink(),
     "beside a lock that is a link": lock_link,
     "beside inputs that are a link": lambda s: (

@@ -70,6 +70,16 @@ def test_a_sticking_tyre_has_its_own_friction_below_one_speed_and_the_curve_abov
         assert compute_effective_slope(slip, 4e3, 0.4, tyre, effects) == pytest.approx(rise, rel=1e-5)
 
 
+def test_sticking_tyres_do_not_chatter_once_the_brake_is_released(coupled):
+    sticking = {"stick_ratio": 0.777, "stick_below": 1.0, "stick_above": 3.0, "rolling_coefficient": 0.012}
+    brake = command(2.2, onset=0.2, ramp_s=0.0, hold_s=0.333, release_s=0.0)
+    ticks = coupled(brake=brake, speed_km_h=9.53, duration=2.0, effects=sticking).columns
+    rate = np.gradient(ticks["speed"], 1e-3)
+    after = slice(560, 2000)
+    assert np.abs(ticks["longitudinal_acceleration"] - rate)[after].max() < 1e-3
+    assert rate[after] == pytest.approx(-0.12, abs=0.01)
+
+
 def test_the_footprint_feels_the_mean_of_the_road(vehicle):
     road, effects = make_road_feature(HUMP), pack_effect_values({"enveloping_length": 0.2})
     for station in (18.2, 18.9, 20.0, 21.3):

@@ -36,7 +36,8 @@ def body_laws(
     z, dz, theta, dtheta = (ticks[c] for c in ("heave", "heave_rate", "pitch", "pitch_rate"))
     # the brake moment follows dv/dt, so its jumps within a few ticks change both rates
     shaken, hits = is_shaken(ticks, constants), find_hits(ticks, constants)
-    jumpy = _spread_maximum(_largest_input_changes(ticks, facts, constants), STOP_PASS if shaken else 3)
+    literal = constants.steady_limit == 0 and facts["hazard_height_m"] != 0
+    jumpy = _spread_maximum(_largest_input_changes(ticks, facts, constants), STOP_PASS if literal else 3)
     pitch_input = 1.3 * car["sprung_mass"] * car["cg_height"] / car["pitch_inertia"]
     laws: list[Law | None] = []
     for name, x, dx, per_jump in (("heave", z, dz, 0.05), ("pitch", theta, dtheta, pitch_input)):
@@ -80,10 +81,8 @@ def body_laws(
                 5e-3 * size + mass * 5 * jumpy[inner] + 0.5 * spread(np.abs(np.diff(push, 2))[2:-2], 2)
                 + np.where(hits, spread(np.abs(np.diff(push, prepend=push[:1])), 3), 0.0)[inner])
         )  # fmt: skip
-    judged = _judged_rows(ticks, facts, constants, shaken)
-    # where passes converge slowly, the moment is of another deceleration than the ticks' own
-    swings = 5.0 * jumpy if shaken else jumpy
-    laws += _sprung_laws(dz, dtheta, forces, moment, judged, constants, swings, hits)
+    judged = _judged_rows(ticks, facts, constants)
+    laws += _sprung_laws(dz, dtheta, forces, moment, judged, constants, jumpy, hits)
     return laws
 
 
@@ -113,17 +112,15 @@ def _sprung_laws(
 
 
 def _judged_rows(
-    ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants, shaken: bool
+    ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants
 ) -> NDArray[np.bool_]:
-    """Rows whose brake moment follows from the ticks [N]: all but those about a stop on a road feature.
-
-    So it is of a literal stop, and of one on a feature that shakes the car.
+    """Rows whose brake moment follows from the ticks [N]: all but those about a literal stop on a road feature.
 
     There the low-speed rule holds one sample of the last fixed-point pass but one, and the ticks are of the last.
     """
     judged = np.ones(len(ticks["speed"]), bool)
     standing = np.flatnonzero(ticks["speed"] <= 0)
-    if standing.size and (constants.held_share == 0 or shaken) and facts["hazard_height_m"] != 0:
+    if standing.size and constants.held_share == 0 and facts["hazard_height_m"] != 0:
         tyre = constants.tyres[facts["weather"]]
         hold, release = (tyre.at(t, facts["surface_friction"]) for t in (tyre.hold_s, tyre.release_s))
         begin = int(standing[0]) - round(max(hold, CAP_S) / DT) - STOP_PASS
@@ -153,12 +150,11 @@ def _largest_input_changes(
     standing = np.flatnonzero(v <= 0)
     if standing.size:
         tyre = constants.tyres[facts["weather"]]
-        apart = 0 if facts["hazard_height_m"] == 0 else STOP_PASS
         hold, release = (tyre.at(t, facts["surface_friction"]) for t in (tyre.hold_s, tyre.release_s))
         # the low-speed rule starts, caps, releases and ends its input at these times before the stop
         for before in (hold, CAP_S, 0.0, -release):
             k = min(max(int(standing[0]) - round(before / DT), 1), len(swing) - 1)
-            swing[max(k - 1 - apart, 0) : k + 1 + apart] = np.abs(a).max()
+            swing[max(k - 1, 0) : k + 1] = np.abs(a).max()
     return swing
 
 

@@ -7,16 +7,16 @@ import numpy as np
 
 from tasks.eval.physics.constants import Constants, Floats, pressure_at, raised_cosine
 from tasks.eval.physics.half_step import find_brake_onset, pressure_shape
-from tasks.eval.physics.laws import Law, evaluate_law, is_shaken
+from tasks.eval.physics.laws import Law, evaluate_law
 
 AT_A_STEP = 1e-9
 """Time about a tick within which a command that jumps has either value [s]."""
 
-ROAD_PASS = 2e-5
-"""Road height left between the last two fixed-point passes over a road feature [m]."""
+LAST_PASS = 2e-6
+"""Way between the last two passes over a road feature [m]."""
 
-LAST_PASS = 5e-3
-"""Way between the last two passes where a feature shakes the car, and they converge slowly [m]."""
+LITERAL_PASS = 1e-2
+"""The same where the published steps are taken literally: they swing about a stop, and five passes are all [m]."""
 
 
 def command_laws(ticks: Mapping[str, Floats], facts: Mapping[str, Any]) -> list[Law | None]:
@@ -58,14 +58,15 @@ def road_height_laws(
     """
     s, v = ticks["station"], ticks["speed"]
     laws = []
-    shaken = is_shaken(ticks, constants)
     hump = facts["hazard_center_m"], facts["hazard_length_m"], facts["hazard_height_m"]
     moves = v > 0
+    way = LITERAL_PASS if constants.steady_limit == 0 else LAST_PASS
     for axle, behind in (("f", 0.0), ("r", constants.wheelbase)):
-        height, slope = raised_cosine(s - behind, *hump)
+        height, before, after = (raised_cosine(s - behind + shift, *hump)[0] for shift in (0.0, -way, way))
+        apart = np.maximum(np.abs(before - height), np.abs(after - height))
         laws.append(
             evaluate_law(f"road height as commanded, {axle}", f"road_height_{axle} station clips.hazard_height_m"
                 " clips.hazard_center_m clips.hazard_length_m",
-                (ticks[f"road_height_{axle}"] - height)[moves], (ROAD_PASS + LAST_PASS * shaken * np.abs(slope))[moves])
+                (ticks[f"road_height_{axle}"] - height)[moves], (apart + 1e-9)[moves])
         )  # fmt: skip
     return laws

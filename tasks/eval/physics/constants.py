@@ -40,26 +40,6 @@ class TyreTables:
 
 
 @dataclass(frozen=True, kw_only=True)
-class TyreNumbers:
-    """Longitudinal coefficients of the Magic Formula (Pacejka 2012, 4.E9 to 4.E18).
-
-    Parameters
-    ----------
-    nominal_load : of one tyre [N]
-    shape : PCX1 [1]
-    peak : PDX1, PDX2 [1]
-    curvature : PEX1 to PEX4 [1]
-    stiffness : PKX1 to PKX3 [1]
-    """
-
-    nominal_load: float
-    shape: float
-    peak: tuple[float, float]
-    curvature: tuple[float, float, float, float]
-    stiffness: tuple[float, float, float]
-
-
-@dataclass(frozen=True, kw_only=True)
 class Constants:
     """Numbers of the frozen car and pavement, by the names of their catalogue files.
 
@@ -73,7 +53,8 @@ class Constants:
     steady_limit : explicit wheel step beyond which the wheels step implicitly, in time constants; 0 never [1]
     held_share : part of the hold time, up to the stop, over which the released deceleration is the mean [1]
     low_speed_rule : whether the low-speed rule replaces the deceleration that pitches the body
-    magic : the Magic Formula of every wheel; None where the families' Burckhardt curves are the tyre
+    tyre : entries of the property file of every wheel's tyre, as text; None where the families' Burckhardt curves are
+        the tyre
     effects : numbers that the car adds to the plain laws, by name [units of the table of effects]
     forms : port and variable of each form outside that table
     """
@@ -86,7 +67,7 @@ class Constants:
     steady_limit: float = 0.0
     held_share: float = 0.0
     low_speed_rule: bool = True
-    magic: TyreNumbers | None = None
+    tyre: Mapping[str, str] | None = None
     effects: Mapping[str, float] = field(default_factory=dict)
     forms: tuple[tuple[str, str], ...] = ()
 

@@ -29,8 +29,6 @@ WET = ("rain",)
 
 HIT = 0.2
 """Change of an axle's load within a tick, over its load at rest, that no hop of the wheel makes [1]."""
-NEAR = 1e-4
-"""Slip by which a slope of the tyre's curve is taken [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,10 +44,6 @@ class AxleForces:
     tyre_force : against the motion [N]
     torque, torque_error : of the brake, and what the time of the onset, known to an inner step, makes of it [N m]
     spin : acceleration of the wheel [rad/s2]
-    stiffness : share of a wheel speed's deviation that is gone each second [1/s]
-    turns : the wheel's acceleration would carry its slip through 0, or through the ABS's band, within half a tick [N]
-    flips : acceleration that the ABS may give between ticks, where the slip meets an edge of its band [rad/s2]
-    pull : what tyre and brake together could give the wheel [rad/s2]
     hidden : largest change of the tyre force that a tick can hide [N]
     linked : the same of the force that links and a tilted tyre force pass on [N]
     strut : force of spring, damper and links [N]
@@ -66,10 +60,6 @@ class AxleForces:
     torque: Floats
     torque_error: Floats
     spin: Floats
-    stiffness: Floats
-    turns: NDArray[np.bool_]
-    flips: Floats
-    pull: Floats
     hidden: Floats
     linked: Floats
     strut: Floats
@@ -189,17 +179,14 @@ def _compute_axle(
     inertia, band = car[f"wheel_inertia_{axle}"], car["abs_release_width"] * curve.target_slip
     torque_at_wheel = lever * force - ticks[f"brake_torque_{axle}"] - offset - shaft
     spin = np.where(moves, torque_at_wheel / inertia, 0.0)
-    steepest = np.maximum(
-        grip(np.full(len(v), NEAR)) / NEAR, np.abs(grip(kappa + NEAR) - grip(kappa - NEAR)) / 2 / NEAR
-    )
     per_slip = np.maximum(v, car["slip_speed_floor"]) / radius
-    slow = np.where(np.abs(omega) < car["lock_speed"], gain * line / car["lock_speed"], 0.0)
-    stiffness = ((steepest * radius + gain * line / band) / per_slip + slow) / inertia
     room = np.where(spread((q < 1.0).astype(float), 2) > 0, np.minimum(np.abs(kappa), band), np.abs(kappa))
     sways = 3.0 * spread(np.abs(np.diff(kappa, prepend=kappa[:1])), 2)
     sways = np.maximum(sways, 0.1 * band)
+    # the ABS may give this between ticks, where the slip meets an edge of its band
     meets = [np.abs(kappa - edge) < sways for edge in (curve.target_slip, curve.target_slip + band)]
     flips = np.where(meets[0] | meets[1], gain * line / inertia * np.minimum(sways / band, 1.0), 0.0)
+    # its acceleration would carry the slip through 0, or through the ABS's band, within half a tick
     turns = spread((np.abs(spin) * DT >= 0.5 * room * per_slip).astype(float), 2) > 0
     arm = -car["cg_to_front_axle"] if axle == "f" else car["cg_to_rear_axle"]
     travel = ticks["heave"] - u + arm * ticks["pitch"]
@@ -220,9 +207,7 @@ def _compute_axle(
         tyre_force=np.where(moves, grip(kappa), rest),
         torque=np.where(moves, torque, radius * force),
         torque_error=_doubt_line(line, facts, constants) * gain,
-        spin=spin, stiffness=stiffness, turns=turns & moves, flips=flips,
-        pull=(np.abs(radius * force) + np.abs(ticks[f"brake_torque_{axle}"])) / inertia,
-        hidden=hidden, linked=linked + bound_lateral_hold(load, travel, v, curve.peak, constants.effects),
+        spin=spin, hidden=hidden, linked=linked + bound_lateral_hold(load, travel, v, curve.peak, constants.effects),
         strut=strut - links if axle == "f" else strut + links,
         strut_error=(damper * (1.0 + abs(e("damper_asymmetry", 0.0))) + dry) * rate_error,
     )  # fmt: skip

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.eval.physics.constants import DT, Constants, Floats
-from tasks.eval.physics.coupled import AxleForces, Forces, compute_forces, spread
+from tasks.eval.physics.coupled import Forces, compute_forces, spread
 from tasks.eval.physics.effects import AXLE, FORCE, HEAVE, PITCH, SUM, TORQUE
 from tasks.eval.physics.half_step import INNER_STEP
 from tasks.eval.physics.laws import Law, evaluate_law, rounding_tolerance
@@ -19,16 +19,18 @@ from tasks.eval.physics.tyres import find_curve
 
 HIDDEN = 1.5
 """Share of a rate's change of slope that an integral over a tick may miss: half where it jumps within, times 3 [1]."""
-SWING = 20.0
-"""Accelerations by which a wheel may swing within a tick that is as long as its time constant or longer [1]."""
+UNEQUAL = 0.01
+"""Share of its integral by which a wheel's change of speed may miss it over a clip [1]."""
+FAINT = 1e-5
+"""Change of wheel speed in an interval that tells nothing of it [rad/s]."""
+FEWEST = 20
+"""Intervals that a ratio over all of them needs [1]."""
 AROUND = 20
 """Ticks about a row whose largest force an error of second order of the inner step follows: a quarter of a hop [1]."""
 SLIGHT = 5e-4
 """Share of the clip's largest force that is always in doubt [1]."""
 EDGE = 4
 """Ticks at either end where differences know the axle's rate less well [1]."""
-BALANCE = 3e-3
-"""Share of tyre's and brake's pull within which a stiff wheel's inertia is not told from rounding [1]."""
 STATES = "heave pitch heave_rate pitch_rate unsprung_heave_f unsprung_heave_r"
 """Columns that decide the struts' forces."""
 
@@ -68,9 +70,7 @@ def integral_law(
     doubt : [N] largest error of the rate itself [any/s]
     floor : rounding of the column [any]
     """
-    inner = np.concatenate([rate[:1], rate, rate[-1:]])
-    gained = DT / 24 * (13 * (inner[1:-2] + inner[2:-1]) - inner[:-3] - inner[3:])
-    gained[[0, -1]] = DT / 2 * (rate[:-1] + rate[1:])[[0, -1]]
+    inner, gained = np.concatenate([rate[:1], rate, rate[-1:]]), _integrate(rate)
     bend = spread(np.abs(np.diff(inner, 2)), 2)
     bend = bend + np.where(hits, spread(np.abs(np.diff(rate, prepend=rate[:1])), 3), 0.0)
     unsure = HIDDEN * bend + spread(np.broadcast_to(doubt, rate.shape), 1)
@@ -80,6 +80,42 @@ def integral_law(
     k = np.arange(len(values) - 1) if rows is None else np.flatnonzero(rows)
     law = evaluate_law(name, columns, (np.diff(values) - gained)[k], tolerance[k])
     return None if law is None else law.moved_to(k)
+
+
+def balance_law(name: str, columns: str, values: Floats, rate: Floats, rows: NDArray[np.bool_]) -> Law | None:
+    """Return the law that a column changes by the integral of its rate, as one ratio over all intervals.
+
+    A wheel swings between ticks by more than its inertia does, so one interval says little. The ratio is the median of
+    all, each weighted by its integral; its bound is `UNEQUAL` and the distance within which half of them lie.
+
+    Parameters
+    ----------
+    name, columns : as in ``evaluate_law``
+    values, rate : [N] the column and its rate at the ticks [any, any/s]
+    rows : [N - 1] intervals that are judged
+    """
+    gained = _integrate(rate)
+    k = np.flatnonzero(rows & (np.abs(gained) > FAINT))
+    if k.size < FEWEST:
+        return None
+    missed, weight = np.diff(values)[k] / gained[k] - 1.0, np.abs(gained[k])
+    middle = _find_weighted_median(missed, weight)
+    apart = _find_weighted_median(np.abs(missed - middle), weight)
+    return evaluate_law(name, columns, np.array([middle]), UNEQUAL + apart)
+
+
+def _integrate(rate: Floats) -> Floats:
+    """Integral of a rate over each interval by the rates at four ticks, [N - 1]."""
+    inner = np.concatenate([rate[:1], rate, rate[-1:]])
+    gained = DT / 24 * (13 * (inner[1:-2] + inner[2:-1]) - inner[:-3] - inner[3:])
+    gained[[0, -1]] = DT / 2 * (rate[:-1] + rate[1:])[[0, -1]]
+    return gained
+
+
+def _find_weighted_median(values: Floats, weight: Floats) -> float:
+    order = np.argsort(values)
+    total = np.cumsum(weight[order])
+    return float(values[order][np.searchsorted(total, 0.5 * total[-1])])
 
 
 def _axle_laws(
@@ -105,8 +141,8 @@ def _axle_laws(
         evaluate_law(f"{TORQUE}, {axle}", f"brake_torque{x} abs_scale{x} brake_pressure_mpa",
             torque - at.torque, rounding_tolerance(torque) + 1e-9 + at.torque_error),
         *_abs_laws(ticks, forces, axle, curve.target_slip, constants),
-        integral_law(f"wheel torque balance, {axle}", f"wheel_speed{x} tyre_force{x} brake_torque{x} tyre_load{x}",
-            omega, at.spin, forces.hits, rows=_leave_out_stop(rolls), doubt=_doubt_spin(at), floor=1e-6),
+        balance_law(f"wheel torque balance, {axle}", f"wheel_speed{x} tyre_force{x} brake_torque{x} tyre_load{x}",
+            omega, at.spin, rolls),
         evaluate_law(f"wheel starts rolling, {axle}", f"wheel_speed{x} clips.initial_speed_km_h",
             omega[:1] - facts["initial_speed_km_h"] / 3.6 / radius, 1e-9),
         evaluate_law(f"wheel stands with the car, {axle}", f"wheel_speed{x} speed", omega[~forces.moves], 1e-12),
@@ -121,21 +157,9 @@ def _axle_laws(
     ]  # fmt: skip
 
 
-def _leave_out_stop(rolls: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Intervals less the last ones before a stop, in which the wheel stops within an inner step, [N - 1]."""
-    return rolls & (np.concatenate([rolls[EDGE:], np.full(EDGE, rolls[-1])]))
-
-
 def _doubt_rate(acceleration: Floats, unsure: Floats) -> Floats:
     """Largest change of a rate that a tick can hide, where its own rate jumps or is unsure, [N]."""
     return DT * (0.5 * spread(np.abs(np.diff(acceleration, prepend=acceleration[:1])), 1) + unsure)
-
-
-def _doubt_spin(at: AxleForces) -> Floats:
-    """Largest change of a wheel's acceleration that a tick can hide: a wheel swings back within its time constant."""
-    swings = np.minimum((at.stiffness * DT) ** 2, 1.0) * SWING
-    swung = np.where(at.turns, SWING, swings) * spread(np.abs(at.spin), 2)
-    return np.asarray(swung + swings / SWING * BALANCE * at.pull + at.flips)
 
 
 def _abs_laws(

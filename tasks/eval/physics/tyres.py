@@ -9,7 +9,6 @@ import numpy as np
 from tasks.eval.physics.constants import (
     Constants,
     Floats,
-    TyreNumbers,
     compute_burckhardt_friction,
     peak_slip,
 )
@@ -18,6 +17,28 @@ MOST_LOAD_CHANGE = 2.0
 """df_z above which friction over load stays as it is [1] (docs/reference/tyres.md)."""
 BISECTIONS = 80
 """Halvings of the slip's interval [1]."""
+BLOWN = ("61", "62")
+"""Values of FITTYP whose forces depend on the pressure."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MagicNumbers:
+    """Longitudinal coefficients of the Magic Formula (Pacejka 2012, 4.E9 to 4.E18).
+
+    Parameters
+    ----------
+    nominal_load : of one tyre [N]
+    shape : PCX1 [1]
+    peak : PDX1, PDX2 [1]
+    curvature : PEX1 to PEX4 [1]
+    stiffness : PKX1 to PKX3 [1]
+    """
+
+    nominal_load: float
+    shape: float
+    peak: tuple[float, float]
+    curvature: tuple[float, float, float, float]
+    stiffness: tuple[float, float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,12 +68,13 @@ def find_curve(facts: Mapping[str, Any], constants: Constants) -> TyreCurve:
     """
     family = constants.tyres[facts["weather"]]
     beta = family.at(family.slip_stiffness, facts["surface_friction"])
-    if constants.magic is None:
+    if constants.tyre is None:
         return _scale_burckhardt(family.burckhardt, facts["tyre_peak"], beta)
+    magic = read_magic_formula(constants.tyre)
     meant = family.at(family.efficiency, facts["surface_friction"]) * facts["surface_friction"]
-    curve = _scale_magic_formula(constants.magic, facts["tyre_peak"], beta)
+    curve = _scale_magic_formula(magic, facts["tyre_peak"], beta)
     # a curve without a peak before full slip has its stated peak there, below eta mu_c
-    return curve if curve.target_slip < 1.0 else _scale_magic_formula(constants.magic, meant, beta)
+    return curve if curve.target_slip < 1.0 else _scale_magic_formula(magic, meant, beta)
 
 
 def _scale_burckhardt(base: tuple[float, float, float], peak: float, beta: float) -> TyreCurve:
@@ -76,7 +98,7 @@ class _Scaled(NamedTuple):
     E: Floats
 
 
-def _scale_magic_formula(tyre: TyreNumbers, peak: float, beta: float) -> TyreCurve:
+def _scale_magic_formula(tyre: MagicNumbers, peak: float, beta: float) -> TyreCurve:
     def scale(load: Floats) -> _Scaled:
         df = np.minimum(np.asarray(load) / (2.0 * tyre.nominal_load) - 1.0, MOST_LOAD_CHANGE)
         D = peak * (1.0 + tyre.peak[1] / tyre.peak[0] * df)
@@ -108,30 +130,29 @@ def _scale_magic_formula(tyre: TyreNumbers, peak: float, beta: float) -> TyreCur
     )
 
 
-def read_tyre_numbers(entries: Mapping[str, float], *, newer: bool) -> TyreNumbers:
+def read_magic_formula(entries: Mapping[str, str]) -> MagicNumbers:
     """Return the longitudinal numbers of a tyre property file, with its factors and its pressure in them.
 
     Parameters
     ----------
-    entries : numbers by their names in the file; a factor that it lacks is 1, a coefficient 0
-    newer : whether the file is of MF 6.1, whose forces depend on the pressure
+    entries : values by their names in the file, as text; a factor that it lacks is 1, a coefficient 0
     """
 
     def factor(name: str) -> float:
-        return entries.get(name, 1.0)
+        return float(entries.get(name, 1.0))
 
     def number(name: str) -> float:
-        return entries.get(name, 0.0)
+        return float(entries.get(name, 0.0))
 
     blown = (
         number("INFLPRES") / number("NOMPRES") - 1.0
-        if newer and number("INFLPRES") * number("NOMPRES") > 0
+        if entries["FITTYP"] in BLOWN and number("INFLPRES") * number("NOMPRES") > 0
         else 0.0
     )
     bend = factor("LEX")
     stiffer = factor("LKX") * (1.0 + number("PPX1") * blown + number("PPX2") * blown**2)
     grip = factor("LMUX") * (1.0 + number("PPX3") * blown + number("PPX4") * blown**2)
-    return TyreNumbers(
+    return MagicNumbers(
         nominal_load=number("FNOMIN") * factor("LFZO"),
         shape=number("PCX1") * factor("LCX"),
         peak=(number("PDX1") * grip, number("PDX2") * grip),

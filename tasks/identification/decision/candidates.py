@@ -1,4 +1,4 @@
-"""Candidates: the numbers that may explain a residual, each with the sizes that it may have, and forms outside the table.
+"""Candidates: numbers that may explain a residual, each with the sizes that it may have, and forms beside them.
 
 Every number of the table belongs to every explanation. One that is not named stays within a *spike* about the vehicle
 file's value: the size that matters to nobody, or the file's own tolerance. One that is named has the *slab*, the sizes
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.campaign import SESSION
-from tasks.identification.decision.forms import FORM_BOUND, KEYS, KNOTS, PORT_STEP
+from tasks.identification.decision.forms import FORM_BOUND, FORM_MATTERS, KEYS, KNOTS, PORT_STEP
 from tasks.identification.inference.derivatives import list_second_values
 from tasks.identification.inference.forward import RunModel
 from tasks.identification.joint.numbers import reaches_limit, saturates_tyres
@@ -159,8 +159,8 @@ def list_columns(
         Candidate(
             name=f"form {port}({variable})", effect_class="form", port=port, variable=variable, effect=None, second=nan,
             columns=tuple(range(splines + KNOTS * i, splines + KNOTS * (i + 1))), base=-1,
-            slab=rules.form_width * PORT_STEP[port], lower=-FORM_BOUND * PORT_STEP[port],
-            upper=FORM_BOUND * PORT_STEP[port], matters=PORT_STEP[port],
+            slab=rules.form_width * FORM_MATTERS[port], lower=-FORM_BOUND * PORT_STEP[port],
+            upper=FORM_BOUND * PORT_STEP[port], matters=FORM_MATTERS[port],
             log_prior=-log(CLASSES * len(KEYS)) - log(rules.form_odds),
         )
         for i, (port, variable) in enumerate(KEYS)

@@ -33,7 +33,12 @@ class Experiment:
 
 
 def plan_next_experiment(
-    evidence: Evidence, first: Fit, second: Fit, vehicle: Vehicle, surface: SurfaceParameters
+    evidence: Evidence,
+    first: Fit,
+    second: Fit,
+    between: tuple[str, str],
+    vehicle: Vehicle,
+    surface: SurfaceParameters,
 ) -> Experiment | None:
     """Return the planned run with the largest nuisance-marginalised D2 between two fits; None if all are alike.
 
@@ -41,6 +46,7 @@ def plan_next_experiment(
     ----------
     evidence : the runs, and the noise of their sensors and the priors of the planned one
     first, second : fitted explanations
+    between : what each names that the other does not
     vehicle, surface : the judged model
     """
     rho, sigma = evidence.sensors
@@ -77,5 +83,4 @@ def plan_next_experiment(
             best = (plan, distance)
     if best[1] < evidence.rules.least_expected_d2:
         return None
-    names = (first.parts[-1].name, second.parts[-1].name if second.parts else "the model as it stands")
-    return Experiment(between=names, plan=best[0], expected_d2=best[1])
+    return Experiment(between=between, plan=best[0], expected_d2=best[1])

@@ -26,7 +26,16 @@ PORT_STEP = {
     "pitch_moment": 60.0,
     "suspension_force": 40.0,
 }
-"""Size of a form that matters at each port, for derivatives [unit of the port]."""
+"""Step of a knot at each port, for derivatives [unit of the port]."""
+FORM_MATTERS = {
+    "longitudinal_force": 30.0,
+    "brake_torque": 0.02,
+    "friction": 0.03,
+    "pitch_moment": 150.0,
+    "suspension_force": 60.0,
+}
+"""Smallest form that matters at each port: 0.02 m/s2, 2 % of the torque, 3 % of friction, 0.06 deg of pitch and 2 mm
+of a spring [unit of the port]."""
 SCANNED = {
     "longitudinal_force": ("speed", "deceleration", "pressure"),
     "brake_torque": ("speed", "pressure", "disc_temperature", "pressure_rate"),

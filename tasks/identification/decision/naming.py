@@ -1,7 +1,5 @@
 """Named effects of an explanation, fitted alone through the simulation, with their intervals."""
 
-from collections.abc import Sequence
-from dataclasses import replace
 from math import log
 
 import numpy as np
@@ -11,7 +9,7 @@ from tasks.campaign.campaign import SESSION
 from tasks.identification.decision.answer import NamedEffect, Parameter
 from tasks.identification.decision.candidates import Candidate
 from tasks.identification.decision.forms import KNOTS, find_scanned_ranges, make_form_hypotheses
-from tasks.identification.decision.odds import Explanation, RunGrams, weigh_explanation
+from tasks.identification.decision.odds import Explanation, RunGrams, keep_members, weigh_explanation
 from tasks.identification.decision.search import Finding, make_hypotheses, widen_session
 from tasks.identification.decision.told import OpenExplanation
 from tasks.identification.inference.fit import Fit, fit_hypotheses
@@ -57,29 +55,6 @@ def fit_told(finding: Finding, opened: OpenExplanation) -> Fit:
     return min((fit(trial) for trial in trials), key=lambda fitted: fitted.objective)
 
 
-def keep_members(explanation: Explanation, members: Sequence[Candidate]) -> Explanation:
-    """Return an explanation with some of its members alone, at the same values.
-
-    Parameters
-    ----------
-    explanation : with all members
-    members : those that are kept
-    """
-    places = [explanation.find_places(m) for m in explanation.members]
-    kept = [
-        (m, s, c)
-        for m, s, c in zip(explanation.members, places, explanation.spreads, strict=True)
-        if m in members
-    ]
-    take = np.concatenate(
-        [np.empty(0, dtype=np.int64), *(np.arange(s.start, s.stop) for _, s, _ in kept)]
-    ).astype(int)
-    return replace(
-        explanation, members=tuple(m for m, *_ in kept), values=explanation.values[take],
-        errors=explanation.errors[take], spreads=tuple(c for *_, c in kept),
-    )  # fmt: skip
-
-
 def name_members(opened: OpenExplanation, grams: RunGrams, fitted: Fit | None) -> list[NamedEffect]:
     """Return what an explanation tells in the form in which the verdict reports it, what gains most first.
 
@@ -107,7 +82,7 @@ def name_members(opened: OpenExplanation, grams: RunGrams, fitted: Fit | None) -
                 score=score,
                 gain=gain,
                 spread=spread,
-            )  # fmt: skip
+            )
         )
     return sorted(named, key=lambda effect: -effect.gain)
 

@@ -7,7 +7,7 @@ variance is that of DerSimonian and Laird (1986, doi:10.1016/0197-2456(86)90046-
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, log
 
 import numpy as np
@@ -154,7 +154,9 @@ def weigh_explanation(
     )  # fmt: skip
 
 
-def search_explanations(grams: RunGrams, *, most: int, width: int, spread: bool = True) -> list[Explanation]:
+def search_explanations(
+    grams: RunGrams, *, most: int, width: int, spread: bool = True, forms: bool = True
+) -> list[Explanation]:
     """Return explanations of up to some members, the best first; no member at all is always among them.
 
     Sets grow by one candidate at a time from the best of those before (beam search).
@@ -165,12 +167,17 @@ def search_explanations(grams: RunGrams, *, most: int, width: int, spread: bool 
     most : members of an explanation
     width : sets of each size that grow further
     spread : count what differs from run to run
+    forms : try forms too
     """
-    found = {(): weigh_explanation(grams, ())}
+    found: dict[tuple[int, ...], Explanation | None] = {(): weigh_explanation(grams, ())}
     beam: list[tuple[int, ...]] = [()]
     candidates = grams.columns.candidates
-    seen = np.einsum("rii->i", grams.information)
-    shown = [j for j, c in enumerate(candidates) if float(seen[list(c.columns)].max()) * c.slab**2 > 1.0]
+    seen = np.einsum("rii->i", grams.information)  # of all runs
+    shown = [
+        j
+        for j, c in enumerate(candidates)
+        if float(seen[list(c.columns)].max()) * c.slab**2 > 1.0 and (forms or c.base >= 0)
+    ]
     for _ in range(most):
         grown: dict[tuple[int, ...], Explanation] = {}
         for known in beam:
@@ -218,9 +225,9 @@ def compare_explanations(
     """Return the logarithm of the odds of one explanation against another [1].
 
     What the runs disagree about on the line from one to the other counts as a random effect there: two explanations
-    that half of the runs decide either way are not told apart, however much each run gains. No model has the signature
-    of an effect exactly as the car does; what its relative error leaves over is no evidence (model discrepancy, Kennedy
-    and O'Hagan 2001, doi:10.1111/1467-9868.00294).
+    that half of the runs decide either way are not told apart, however much each run gains. The run that speaks most
+    for the first does not count. No model has the signature of an effect exactly as the car does; what its relative
+    error leaves over is no evidence (model discrepancy, Kennedy and O'Hagan 2001, doi:10.1111/1467-9868.00294).
 
     Parameters
     ----------
@@ -239,7 +246,9 @@ def compare_explanations(
     weight = np.zeros(len(size))
     weight[informed] = 1.0 / (1.0 / size[informed] + spread)
     place = np.divide(pull, size, out=np.zeros(len(size)), where=informed)
-    robust = float(np.sum(weight * (0.5 - place)))
+    by_run = weight * (0.5 - place)
+    # no comparison hangs on one run
+    robust = float(by_run.sum() - max(by_run.max(), 0.0)) if len(by_run) >= FEWEST else float(by_run.sum())
     prior = sum(m.log_prior for m in one.members) - sum(m.log_prior for m in other.members)
     odds = one.gain - other.gain + prior - plain + robust
     return temper_odds(odds, max(one.gain, other.gain), signature_error)
@@ -255,6 +264,29 @@ def temper_odds(log_odds: float, gain: float, signature_error: float) -> float:
     signature_error : its relative error in a model of the car [1]
     """
     return log_odds / (1.0 + signature_error**2 * max(gain, 0.0))
+
+
+def keep_members(explanation: Explanation, members: Sequence[Candidate]) -> Explanation:
+    """Return an explanation with some of its members alone, at the same values.
+
+    Parameters
+    ----------
+    explanation : with all members
+    members : those that are kept
+    """
+    places = [explanation.find_places(m) for m in explanation.members]
+    kept = [
+        (m, s, c)
+        for m, s, c in zip(explanation.members, places, explanation.spreads, strict=True)
+        if m in members
+    ]
+    take = np.concatenate(
+        [np.empty(0, dtype=np.int64), *(np.arange(s.start, s.stop) for _, s, _ in kept)]
+    ).astype(int)
+    return replace(
+        explanation, members=tuple(m for m, *_ in kept), values=explanation.values[take],
+        errors=explanation.errors[take], spreads=tuple(c for *_, c in kept),
+    )  # fmt: skip
 
 
 def estimate_spread(size: NDArray[np.float64], pull: NDArray[np.float64]) -> float:

@@ -1,6 +1,7 @@
 """The search: linearise the runs, weigh every explanation, fit the best one through the simulation, and begin again."""
 
 from dataclasses import dataclass, replace
+from math import log
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,14 @@ from tasks.identification.decision.forms import (
     make_spline_hypothesis,
     rewhiten_splines,
 )
-from tasks.identification.decision.odds import Explanation, RunGrams, search_explanations
+from tasks.identification.decision.odds import (
+    Explanation,
+    RunGrams,
+    compare_explanations,
+    keep_members,
+    search_explanations,
+)
+from tasks.identification.decision.told import tell_members
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.discrepancy import estimate_run_noise, set_run_noise
 from tasks.identification.inference.fit import Fit, fit_hypotheses
@@ -37,6 +45,8 @@ Splines = tuple[NDArray[np.float64], ...]
 """Derivatives of every training run by the knots of all splines, float64 [M, K] each."""
 STEPS = 6
 """Gauss-Newton steps of a fit [1]."""
+REFINED = 3
+"""Single candidates that are tried through the simulation before the first turn [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,8 +92,9 @@ def find_explanations(
 ) -> Finding:
     """Return the explanations of what a model misses in the training runs, with their odds.
 
-    The first turn takes the single candidate that gains most, so that what it hides comes to light. Every further turn
-    weighs sets of candidates about the fit of the turn before, until the best set is the one that was fitted.
+    First comes the single candidate that gains most, so that what it hides comes to light. Every further turn weighs
+    sets of candidates about the fit of the turn before, until the best set is the one that was fitted: of the library,
+    then with forms.
 
     Parameters
     ----------
@@ -106,21 +117,60 @@ def find_explanations(
     )
     columns = list_columns(numbers, retuned, evidence.session_sigma, rules)
     null = place.fitted
-    for turn in range(rules.most_turns):
-        grams = gather_grams(place.evidence, place.fitted, place.splines, columns)
-        found: list[Explanation] = []
-        if turn == 0:
-            found = search_explanations(grams, most=1, width=1, spread=False)
-        if not found or not found[0].members:
-            found = search_explanations(grams, most=rules.most_effects, width=rules.beam_width)
-        if _is_fitted(found[0], place.fitted):
-            break
-        place = _move_to(found[0], place, null, settle=turn == 0)
-    else:
-        grams = gather_grams(place.evidence, place.fitted, place.splines, columns)
-        found = search_explanations(grams, most=rules.most_effects, width=rules.beam_width)
+    grams = gather_grams(place.evidence, place.fitted, place.splines, columns)
+    first = _refine_first(search_explanations(grams, most=1, width=1, spread=False, forms=False), place, null)
+    if first is not None:
+        place = _move_to(first, place, null, settle=True)
+    for forms in (False, True):
+        place, grams, found = _settle_explanation(place, null, columns, rules, forms=forms)
     return Finding(
         evidence=place.evidence, null=null, fitted=place.fitted, grams=grams, explanations=tuple(found)
+    )
+
+
+def _refine_first(found: list[Explanation], place: _Place, null: Fit) -> Explanation | None:
+    """Return the single candidate that explains most through the simulation, of those that seem to; None without one.
+
+    A linear estimate of a delay, or of what decides when an anti-lock brake acts, is a hint.
+    """
+    hopeful = [e for e in found if e.members and e.log_odds > 0.0][:REFINED]
+    fits = [
+        fit_hypotheses(
+            place.evidence.train, make_hypotheses(e, place.evidence),
+            widen_session(e, place.evidence.session_sigma), session=null.session, iterations=STEPS,
+        )
+        for e in hopeful
+    ]  # fmt: skip
+    costs = [
+        0.5 * f.objective - sum(m.log_prior for m in e.members) for f, e in zip(fits, hopeful, strict=True)
+    ]
+    return hopeful[int(np.argmin(costs))] if hopeful else None
+
+
+def _settle_explanation(
+    place: _Place, null: Fit, columns: Columns, rules: DecisionRules, *, forms: bool
+) -> tuple[_Place, RunGrams, list[Explanation]]:
+    """Return where what the best explanation tells is fitted, what the runs say there, and all explanations.
+
+    Forms come after the library: what an effect of the library explains is no form.
+    """
+    for turn in range(rules.most_turns):
+        grams = gather_grams(place.evidence, place.fitted, place.splines, columns)
+        found = search_explanations(grams, most=rules.most_effects, width=rules.beam_width, forms=forms)
+        told = keep_members(found[0], tell_members(grams, found[0], rules))
+        here = next((e for e in found if _is_fitted(e, place.fitted)), None)
+        if turn == rules.most_turns - 1 or _is_fitted(told, place.fitted):
+            break
+        if forms and here is not None and not _is_worth_it(found[0], here, grams, rules):
+            break
+        place = _move_to(told, place, null, settle=False)
+    return place, grams, found
+
+
+def _is_worth_it(best: Explanation, here: Explanation, grams: RunGrams, rules: DecisionRules) -> bool:
+    """Whether an explanation with a form is so much more likely than the fitted one that it takes its place."""
+    return best is not here and compare_explanations(grams, best, here, rules.signature_error) > log(
+        rules.named_odds
     )
 
 

@@ -13,7 +13,7 @@ from tasks.identification.decision.odds import (
     RunGrams,
     can_stand_for,
     compare_explanations,
-    temper_odds,
+    weigh_explanation,
 )
 from tasks.identification.rules import DecisionRules
 
@@ -41,21 +41,34 @@ class OpenExplanation:
         """Return the names of what it tells."""
         return frozenset(member.name for member in self.told)
 
+    @property
+    def numbers(self) -> Told:
+        """Return the numbers of what it tells: a drag with and without a wind is one number."""
+        return frozenset(m.name if m.effect is None else m.effect.parameters[0].name for m in self.told)
 
-def tell_members(explanation: Explanation, rules: DecisionRules) -> tuple[Candidate, ...]:
-    """Return the members that are larger than what matters, at the odds of a name.
+
+def tell_members(grams: RunGrams, explanation: Explanation, rules: DecisionRules) -> tuple[Candidate, ...]:
+    """Return the members that the runs tell at the odds of a name: to be there, and to be larger than what matters.
+
+    None of an explanation whose odds against nothing are less.
 
     Parameters
     ----------
+    grams : of the runs
     explanation : its members with values and errors
     rules : the odds
     """
+    if explanation.log_odds <= log(rules.named_odds):
+        return ()
     reach = float(ndtri(rules.named_odds / (1.0 + rules.named_odds)))
     told = []
     for member in explanation.members:
         places = explanation.find_places(member)
         certain = np.abs(explanation.values[places]) - reach * explanation.errors[places]
-        if float(certain.max()) > member.matters:
+        if float(certain.max()) <= member.matters:
+            continue
+        without = weigh_explanation(grams, [m for m in explanation.members if m is not member])
+        if without is None or explanation.log_odds - without.log_odds > log(rules.named_odds):
             told.append(member)
     return tuple(told)
 
@@ -78,13 +91,8 @@ def list_open_explanations(
     ranked = list(explanations)[: rules.most_compared]
     by_told: dict[Told, OpenExplanation] = {}
     for explanation in ranked:
-        told = tell_members(explanation, rules)
+        told = tell_members(grams, explanation, rules)
         against = -compare_explanations(grams, ranked[0], explanation, rules.signature_error)
-        # neither the runs that disagree about a member, nor those that disagree between two explanations, may be for it
-        against = min(
-            against,
-            temper_odds(explanation.log_odds - ranked[0].log_odds, ranked[0].gain, rules.signature_error),
-        )
         known = by_told.get(frozenset(m.name for m in told))
         if known is None or against > known.log_odds:
             found = OpenExplanation(explanation=explanation, told=told, log_odds=against)
@@ -97,7 +105,9 @@ def list_open_explanations(
         (f for f in within if f.names <= best.names or _has_form(best) > _has_form(f)),
         key=lambda found: (_has_form(found), len(found.names), -found.log_odds),
     )
-    others = [f for f in within if not f.names >= simplest.names and not _holds_again(f, simplest)]
+    apart = [f for f in within if not f.numbers >= simplest.numbers and not _holds_again(f, simplest)]
+    # of explanations that add to one another the simplest stands for all
+    others = [f for f in apart if not any(g.names < f.names for g in apart)]
     others.sort(key=lambda found: -found.log_odds)
     return [
         OpenExplanation(explanation=f.explanation, told=f.told, log_odds=f.log_odds - simplest.log_odds)

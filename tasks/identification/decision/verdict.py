@@ -98,7 +98,7 @@ def judge_runs(
     tried = _list_tried(finding, first)
     reasons = tell_open_explanations(opened, finding.explanations, rules)
     if not named:
-        reasons += say_not_named(tried, finding.best, tell_members(finding.best, rules), rules)
+        reasons += say_not_named(tried, finding.best, tell_members(finding.grams, finding.best, rules), rules)
     reasons += [tell_driven(drive)] if driven else []
     reasons += tell_log_faults(campaign, named, [rival.name for _, rival in rivals])
     reasons += tell_present_effects(vehicle)
@@ -179,6 +179,9 @@ def _plan(
 ) -> Experiment | None:
     """Return the run that tells the first explanation from its closest rival, or what is suggested from nothing."""
     if others:
+        names = frozenset(part.name for part in fitted.parts)
+        told = (sorted(names - others[0].names), sorted(others[0].names - names))
+        between = tuple(" and ".join(own) or "nothing" for own in told)
         pair = (fitted, fit_told(finding, others[0]))
     elif fitted.parts:
         return None
@@ -186,10 +189,9 @@ def _plan(
         suggested = _find_suggested(finding)
         if suggested is None:
             return None
+        between = (suggested.told[0].name, "the model as it stands")
         pair = (fit_told(finding, suggested), finding.null)
-    if not all(fit.parts for fit in pair[:1]):
-        return None
-    return plan_next_experiment(finding.evidence, *pair, vehicle, surface)
+    return plan_next_experiment(finding.evidence, *pair, (between[0], between[1]), vehicle, surface)
 
 
 def _find_suggested(finding: Finding) -> OpenExplanation | None:

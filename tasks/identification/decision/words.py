@@ -47,14 +47,14 @@ def tell_verdict(
     rivals : that cannot be told from them
     library : effects that may be named
     error, manoeuvres : on runs to which no number was fitted
-    suggested : what the training runs show and the held-out runs neither confirm nor contradict, if nothing is named
+    suggested : the best candidate, if nothing is named
     misses : whether the runs disagree with the model, and with what is named, by more than their noise
     own : what the vehicle's own numbers that the runs moved say of the car
     """
     if not effects and suggested is not None:
         return (
-            "These runs prove nothing that the model lacks. The training runs suggest that"
-            f" {say_effect(suggested, library)}; the held-out runs do not confirm it."
+            "These runs prove nothing that the model lacks. They suggest that"
+            f" {say_effect(suggested, library)}, at odds that are too small for a name."
         )
     if not effects:
         nothing = (
@@ -87,13 +87,10 @@ def tell_verdict(
         # what a name is worth stands in another channel
         worth = min(error, key=lambda name: error[name].after / max(error[name].retuned, 1e-12))
         figures = {worth: error[worth]} | figures
-    moved = _say_errors(figures, retuned=True)
-    how = "that takes" if len(told) == 1 else "together they take"
-    if own:
-        how = f"with the vehicle's own numbers fitted too ({own}), {how}"
     rest = " The speed is still missed by more than its noise: more is lacking than that." if misses else ""
-    done = f"{how} the error {moved}, on runs to which no number was fitted."
-    return f"{text[0].upper()}{text[1:]}; {done}{rest}"
+    beside = f"With the vehicle's own numbers fitted too ({own}), that " if own else "That "
+    done = f"{beside}{_say_change(figures)}, on runs to which no number was fitted."
+    return f"{text[0].upper()}{text[1:]}. {done}{rest}"
 
 
 def _is_told_apart(error: ChannelError) -> bool:
@@ -102,12 +99,23 @@ def _is_told_apart(error: ChannelError) -> bool:
 
 
 def _say_errors(figures: Mapping[str, ChannelError], *, retuned: bool = False) -> str:
-    """Return from what to what errors fall, and with ``retuned`` to what the vehicle's own numbers alone take them."""
+    """Return from what to what errors go, and with ``retuned`` to what the vehicle's own numbers alone take them."""
     return join_phrases(
         f"of the {name.replace('_', ' ')} from {say_number(e.frozen)}"
         f"{f' (re-tuned {say_number(e.retuned)})' if retuned else ''} to {say_number(e.after)} {e.unit}"
         for name, e in figures.items()
     )
+
+
+def _say_change(figures: Mapping[str, ChannelError]) -> str:
+    """Return which errors fall and which grow: "lowers the error of the speed from 1 to 0.1 m/s"."""
+    lower = {name: e for name, e in figures.items() if e.after <= e.frozen}
+    higher = {name: e for name, e in figures.items() if e.after > e.frozen}
+    phrases = [f"lowers the error {_say_errors(lower, retuned=True)}"] if lower else []
+    phrases += (
+        [f"raises {'that' if lower else 'the error'} {_say_errors(higher, retuned=True)}"] if higher else []
+    )
+    return join_phrases(phrases)
 
 
 def tell_open_explanations(

@@ -106,7 +106,7 @@ def _add_sensor(name: str, unit: str, bounds: tuple[float, float], step: float) 
 EFFECT_TABLE = (
     # numbers of the vehicle that may be off
     _change_field("pressure_gain", "scaled", ("brake_gain",), (-0.4, 0.4), 0.01),
-    _change_field("mass", "scaled", ("sprung_mass",), (-0.3, 0.3), 0.01),
+    _change_field("mass", "scaled", ("sprung_mass", "pitch_inertia"), (-0.3, 0.3), 0.01),
     _add_number("pitch_gain", "brake-pitch gain", "1", "parameter", (-0.4, 0.4), 0.01, PAPER),
     _change_field("wheel_radius", "scaled", ("wheel_radius",), (-0.08, 0.08), 0.003),
     _change_field("damping", "scaled", ("suspension_damping_f", "suspension_damping_r"), (-0.6, 1.0), 0.02),

@@ -54,9 +54,10 @@ def compute_axle_slope(
 ) -> AxleSlope:
     """Return the derivatives of speed and wheel rate through the slip of one axle.
 
-    What is stiff counts as soon as the wheel can reach it within the step: the pad friction of a locked wheel, and the
-    anti-lock brake, which takes all torque away within a few percent of slip. A wheel that is only met there after a
-    step has swung through it, and swings on; its motion then hangs on rounding.
+    What is stiff counts as soon as the wheel can reach it within the step: the pad friction of a locked wheel, the
+    anti-lock brake, which takes all torque away within a few percent of slip, and the turn of a sticking tyre's force
+    at slip 0. A wheel that is only met there after a step has swung through it, and swings on; its motion then hangs
+    on rounding. The chord from slip 0, divided by gamma, ends the first stage short of slip 0.
 
     Parameters
     ----------
@@ -80,6 +81,8 @@ def compute_axle_slope(
         force = compute_effective_slope(abs(ports.force_slip), load, share, tyre, chassis.effects) * load
         width = wheels.release_width * tyre.target_slip
         ahead = ports.slip + slip_per_wheel * change
+        if share > 0.0 and ports.force_slip * ahead < 0.0:
+            force = max(force, ports.tyre_force / ports.force_slip / GAMMA)
         enters = (
             max(ports.slip, ahead) > tyre.target_slip and min(ports.slip, ahead) < tyre.target_slip + width
         )

@@ -223,3 +223,13 @@ def test_a_topic_of_two_publishers_in_turns_is_given_by_the_publisher(tmp_path: 
     with pytest.raises(InputError, match=r"/car is written by several publishers in turns.* as /car#"):
         read_signals(path, take_speed("/car.speed"))
     assert read_signals(path, take_speed("/car#2.speed"))["/car#2.speed"].values.tolist() == [11.0, 13.0]
+
+
+def test_a_package_that_lacks_one_of_its_own_is_not_taken_for_missing(tmp_path, monkeypatch):
+    (tmp_path / "rosbags.py").write_text("import no_such_codec")
+    (tmp_path / "log.mcap").write_bytes(b"")
+    for loaded in [name for name in sys.modules if name.partition(".")[0] == "rosbags"]:
+        monkeypatch.delitem(sys.modules, loaded)
+    monkeypatch.syspath_prepend(tmp_path)
+    told = read_refusal(tmp_path / "log.mcap", "/car.speed")
+    assert "rosbags, which is installed and does not load" in told and "no_such_codec" in told

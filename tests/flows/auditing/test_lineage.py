@@ -128,7 +128,7 @@ def test_the_runs_that_a_vehicle_was_fitted_to_are_named(kept, tmp_path, quick):
     reseal(copy)
     result = trace_lineage(str(copy.root), "dry/flat")
     assert not result["follows"] and "NOT as recorded" in format_text(result)
-    assert result["measured"]["procedure"] == "coupled-stops"
+    assert result["measured"]["procedure"] == "coupled-grown"
     assert f"hump-dry: {result['measured']['data_sha256']['hump-dry']}" in format_text(result)
 
 

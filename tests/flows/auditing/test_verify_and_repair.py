@@ -1,6 +1,7 @@
 """A flipped bit is found and named, what is broken is made again byte for byte, left-overs go."""
 
 import json
+import os
 import random
 import shutil
 
@@ -152,6 +153,10 @@ def test_left_overs_of_killed_runs_go_and_nothing_else(toy_dataset, copy, tmp_pa
     for name in ("dead", "live"):
         (copy.staging / f"scratch-{name}" / ".staging").mkdir(parents=True)
         (copy.staging / f"scratch-{name}" / ".staging" / "lock").touch()
+    # killed, or just about to make its lock
+    begun = [copy.staging / f"scratch-{maker}-abc" for maker in (2**22 + 1, os.getpid())]
+    for folder in begun:
+        folder.mkdir()
     (copy.staging / f"{'0' * 16}.json").write_text("{}")
     mine = [
         copy.staging / "notes.txt", copy.root / "thesis.partial.tex", tmp_path / ".audit-2025" / ".staging" / "lock"
@@ -163,7 +168,8 @@ def test_left_overs_of_killed_runs_go_and_nothing_else(toy_dataset, copy, tmp_pa
         named = collect_garbage(str(copy.root), dry_run=True)["removed"]
         assert (copy.staging / f"{'0' * 16}.json").exists()
         assert collect_garbage(str(copy.root))["removed"] == named
-        assert len(named) == 3
+        assert len(named) == 4
+        assert [folder.exists() for folder in begun] == [False, True]
         assert (copy.staging / "scratch-live").exists()
     assert not (copy.staging / "scratch-dead").exists()
     assert all(path.exists() for path in mine)

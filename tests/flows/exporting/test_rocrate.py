@@ -8,6 +8,7 @@ import pytest
 import musync
 from flows.exporting.export import export_dataset
 from manifests.canonical import sha256_of_file
+from tests.flows.older import make_older
 
 
 @pytest.fixture(scope="module")
@@ -28,6 +29,21 @@ def test_every_part_is_there_with_its_hash_and_the_run_names_inputs_and_results(
     assert {row["@id"] for row in run["object"]} == {f"inputs/{name}" for name in manifest["inputs"]}
     for row in run["result"]:
         assert graph[row["@id"]]["sha256"] == manifest["artifacts"][row["@id"]]
+
+
+def test_a_crate_of_an_older_dataset_keeps_its_bytes_and_says_that_they_hold_nan(
+    folder, toy_dataset, tmp_path
+):
+    older = make_older(toy_dataset, tmp_path / "older")
+    export_dataset(
+        str(older.root), "ro-crate", out=str(tmp_path / "out"), clips=list(musync.open(older.root))
+    )
+    name = "telemetry/clips.parquet"
+    assert (tmp_path / "out" / name).read_bytes() == (older.root / name).read_bytes()
+    told = [
+        "hold NaN" in (place / "ro-crate-metadata.json").read_text() for place in (tmp_path / "out", folder)
+    ]
+    assert told == [True, False]
 
 
 def test_prov_reads_what_the_run_used_and_made(folder, toy_dataset):

@@ -14,6 +14,7 @@ from flows.auditing.audit import audit_dataset
 from flows.auditing.driven_lines import Asked, drive_clip, is_driven, load_entries
 from flows.auditing.explain import explain_frame
 from flows.auditing.kept_lines import list_lines
+from flows.auditing.repair import repair_dataset
 from flows.judging.physics import audit_physics, clip_columns, clip_facts
 from flows.judging.physics_constants import read_constants
 from flows.making.freezing import frozen_run
@@ -138,3 +139,16 @@ def test_an_open_question_of_sampling_hides_no_tenth_of_a_grade(hill):
 def test_a_road_steeper_than_any_street_is_refused_since_up_is_somewhere_else(tmp_path):
     with pytest.raises(InputError, match=r"grade of the road must be at most 0.35 .*z axis must point up"):
         make_plan(write_hill(tmp_path, grade=1.5), "cpu")
+
+
+def test_repair_makes_the_grade_again_from_the_scene(tmp_path: Path) -> None:
+    layout = generate_dataset(
+        write_hill(tmp_path), str(tmp_path / "data"), runner="threads", workers=1
+    ).layout
+    kept = layout.inputs / ROAD_GRADE
+    before = kept.read_bytes()
+    kept.unlink()
+    assert repair_dataset(str(layout.root), runner="threads", workers=1)["restored"] == [
+        f"inputs/{ROAD_GRADE}"
+    ]
+    assert kept.read_bytes() == before

@@ -152,17 +152,12 @@ def test_inputs_that_change_while_clips_are_made_are_not_sealed(grid, tmp_path, 
     assert not (tmp_path / "data" / "manifest.json").exists()
 
 
-def test_damaged_rows_of_a_clip_that_is_made_are_not_sealed(grid, whole, tmp_path, monkeypatch):
+def test_a_clip_whose_rows_were_damaged_is_made_again(grid, whole, tmp_path, monkeypatch):
     layout = stop_before_the_end(grid, tmp_path / "data", monkeypatch)
     rows = next(layout.staging.glob("*.ticks.parquet"))
     content = bytearray(rows.read_bytes())
     content[len(content) // 4] ^= 1
     rows.write_bytes(content)
-    with pytest.raises(
-        InputError, match="remove it, and the same musync generate command makes its clip again"
-    ):
-        make(grid, layout.root)
-    rows.unlink()
     make(grid, layout.root)
     assert files_of(layout.root) == whole
 

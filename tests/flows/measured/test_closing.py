@@ -16,12 +16,14 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_provenance
 from flows.cli import app
 from flows.making.plan import make_plan
+from flows.measured import closing
 from flows.measured.closing import close_loop, find_unused_tolerances, verdict_json
 from flows.measured.closing_ledger import record_reading
 from flows.measured.friction_pulls import find_pulled_runs, tell_friction_pulls
 from flows.measured.grown_vehicle import grown_vehicle
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS, SESSION, Campaign
 from tasks.campaign.planned_runs import RunPlan
+from tasks.errors import InputError
 from tasks.identification.benchmark import TOLERANCES, make_synthetic_campaign
 from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter, Verdict
 from tasks.identification.inference.disturbance import Disturbance
@@ -244,6 +246,22 @@ def test_a_ledger_from_before_runs_were_hashed_still_counts(
     assert record_reading(judging(1, "a"), "v") == 1
 
 
+def test_a_call_that_ends_before_it_has_a_result_has_read_nothing(
+    lagging: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def give_up(*_: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setenv("MUSYNC_LEDGER", str(tmp_path / "ledger.jsonl"))
+    monkeypatch.setattr(closing, "judge_campaign", give_up)
+    with pytest.raises(MemoryError):
+        close_loop(str(lagging), out=str(tmp_path / "out"))
+    assert not (tmp_path / "ledger.jsonl").exists()
+    (tmp_path / "ledger.jsonl").write_text("no entry\n")
+    with pytest.raises(InputError, match="line 1 must be a JSON object"):  # not after minutes of fitting
+        close_loop(str(lagging), out=str(tmp_path / "out"))
+
+
 def parameter(name: str, value: float, unit: str = "1") -> Parameter:
     return Parameter(
         name=name, value=value, ci_low=0.9 * value, ci_high=1.1 * value, lower=0.0, upper=9.0, unit=unit
@@ -325,7 +343,5 @@ def test_a_dataset_is_planned_with_the_grown_vehicle_in_coupled_mode(tmp_path: P
 
 
 def test_a_folder_that_is_no_campaign_is_the_users_mistake(tmp_path: Path) -> None:
-    from tasks.errors import InputError
-
     with pytest.raises(InputError, match=r"needs campaign\.yaml"):
         close_loop(str(tmp_path), out=str(tmp_path / "out"))

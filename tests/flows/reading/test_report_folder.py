@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from flows.reading.report import make_report, pack_columns
+from flows.store.layout import PARTIAL
+from flows.store.outputs import MARKER
 from tasks.errors import InputError
 
 
@@ -34,6 +36,13 @@ def test_a_folder_that_only_looks_like_a_report_is_left_alone(toy_dataset, tmp_p
     with pytest.raises(InputError, match="must be new, empty or an earlier report"):
         make_report(str(toy_dataset.root), out=str(tmp_path))
     assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+
+
+def test_a_report_that_was_killed_before_its_list_was_there_is_made_again(toy_dataset, tmp_path):
+    half = tmp_path / f"{MARKER}.{2**22 + 1}-7{PARTIAL}"
+    half.write_text("{")
+    make_report(str(toy_dataset.root), out=str(tmp_path), clips=["dry/flat"])
+    assert (tmp_path / "index.html").is_file() and not half.exists()
 
 
 def test_a_page_is_not_written_through_links(toy_dataset, tmp_path):

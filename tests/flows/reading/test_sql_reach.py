@@ -219,3 +219,10 @@ def test_two_threads_read_one_open_file_each_at_its_own_place(tmp_path):
     other.join()
     assert file.read(2) == bytes([10, 11]) and file.tell() == 12
     assert file.seek(-1, os.SEEK_END) == 99 and file.read() == bytes([99])
+
+
+def test_no_progress_bar_stands_among_the_answers_of_a_program_without_a_file(toy_dataset):
+    ask = "SELECT current_setting('enable_progress_bar')"
+    code = f"import musync; print(musync.open({str(toy_dataset.root)!r}).sql({ask!r}).fetchall())"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=SOURCE_ROOT)
+    assert done.stdout == "[(False,)]\n", done.stderr

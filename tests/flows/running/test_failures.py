@@ -52,6 +52,7 @@ def caused(error: BaseException, cause: BaseException) -> BaseException:
         (InputError(["a: is wrong", "b: is wrong"]), "musync: a: is wrong\nmusync: b: is wrong\n"),
         (InputError("first line\nmusync: forged"), "musync: first line\n  musync: forged\n"),
         (oserror(errno.EACCES), "data/x.json: there is no permission"),
+        (oserror(errno.EACCES, "data/.staging/lock"), "musync: data: there is no permission"),
         (oserror(errno.EPERM), "there is no permission"),
         (oserror(errno.EROFS), "read-only"),
         (oserror(errno.ENOSPC), "the disk is full; what is committed is kept: free space"),

@@ -31,6 +31,7 @@ from tests.flows.running.calls import (
     square_or_fail,
     tell_process_id,
 )
+from tests.hostile.other_user import run_as_other
 
 
 @pytest.fixture(scope="module")
@@ -131,6 +132,40 @@ def test_nobody_without_the_certificates_of_a_run_reaches_its_scheduler(executor
     address = executors["dask"]._client.scheduler.address.replace("tls", scheme)
     with pytest.raises(InputError, match=said), open_executor("dask", None, address):
         pass
+
+
+REACH = """
+logging.disable()
+async def reach(address, call):
+    try:
+        return await asyncio.wait_for(call(address), 20)
+    except (TypeError, OSError, asyncio.TimeoutError) as error:  # of a comm that is closed, too
+        return type(error).__name__
+async def run_code(address):
+    async with Client(address, asynchronous=True, timeout=3) as client:
+        return await client.run_on_scheduler(os.getuid)
+async def call(address):
+    async with rpc(address, timeout=3) as remote:
+        return await remote.identity()
+async def reach_all():
+    for address in sys.argv[1:]:
+        for call_it in (run_code, call):
+            print(await reach(address, call_it))
+asyncio.run(reach_all())
+"""
+
+
+def test_another_user_runs_no_code_in_the_scheduler_or_the_workers_of_a_run(executors):
+    imports = "import asyncio, logging\nfrom distributed import Client\nfrom distributed.core import rpc"
+    client = executors["dask"]._client
+    address, worker = next(iter(client.scheduler_info(n_workers=-1)["workers"].items()))
+    doors = [client.scheduler.address, address, worker["nanny"]]
+    assert all(door.startswith("tls://127.0.0.1:") for door in doors)
+    tried = [door.replace("tls", scheme) for door in doors for scheme in ("tls", "tcp")]
+    said = run_as_other(REACH, *tried, imports=imports).splitlines()
+    assert len(said) == 2 * len(tried)
+    assert set(said) <= {"TypeError", "OSError", "CommClosedError", "TimeoutError"}, said
+    assert executors["dask"].submit(os.getuid).result() == os.getuid()
 
 
 @pytest.mark.parametrize("runner", ["process", "Dask", ""])

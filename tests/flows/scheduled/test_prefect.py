@@ -108,11 +108,13 @@ def stopped_schedule():
         def add_and_submit(self, flow, **options):
             deployment = add(self, flow, **options)
             client.create_flow_run_from_deployment(deployment, state=Submitting())
+            client.create_flow_run_from_deployment(deployment, parameters={"grid": "old.yaml", "notify": "true"})
             return deployment
         serving.Runner.add_flow = add_and_submit
         serving.serve_flow(prefect_schedule.scheduled, "0 3 1 1 *", parameters)
         runs = [run for run in client.read_flow_runs() if run.deployment_id]
-    return [run.state.name for run in runs if run.state.type != StateType.SCHEDULED]
+    due = [run.parameters for run in runs if run.state.type == StateType.SCHEDULED and not run.auto_scheduled]
+    return [run.state.name for run in runs if run.state.type != StateType.SCHEDULED], due
 
 if __name__ == "__main__":  # a worker of Dask needs none of this
     import asyncio
@@ -247,7 +249,11 @@ def test_the_record_of_a_run_says_how_it_ended_and_its_metrics_are_prometheus_te
 
 
 def test_a_stopped_schedule_says_nothing_and_leaves_no_run_that_seems_to_go_on(runs):
-    assert runs["stopped"] == ["Cancelled"]
+    assert runs["stopped"][0] == ["Cancelled"]
+
+
+def test_a_run_that_is_due_from_before_gets_the_parameters_of_today(runs):
+    assert runs["stopped"][1] == [{"grid": "grid.yaml", "root": "stopped"}]
     assert "never awaited" not in runs["said_late"]
 
 
