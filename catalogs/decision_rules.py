@@ -39,8 +39,6 @@ class JointRulesEntry(CatalogueEntry):
     better_prediction_share: Level
     equal_prediction_share: Level
     same_fit_errors: Level
-    rival_gain_share: Share
-    worse_limit: Level
     wrong_number_tolerances: Level
     rival_gain_share: Share
     worse_limit: Level

@@ -34,8 +34,6 @@ class JointRules:
     equal_prediction_share : share of the held-out misfit of all channels up to which a fit without a number is as
         good [1]
     same_fit_errors : standard errors within which the numbers of two fits are the same [1]
-    rival_gain_share : share of a named number's gain from which another number counts as its rival [1]
-    worse_limit : ratio of held-out errors from which a channel is worse than under the vehicle's file [1]
     wrong_number_tolerances : tolerances from which a number of the vehicle file is wrong [1]
     rival_gain_share : share of the named number's gain from which another counts as a rival [1]
     worse_limit : ratio of held-out errors from which a channel is worse than under the frozen model [1]
@@ -64,8 +62,6 @@ class JointRules:
     better_prediction_share: float
     equal_prediction_share: float
     same_fit_errors: float
-    rival_gain_share: float
-    worse_limit: float
     wrong_number_tolerances: float
     rival_gain_share: float
     worse_limit: float

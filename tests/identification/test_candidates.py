@@ -48,7 +48,9 @@ def test_every_column_is_of_one_candidate_and_one_number_stands_once_in_the_base
     used = [place for c in COLUMNS.candidates for place in c.columns]
     assert len(used) == len(set(used)) and max(used) < COLUMNS.count
     assert len(set(COLUMNS.base.tolist())) == len(COLUMNS.base) == len(COLUMNS.spike)
-    drag, wind = (next(c for c in COLUMNS.candidates if c.name == n) for n in ("aerodynamic_drag", "headwind"))
+    drag, wind = (
+        next(c for c in COLUMNS.candidates if c.name == n) for n in ("aerodynamic_drag", "headwind")
+    )
     assert drag.base == wind.base, "both are a drag area, which an explanation has once"
 
 

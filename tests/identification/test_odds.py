@@ -107,14 +107,30 @@ def test_of_two_explanations_of_one_gain_the_one_about_which_the_runs_agree_has_
     assert disputed.log_odds < agreed.log_odds - 20.0
 
 
-def test_a_comparison_of_two_explanations_reads_the_same_from_either_side() -> None:
-    grams = balance((5.0, 4.0), (6.0, 4.5), (4.0, 5.0), (7.0, 3.0), (5.0, 5.0))
-    one, other = (weigh_explanation(grams, [c]) for c in grams.columns.candidates)
-    assert one is not None and other is not None
+def test_a_comparison_reads_the_same_from_either_side_but_for_the_run_that_speaks_most_for_the_first() -> (
+    None
+):
+    pulls = ((5.0, 4.0), (6.0, 4.5), (5.0, 5.0), (7.0, 3.0), (5.0, 5.0))
     for signature_error in (0.0, 0.1):
-        there = compare_explanations(grams, one, other, signature_error)
-        back = compare_explanations(grams, other, one, signature_error)
-        assert there > 1.0 and there == pytest.approx(-back, rel=1e-9)
+        whole, few = [], []
+        for compared, runs in ((whole, pulls), (few, pulls[:2])):
+            grams = balance(*runs)
+            one, other = (weigh_explanation(grams, [c]) for c in grams.columns.candidates)
+            assert one is not None and other is not None
+            compared += [
+                compare_explanations(grams, one, other, signature_error),
+                -compare_explanations(grams, other, one, signature_error),
+            ]
+        # of two runs none can be left out
+        assert few[0] > 0.5 and few[0] == pytest.approx(few[1], rel=1e-9)
+        assert 0.5 < whole[0] < whole[1]
+
+
+def test_no_comparison_hangs_on_one_run() -> None:
+    grams = balance((12.0, 0.0), (5.0, 5.0), (5.0, 5.0), (5.0, 5.0), (5.0, 5.0))
+    one, other = (weigh_explanation(grams, [c]) for c in grams.columns.candidates)
+    assert one is not None and other is not None and one.gain - other.gain > 5.0
+    assert abs(compare_explanations(grams, one, other, 0.0)) < 1.0
 
 
 def test_two_explanations_that_half_of_the_runs_decide_either_way_are_not_told_apart() -> None:

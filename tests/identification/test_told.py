@@ -31,16 +31,16 @@ def names(opened: Sequence[OpenExplanation]) -> list[set[str]]:
 
 
 @pytest.mark.parametrize(("matters", "told"), [(2.5, {"brake_lag"}), (2.95, set()), (3.5, set())])
-def test_a_member_is_told_where_it_is_surely_larger_than_what_matters(
-    matters: float, told: set[str]
-) -> None:
+def test_a_member_is_told_where_it_is_surely_larger_than_what_matters(matters: float, told: set[str]) -> None:
     """A lag of 3 +- 0.05: that 2.95 is smaller has odds of 5 : 1, and that something is there e^1800."""
     opened = open_explanations([replace(LAG, matters=matters)], np.array([[10.0]]), [3.0])
     assert names(opened) == [told]
     assert opened[0].explanation.log_odds > 100.0
 
 
-@pytest.mark.parametrize(("log_prior", "told"), [(-7.0, {"brake_lag"}), (0.0, {"brake_lag", "aerodynamic_drag"})])
+@pytest.mark.parametrize(
+    ("log_prior", "told"), [(-7.0, {"brake_lag"}), (0.0, {"brake_lag", "aerodynamic_drag"})]
+)
 def test_the_simpler_of_two_explanations_is_told_unless_the_odds_speak_for_the_other(
     log_prior: float, told: set[str]
 ) -> None:
