@@ -67,7 +67,7 @@ def test_a_miss_is_measured_by_the_half_of_the_interval_on_its_side(truth: float
 
 def answer(name: str) -> SimpleNamespace:
     effect = SimpleNamespace(name=name, port="brake_torque", variable="pressure", parameters=())
-    verdict = SimpleNamespace(verdict="FOUND", effects=(effect,), rivals=(), tried=(), reasons=())
+    verdict = SimpleNamespace(verdict="FOUND", effects=(effect,), rivals=(), odds=(), tried=(), reasons=())
     return SimpleNamespace(verdict=verdict)
 
 

@@ -14,7 +14,6 @@ def make_effect(name: str) -> NamedEffect:
     p = Parameter(name=name, value=0.1, ci_low=0.0, ci_high=1.0, lower=0.0, upper=1.0, unit="s")
     return NamedEffect(
         name=name, effect_class="effect", port="", variable="", parameters=(p,), score=0.0, gain=0.0,
-        inflation=1.0, held_out_gain=0.0, cross_validated_gain=0.0, win_share=1.0,
     )  # fmt: skip
 
 

@@ -16,7 +16,7 @@ from tasks.vehicle.tyres.burckhardt import compute_burckhardt_friction, scale_bu
 RULES = load_decision_rules()
 FORM = NamedEffect(
     name="pitch_form", effect_class="form", port="pitch_moment", variable="speed", parameters=(),
-    score=45.6, gain=89.0, inflation=1.6, held_out_gain=0.4, cross_validated_gain=0.0, win_share=0.0,
+    score=45.6, gain=89.0,
 )  # fmt: skip
 ERROR = ChannelError(
     frozen=1.0, retuned=1.0, after=1.0, ci_low=0.0, ci_high=1.0, change_low=-1.0, change_high=0.0, wins=3,

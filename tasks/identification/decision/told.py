@@ -88,7 +88,11 @@ def list_open_explanations(
     explanations : the best first
     rules : the odds
     """
-    ranked = list(explanations)[: rules.most_compared]
+    listed = list(explanations)
+    ranked = listed[: rules.most_compared]
+    # what an effect of the library explains is held against every form
+    plain = [e for e in listed if all(m.effect is not None for m in e.members)]
+    ranked += [e for e in plain[: rules.most_compared // 2] if not any(e is known for known in ranked)]
     by_told: dict[Told, OpenExplanation] = {}
     for explanation in ranked:
         told = tell_members(grams, explanation, rules)
@@ -101,9 +105,16 @@ def list_open_explanations(
     most = max(found.log_odds for found in by_told.values())
     within = [found for found in by_told.values() if found.log_odds >= most - span]
     best = max(within, key=lambda found: found.log_odds)
+    # what a form has beyond an effect of the library may be the law of that effect in another car
+    laws = [
+        f
+        for f in by_told.values()
+        if f.told and _has_form(best) > _has_form(f)
+        and compare_explanations(grams, best.explanation, f.explanation, rules.law_error) <= span
+    ]  # fmt: skip
     simplest = min(
-        (f for f in within if f.names <= best.names or _has_form(best) > _has_form(f)),
-        key=lambda found: (_has_form(found), len(found.names), -found.log_odds),
+        laws or [f for f in within if f.names <= best.names],
+        key=lambda found: (len(found.names), -found.log_odds),
     )
     apart = [f for f in within if not f.numbers >= simplest.numbers and not _holds_again(f, simplest)]
     # of explanations that add to one another the simplest stands for all

@@ -102,9 +102,6 @@ def judge_jointly(
     surface: SurfaceParameters,
     numbers: Sequence[JointNumber],
     rules: DecisionRules,
-    *,
-    disagreement: str = "",
-    names_numbers: bool = True,
 ) -> JointOutcome:
     """Calibrate a car on its training runs, take away what does not earn its place, and name what is left.
 
@@ -114,15 +111,13 @@ def judge_jointly(
     vehicle, surface : the model that is judged
     numbers : that a fit may move
     rules : of the decision
-    disagreement : why single effects could not be told; empty where they were not looked for
-    names_numbers : whether numbers of the vehicle's file may be named without any other name; else they are calibrated
     """
     joint = rules.joint
     stops = [make_stop(run, vehicle, surface, campaign.channels, joint) for run in campaign.runs]
     train = tuple(stop for stop in stops if not stop.model.run.held_out)
     held_out = tuple(stop for stop in stops if stop.model.run.held_out)
     shown = choose_numbers(numbers, campaign, [stop.model for stop in train], joint)
-    reasons = [disagreement] if disagreement else []
+    reasons: list[str] = []
     selected, agreeing = select_numbers(campaign, train, held_out, shown, joint, reasons)
     find_feigned = make_driver_check(campaign, vehicle, surface, train, joint)
     selected = drop_feigned_numbers(train, selected, find_feigned, joint, reasons)
@@ -165,12 +160,6 @@ def judge_jointly(
     disputed = {substitute.of for substitute in substitutes}
     effects += [e for e in calibrated if e.parameters[0].name in disputed]
     calibrated = [e for e in calibrated if e not in effects]
-    if not names_numbers and all(e.effect_class == "retune" for e in effects):
-        reasons += [
-            f"{effect.name} is told as a number of the vehicle's own: other physics may stand behind it"
-            for effect in effects
-        ]
-        effects, calibrated, substitutes = [], [*effects, *calibrated], ()
     rivals = name_rivals(fitted, substitutes, effects, joint)
     reasons += tell_what_was_used(campaign, train, agreeing, joint)
     reasons += tell_rivals(effects, rivals, shown)
@@ -199,7 +188,6 @@ def judge_jointly(
         experiment=None,
         step_sensitive=(),
         reasons=tuple(reasons),
-        disagreement=disagreement,
     )  # fmt: skip
     verdict = tell_miss(verdict, campaign, joint.foreign_misfit, left.follows)
     if verdict.misses:

@@ -13,10 +13,6 @@ from tasks.vehicle.effects.table import build_parameter_vector
 FOUND = {
     "score": 50.0,
     "gain": 60.0,
-    "inflation": 1.0,
-    "held_out_gain": 9.0,
-    "cross_validated_gain": 0.0,
-    "win_share": 1.0,
 }
 
 
@@ -47,7 +43,7 @@ def found_form(port: str, variable: str, shape: str, scale: float, *coefficients
 def verdict_of(*effects: NamedEffect) -> Verdict:
     """A verdict that names these effects."""
     return Verdict(
-        verdict="FOUND", effects=effects, rivals=(), tried=(), error={}, manoeuvre_error={}, correlation={},
+        verdict="FOUND", effects=effects, rivals=(), odds=(), tried=(), error={}, manoeuvre_error={}, correlation={},
         session_pulls={}, noise={}, disturbance=Disturbance(), detectable={}, campaign="toy", content_hash="c" * 64,
         split_hash="d" * 64, theta=build_parameter_vector({}), slots=(), experiment=None, step_sensitive=(), reasons=(),
     )  # fmt: skip

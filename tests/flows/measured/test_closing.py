@@ -271,7 +271,6 @@ def parameter(name: str, value: float, unit: str = "1") -> Parameter:
 def named(name: str, kind: str, *parameters: Parameter) -> NamedEffect:
     return NamedEffect(
         name=name, effect_class=kind, port="p", variable="v", parameters=parameters, score=50.0, gain=60.0,
-        inflation=1.0, held_out_gain=9.0, cross_validated_gain=0.0, win_share=1.0,
     )  # fmt: skip
 
 
@@ -281,7 +280,7 @@ def verdict_of(*effects: NamedEffect) -> Verdict:
         worst_run="run-01", unit="m/s",
     )  # fmt: skip
     return Verdict(
-        verdict="FOUND", effects=effects, rivals=(), tried=(), error=dict.fromkeys(CHANNELS, error),
+        verdict="FOUND", effects=effects, rivals=(), odds=(), tried=(), error=dict.fromkeys(CHANNELS, error),
         manoeuvre_error={"peak_pitch": error}, correlation={},
         session_pulls=dict.fromkeys(SESSION, (0.0, 0.0)), noise=dict.fromkeys(CHANNELS, (0.0, 1.0)),
         disturbance=Disturbance(), detectable={"bump_stop": float("inf")}, campaign="toy", content_hash="c" * 64,

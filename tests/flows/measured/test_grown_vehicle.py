@@ -28,7 +28,7 @@ def drag(value: float, name: str = "aerodynamic_drag") -> NamedEffect:
     )
     return NamedEffect(
         name=name, effect_class="effect", port="longitudinal_force", variable="speed", parameters=(parameter,),
-        score=50.0, gain=60.0, inflation=1.0, held_out_gain=9.0, cross_validated_gain=0.0, win_share=1.0,
+        score=50.0, gain=60.0,
     )  # fmt: skip
 
 
@@ -36,7 +36,7 @@ def verdict_of(
     effect: NamedEffect, campaign: str, rivals: tuple[tuple[str, NamedEffect], ...] = ()
 ) -> Verdict:
     return Verdict(
-        verdict="SET" if rivals else "FOUND", effects=(effect,), rivals=rivals, tried=(), error={}, manoeuvre_error={},
+        verdict="SET" if rivals else "FOUND", effects=(effect,), rivals=rivals, odds=(), tried=(), error={}, manoeuvre_error={},
         correlation={}, session_pulls={}, noise={}, disturbance=Disturbance(), detectable={}, campaign=campaign,
         content_hash="c" * 64, split_hash="d" * 64, theta=np.zeros(1), slots=(), experiment=None, reasons=(),
         step_sensitive=(),

@@ -186,7 +186,6 @@ def test_tyres_at_their_limit_are_a_rival_of_the_brakes_curve():
     numbers = {n.name: n for n in load_joint_numbers()}
     curve = NamedEffect(
         name="push_out_pressure", effect_class="effect", port="", variable="", parameters=(), score=0.0, gain=0.0,
-        inflation=1.0, held_out_gain=0.0, cross_validated_gain=0.0, win_share=1.0,
     )  # fmt: skip
     fitted = replace(
         slow_brakes().fitted, numbers=(numbers["wet_friction"], numbers["push_out"]), values=np.array([0.1, 0.3]),

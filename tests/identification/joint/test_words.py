@@ -26,7 +26,6 @@ def named_effect(effect: str, number: str, value: float) -> NamedEffect:
     p = Parameter(name=number, value=value, ci_low=0.0, ci_high=1.0, lower=0.0, upper=1.0, unit="s")
     return NamedEffect(
         name=effect, effect_class="effect", port="", variable="", parameters=(p,), score=0.0, gain=0.0,
-        inflation=1.0, held_out_gain=0.0, cross_validated_gain=0.0, win_share=1.0,
     )  # fmt: skip
 
 

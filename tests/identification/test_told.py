@@ -1,0 +1,79 @@
+"""What is told of the explanations that were weighed, and which of them the runs leave open."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from catalogs.decision_rules import load_decision_rules
+from tasks.identification.decision.candidates import Candidate
+from tasks.identification.decision.odds import RunGrams, search_explanations
+from tasks.identification.decision.told import OpenExplanation, list_open_explanations
+from tests.identification.explained import effect_of, form_of, grams_of
+
+RULES = replace(load_decision_rules(), signature_error=0.0)
+LAG, DRAG = effect_of("brake_lag", 0), effect_of("aerodynamic_drag", 1)
+
+
+def open_explanations(
+    candidates: Sequence[Candidate], design: NDArray[np.float64], values: Sequence[float], runs: int = 4
+) -> list[OpenExplanation]:
+    """The explanations that runs of a car with these values leave open, without noise."""
+    designs = [design] * runs
+    grams: RunGrams = grams_of(candidates, designs, [x @ np.array(values) for x in designs])
+    return list_open_explanations(grams, search_explanations(grams, most=2, width=8), RULES)
+
+
+def names(opened: Sequence[OpenExplanation]) -> list[set[str]]:
+    return [set(one.names) for one in opened]
+
+
+@pytest.mark.parametrize(("matters", "told"), [(2.5, {"brake_lag"}), (2.95, set()), (3.5, set())])
+def test_a_member_is_told_where_it_is_surely_larger_than_what_matters(matters: float, told: set[str]) -> None:
+    """A lag of 3 +- 0.05: that 2.95 is smaller has odds of 5 : 1, and that something is there e^1800."""
+    opened = open_explanations([replace(LAG, matters=matters)], np.array([[10.0]]), [3.0])
+    assert names(opened) == [told]
+    assert opened[0].explanation.log_odds > 100.0
+
+
+@pytest.mark.parametrize(
+    ("log_prior", "told"), [(-7.0, {"brake_lag"}), (0.0, {"brake_lag", "aerodynamic_drag"})]
+)
+def test_the_simpler_of_two_explanations_is_told_unless_the_odds_speak_for_the_other(
+    log_prior: float, told: set[str]
+) -> None:
+    """A drag of 4.5 standard errors gains 6.6 beside its slab: e^-7 before the runs leaves 0.7 : 1 for it."""
+    drag = replace(DRAG, log_prior=log_prior, matters=0.1)
+    opened = open_explanations([LAG, drag], np.diag([10.0, 2.25]), [3.0, 1.0])
+    assert names(opened) == [told], "one that adds to the first is no other explanation"
+    assert opened[0].log_odds == 0.0
+
+
+def test_two_numbers_that_the_runs_hardly_tell_apart_are_both_open_with_their_odds() -> None:
+    lag, push = replace(LAG, log_prior=-4.0), effect_of("push_out_pressure", 1, log_prior=-5.0)
+    alike = np.array([[10.0, 10.0], [0.0, 0.1]])
+    opened = open_explanations([lag, push], alike, [3.0, 0.0])
+    assert names(opened) == [{"brake_lag"}, {"push_out_pressure"}]
+    assert opened[1].log_odds == pytest.approx(-1.0, abs=0.3)
+    apart = np.array([[10.0, 10.0], [0.0, 3.0]])
+    assert names(open_explanations([lag, push], apart, [3.0, 0.0])) == [{"brake_lag"}]
+
+
+@pytest.mark.parametrize(
+    ("miss", "told"), [(0.3, {"pressure_nonlinearity"}), (6.0, {"form brake_torque(pressure)"})]
+)
+def test_a_form_is_told_where_no_effect_of_the_library_is_as_likely(miss: float, told: set[str]) -> None:
+    curve = effect_of("pressure_nonlinearity", 0)
+    form = form_of("brake_torque", "pressure", (1, 2))
+    # the form holds what the effect is, and what the effect misses
+    design = np.array([[10.0, 10.0, 0.0], [0.0, 0.0, 10.0]])
+    opened = open_explanations([curve, form], design, [0.0, 3.0, 0.1 * miss], runs=3)
+    assert names(opened) == [told], "nor is the form the rival of what it is without its law"
+
+
+def test_a_form_of_another_port_stands_beside_the_effect_that_it_cannot_be() -> None:
+    lag, form = replace(LAG, log_prior=-4.0), form_of("friction", "speed", (1,), log_prior=-3.5)
+    opened = open_explanations([lag, form], np.array([[10.0, 10.0]]), [3.0, 0.0])
+    assert names(opened) == [{"brake_lag"}, {"form friction(speed)"}], "the effect first, whatever the odds"
