@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tasks.identification.decision.screening import screen_library
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
@@ -17,7 +18,6 @@ from tasks.identification.decision.forms import (
     make_form_hypotheses,
     make_form_in_range,
 )
-from tasks.identification.decision.screening import screen_library
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.derivatives import differentiate_run, list_second_values
 from tasks.identification.inference.disturbance import Disturbance

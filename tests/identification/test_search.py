@@ -6,19 +6,19 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tasks.identification.decision.attribution import Candidate, refine_candidates
+from tasks.identification.decision.screening import (
+    compute_inflation,
+    find_detectable_sizes,
+    find_look_alikes,
+)
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from tasks.campaign.campaign import SESSION
 from tasks.campaign.planned_runs import RICH, RunPlan, make_planned_run, plan_experiments
 from tasks.identification.decision import experiment, search
-from tasks.identification.decision.attribution import Candidate, refine_candidates
 from tasks.identification.decision.experiment import plan_next_experiment
-from tasks.identification.decision.screening import (
-    compute_inflation,
-    find_detectable_sizes,
-    find_look_alikes,
-)
 from tasks.identification.decision.search import relinearise_candidate
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.derivatives import differentiate_run

@@ -4,11 +4,11 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
+from tasks.identification.decision.attribution import Candidate
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter
-from tasks.identification.decision.attribution import Candidate
 from tasks.identification.decision.verdict import find_pair_to_confirm
 from tasks.identification.decision.words import say_confirmation, say_rejection, tell_verdict
 from tasks.vehicle.tyres.burckhardt import compute_burckhardt_friction, scale_burckhardt

@@ -60,17 +60,39 @@ def tell_members(grams: RunGrams, explanation: Explanation, rules: DecisionRules
     """
     if explanation.log_odds <= log(rules.named_odds):
         return ()
+    return tuple(m for m in find_large_members(explanation, rules) if is_needed(grams, explanation, m, rules))
+
+
+def find_large_members(explanation: Explanation, rules: DecisionRules) -> tuple[Candidate, ...]:
+    """Return the members that are larger than what matters, at the odds of a name.
+
+    Parameters
+    ----------
+    explanation : its members with values and errors
+    rules : the odds
+    """
     reach = float(ndtri(rules.named_odds / (1.0 + rules.named_odds)))
-    told = []
+    large = []
     for member in explanation.members:
         places = explanation.find_places(member)
         certain = np.abs(explanation.values[places]) - reach * explanation.errors[places]
-        if float(certain.max()) <= member.matters:
-            continue
-        without = weigh_explanation(grams, [m for m in explanation.members if m is not member])
-        if without is None or explanation.log_odds - without.log_odds > log(rules.named_odds):
-            told.append(member)
-    return tuple(told)
+        if float(certain.max()) > member.matters:
+            large.append(member)
+    return tuple(large)
+
+
+def is_needed(grams: RunGrams, explanation: Explanation, member: Candidate, rules: DecisionRules) -> bool:
+    """Return whether an explanation without a member has smaller odds, by those of a name.
+
+    Parameters
+    ----------
+    grams : of the runs
+    explanation : with the member
+    member : one of its members
+    rules : the odds
+    """
+    without = weigh_explanation(grams, [m for m in explanation.members if m is not member])
+    return without is None or explanation.log_odds - without.log_odds > log(rules.named_odds)
 
 
 def list_open_explanations(
@@ -96,7 +118,10 @@ def list_open_explanations(
     by_told: dict[Told, OpenExplanation] = {}
     for explanation in ranked:
         told = tell_members(grams, explanation, rules)
-        against = -compare_explanations(grams, ranked[0], explanation, rules.signature_error)
+        if told != find_large_members(explanation, rules):
+            continue  # one of two that stand in for each other is too many
+        # a run that does not count may leave another explanation as good as the best, and no better
+        against = min(-compare_explanations(grams, ranked[0], explanation, rules.signature_error), 0.0)
         known = by_told.get(frozenset(m.name for m in told))
         if known is None or against > known.log_odds:
             found = OpenExplanation(explanation=explanation, told=told, log_odds=against)
@@ -113,7 +138,7 @@ def list_open_explanations(
         and compare_explanations(grams, best.explanation, f.explanation, rules.law_error) <= span
     ]  # fmt: skip
     simplest = min(
-        laws or [f for f in within if f.names <= best.names],
+        [f for f in within if not f.told] or laws or [f for f in within if f.names <= best.names],
         key=lambda found: (len(found.names), -found.log_odds),
     )
     apart = [f for f in within if not f.numbers >= simplest.numbers and not _holds_again(f, simplest)]

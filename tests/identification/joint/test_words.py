@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.identification.joint.test_calibration import make_campaign
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
@@ -18,7 +19,6 @@ from tasks.identification.joint.words import (
     tell_rivals,
     tell_what_was_used,
 )
-from tests.identification.joint.test_calibration import make_campaign
 from tests.identification.synthetic import SURFACE, TOLERANCES, VEHICLE, plain_run
 
 
