@@ -21,7 +21,6 @@ RULES = (
     ("physical_limits", "Limits of a scenario"),
     ("calibrated_range", "Calibrated range"),
     ("plausible_vehicle", "Plausible vehicles"),
-    ("decision_rules", "Decisions of `close-loop`"),
     ("joint_numbers", "Numbers of the joint fit"),
 )
 """Files of the catalogue's own folder, with their headings."""
@@ -144,7 +143,10 @@ def write_other_kinds_page() -> str:
 
 def write_rules_page() -> str:
     """Return the page of limits and rules: gates, plausible ranges, and rules of decision."""
-    page = "# Limits and rules\n\nNumbers by which muSync refuses, warns or decides, from the files of `catalogs/`.\n\n"
+    page = (
+        "# Limits and rules\n\nNumbers by which muSync refuses, warns or decides, from the files of `catalogs/`."
+        " [Rules of a verdict](../verdict-rules.md) has those by which `close-loop` decides.\n\n"
+    )
     return page + "\n".join(_describe_file(CATALOGUE / f"{name}.yaml", heading) for name, heading in RULES)
 
 

@@ -1,8 +1,9 @@
-"""Every page that is made from the code: what writes it, by its path below ``docs/``."""
+"""Every page and table that is made from the code: what writes it."""
 
+import re
 from collections.abc import Callable
 
-from reference_pages import catalogues, modules
+from reference_pages import catalogues, modules, verdict_rules
 from reference_pages.schema import write_schema_page
 
 WRITERS: dict[str, Callable[[], str]] = {
@@ -10,3 +11,23 @@ WRITERS: dict[str, Callable[[], str]] = {
     **modules.WRITERS,
     "reference/schema.md": write_schema_page,
 }
+"""Pages, by their path below ``docs/``."""
+TABLES: dict[str, Callable[[], str]] = verdict_rules.TABLES
+"""Tables of pages that people write, by the name under which a page asks for them."""
+ASKED = re.compile(r"^<!-- table: (.+) -->$", flags=re.M)
+"""Line of a page at whose place a table belongs."""
+
+
+def insert_tables(page: str) -> str:
+    """Return a page with the tables that it asks for.
+
+    Parameters
+    ----------
+    page : Markdown
+
+    Raises
+    ------
+    KeyError
+        Where no table has the name.
+    """
+    return ASKED.sub(lambda asked: TABLES[asked[1]](), page)

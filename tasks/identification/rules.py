@@ -10,11 +10,11 @@ class JointRules:
     Parameters
     ----------
     unknown_gain_tolerance : tolerance of the brake gain from which a vehicle file hardly knows its car [1]
-    fewest_runs : training or held-out runs below which effects cannot be screened one by one [1]
-    foreign_misfit : misfit of a calibrated car over its sensors' noise from which its equations are not the model's [1]
+    fewest_runs : training or held-out runs below which a joint fit judges [1]
+    foreign_misfit : error of the held-out speed over its noise from which more is lacking than what is named [1]
     missed_share : share of some channel's held-out error that a name must leave at most, where stops are missed by more
         than `foreign_misfit` with it [1]
-    noticed_share : the same where they are not, and where the gain was not known [1]
+    noticed_share : the same where they are not [1]
     driven_acceleration : mean drive force before the brake, over the mass, from which a car is driven [m s-2]
     brake_onset_share : share of a run's largest pressure from which the driver brakes [1]
     braking_deceleration : deceleration above which a run brakes hard enough to show something of the brake [m s-2]

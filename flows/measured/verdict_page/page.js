@@ -127,7 +127,7 @@ function drawGains(plot) {
   const height = 40 * gains.length;
   const most = Math.log10(Math.max(...gains.flatMap((g) => [g.frozen, g.after]))) + 0.1;
   const whole = [-1, most];
-  const layout = baseLayout(c, height, "gain of a spline / inflation", whole);
+  const layout = baseLayout(c, height, "gain of a spline", whole);
   layout.margin = { ...MARGIN, l: 12 };
   layout.dragmode = false;
   layout.hovermode = "closest";

@@ -29,7 +29,7 @@ from tasks.vehicle.effects.table import PARAMETER_INDEX
 from tasks.vehicle.model.simulation import Simulation
 
 SECOND_SHARES = (0.3, 0.6)
-"""Shares of the range of an effect's second parameter at which the screen tries it, besides its first value."""
+"""Shares of the range of an effect's second parameter at which it is tried, besides its first value."""
 LARGEST_STEP = 0.02
 """Largest step of a number of the session: a car that stops sooner stands where the other still brakes [1]."""
 KNOT_STEP = (30.0, 0.01, 30.0)
@@ -174,7 +174,7 @@ def _prepare_quotients(
 
 
 def list_second_values(effects: tuple[Effect, ...]) -> list[tuple[int, float]]:
-    """Return positions of the effects with a second parameter, and the values at which the screen tries it.
+    """Return positions of the effects with a second parameter, and the values at which it is tried.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Whether a campaign needs the joint fit, and the first numbers of that."""
+"""Campaigns that need a joint fit, and its first numbers: the brake's gain before anything else."""
 
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -10,10 +10,12 @@ from tasks.identification.rules import JointRules
 
 FIRST = ("lag", "drag_area", "speed_delay")
 """Numbers that are free beside those of every car while the best start is looked for."""
+HELD = 1e-5
+"""Sigma of a number that stays as the file has it [1]."""
 
 
 def needs_joint_fit(campaign: Campaign, rules: JointRules) -> bool:
-    """Whether a campaign says too little to look for one effect at a time, or has what only a joint fit knows.
+    """Whether a campaign has too few runs for odds of explanations, or has what only a joint fit knows.
 
     Parameters
     ----------
@@ -41,7 +43,7 @@ def is_gain_unknown(campaign: Campaign, rules: JointRules) -> bool:
 
 
 def has_few_runs(campaign: Campaign, rules: JointRules) -> bool:
-    """Whether there are too few training or held-out runs to look for one effect at a time.
+    """Whether there are too few training or held-out runs for odds of explanations.
 
     Parameters
     ----------

@@ -1,0 +1,52 @@
+"""Tables of the page on a verdict's rules: every number with meaning and reason, each where the page asks for it."""
+
+import re
+
+import yaml
+
+from catalogs.decision_rules import DECISION_RULES
+from catalogs.effects import LIBRARY_FILE
+from reference_pages.markdown import format_cell
+from reference_pages.pages import ASKED, TABLES, insert_tables
+from reference_pages.verdict_rules import read_meanings
+from tasks.identification.rules import DecisionRules, JointRules
+from tests.documents import DOCS
+
+PAGE = insert_tables((DOCS / "reference" / "verdict-rules.md").read_text())
+
+
+def rows_of(heading: str) -> dict[str, list[str]]:
+    section = PAGE.split(f"\n## {heading}\n")[1].split("\n## ")[0]
+    lines = [
+        re.split(r" (?<!\\)\| ", line.strip("| ")) for line in section.splitlines() if line.startswith("| `")
+    ]
+    return {row[0].strip("`"): row[1:] for row in lines}
+
+
+def test_every_number_of_a_decision_stands_on_the_page_with_meaning_and_reason() -> None:
+    content = yaml.safe_load(DECISION_RULES.read_text())
+    for heading, numbers, rules in (
+        ("Joint fit", content.pop("joint"), JointRules),
+        ("Numbers of the decision", content, DecisionRules),
+    ):
+        rows = rows_of(heading)
+        assert rows.keys() == numbers.keys() and read_meanings(rules).keys() >= rows.keys()
+        for name, entry in numbers.items():
+            value, unit, meaning, reason = rows[name]
+            assert [value, unit] == [format_cell(entry["value"]), entry["unit"]]
+            assert meaning == format_cell(read_meanings(rules)[name]) and not meaning.endswith("]")
+            assert reason == format_cell(entry["source"])
+
+
+def test_every_effect_has_the_size_that_matters_and_why() -> None:
+    rows = rows_of("Sizes that matter")
+    for effect in yaml.safe_load(LIBRARY_FILE.read_text()):
+        number, size, _, reason = rows[effect["name"]]
+        assert [number, size] == [f"`{effect['parameters'][0]}`", format_cell(effect["matters"])]
+        assert reason == format_cell(effect["because"])
+
+
+def test_every_table_is_asked_for_once_and_none_that_is_not_there() -> None:
+    asked = [name for page in DOCS.rglob("*.md") for name in ASKED.findall(page.read_text())]
+    assert sorted(asked) == sorted(TABLES)
+    assert "<!-- table" not in PAGE
