@@ -61,16 +61,31 @@ def tell_members(grams: RunGrams, explanation: Explanation, rules: DecisionRules
     if explanation.log_odds <= log(rules.named_odds):
         return ()
     reach = float(ndtri(rules.named_odds / (1.0 + rules.named_odds)))
+    needed = _take_away(grams, explanation, rules)
     told = []
-    for member in explanation.members:
-        places = explanation.find_places(member)
-        certain = np.abs(explanation.values[places]) - reach * explanation.errors[places]
-        if float(certain.max()) <= member.matters:
-            continue
-        without = weigh_explanation(grams, [m for m in explanation.members if m is not member])
-        if without is None or explanation.log_odds - without.log_odds > log(rules.named_odds):
+    for member in needed.members:
+        places = needed.find_places(member)
+        certain = np.abs(needed.values[places]) - reach * needed.errors[places]
+        if float(certain.max()) > member.matters:
             told.append(member)
     return tuple(told)
+
+
+def _take_away(grams: RunGrams, explanation: Explanation, rules: DecisionRules) -> Explanation:
+    """Return an explanation without the members that it does not need, one after the other, the least needed first.
+
+    Of two that stand in for each other neither is needed, but one of them is.
+    """
+    while explanation.members:
+        rest = [
+            weigh_explanation(grams, [m for m in explanation.members if m is not member])
+            for member in explanation.members
+        ]
+        best = max((e for e in rest if e is not None), key=lambda e: e.log_odds, default=None)
+        if best is None or explanation.log_odds - best.log_odds > log(rules.named_odds):
+            break
+        explanation = best
+    return explanation
 
 
 def list_open_explanations(
