@@ -178,9 +178,10 @@ def test_what_speed_alone_cannot_tell_apart_is_a_set_with_its_odds_and_the_run_t
 
     library = ("retuned_pressure_gain", "retuned_mass", "brake_lag")
     verdict = judged({"pressure_gain": 0.2}, library=library, change=measure_speed_alone)
-    assert (verdict.verdict, names(verdict)) == ("SET", ["retuned_pressure_gain"])
-    assert rivals(verdict) == [("retuned_pressure_gain", "retuned_mass")]
-    assert [o.names for o in verdict.odds] == [("retuned_pressure_gain",), ("retuned_mass",)]
+    assert verdict.verdict == "SET"
+    ((of, rival),) = rivals(verdict)
+    assert [of] == names(verdict) and {of, rival} == {"retuned_pressure_gain", "retuned_mass"}
+    assert [o.names for o in verdict.odds] == [(of,), (rival,)]
     assert verdict.odds[0].odds == 1.0 and 1.0 / RULES.named_odds < verdict.odds[1].odds < RULES.named_odds
 
 
