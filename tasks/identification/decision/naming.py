@@ -1,5 +1,6 @@
 """Named effects of an explanation, fitted alone through the simulation, with their intervals."""
 
+from dataclasses import replace
 from math import log
 
 import numpy as np
@@ -169,7 +170,9 @@ def find_detectable_sizes(finding: Finding, rules: DecisionRules) -> dict[str, f
     for candidate in finding.grams.columns.candidates:
         if candidate.effect is None or candidate.name in sizes:
             continue
-        alone = weigh_explanation(finding.grams, [candidate], spread=False)
+        # how small a size would be seen does not depend on the size that was
+        free = replace(candidate, lower=-np.inf, upper=np.inf)
+        alone = weigh_explanation(finding.grams, [free], spread=False)
         if alone is None:
             continue
         error = float(alone.errors[0])

@@ -58,9 +58,30 @@ def tell_members(grams: RunGrams, explanation: Explanation, rules: DecisionRules
     explanation : its members with values and errors
     rules : the odds
     """
-    if explanation.log_odds <= log(rules.named_odds):
-        return ()
-    return tuple(m for m in find_large_members(explanation, rules) if is_needed(grams, explanation, m, rules))
+    return find_large_members(take_away_members(grams, explanation, rules), rules)
+
+
+def take_away_members(grams: RunGrams, explanation: Explanation, rules: DecisionRules) -> Explanation:
+    """Return an explanation without the members that it does not need, one after the other, the least needed first.
+
+    Of two that stand in for each other neither is needed, but one of them is.
+
+    Parameters
+    ----------
+    grams : of the runs
+    explanation : its members with values and errors
+    rules : the odds at which a member is needed
+    """
+    while explanation.members:
+        rest = [
+            weigh_explanation(grams, [m for m in explanation.members if m is not member])
+            for member in explanation.members
+        ]
+        best = max((e for e in rest if e is not None), key=lambda e: e.log_odds, default=None)
+        if best is None or explanation.log_odds - best.log_odds > log(rules.named_odds):
+            break
+        explanation = best
+    return explanation
 
 
 def find_large_members(explanation: Explanation, rules: DecisionRules) -> tuple[Candidate, ...]:
@@ -79,20 +100,6 @@ def find_large_members(explanation: Explanation, rules: DecisionRules) -> tuple[
         if float(certain.max()) > member.matters:
             large.append(member)
     return tuple(large)
-
-
-def is_needed(grams: RunGrams, explanation: Explanation, member: Candidate, rules: DecisionRules) -> bool:
-    """Return whether an explanation without a member has smaller odds, by those of a name.
-
-    Parameters
-    ----------
-    grams : of the runs
-    explanation : with the member
-    member : one of its members
-    rules : the odds
-    """
-    without = weigh_explanation(grams, [m for m in explanation.members if m is not member])
-    return without is None or explanation.log_odds - without.log_odds > log(rules.named_odds)
 
 
 def list_open_explanations(
@@ -116,10 +123,8 @@ def list_open_explanations(
     plain = [e for e in listed if all(m.effect is not None for m in e.members)]
     ranked += [e for e in plain[: rules.most_compared // 2] if not any(e is known for known in ranked)]
     by_told: dict[Told, OpenExplanation] = {}
-    for explanation in ranked:
-        told = tell_members(grams, explanation, rules)
-        if told != find_large_members(explanation, rules):
-            continue  # one of two that stand in for each other is too many
+    for explanation in {e.names: e for e in (take_away_members(grams, e, rules) for e in ranked)}.values():
+        told = find_large_members(explanation, rules)
         # a run that does not count may leave another explanation as good as the best, and no better
         against = min(-compare_explanations(grams, ranked[0], explanation, rules.signature_error), 0.0)
         known = by_told.get(frozenset(m.name for m in told))

@@ -35,6 +35,8 @@ from tasks.vehicle.effects.slots import Slot
 from tasks.vehicle.effects.table import PARAMETER_INDEX
 
 SESSION_INDEX = tuple(PARAMETER_INDEX[name] for name in SESSION)
+DIVERGED = 1e6
+"""Reading beyond which a simulation diverges, in the unit of any channel."""
 BROKEN = 1e4
 """Whitened residual of a trial whose simulation diverges, so large that no fit accepts the trial."""
 
@@ -94,14 +96,14 @@ class RunEvidence:
         """
         if offsets is None:
             y = predict_channels(self.model, theta, slots=slots)
-            if not np.isfinite(y).all():
+            if not np.abs(y).max() < DIVERGED:
                 return np.full(len(self.nuisance), BROKEN)
             return whiten_channels(self.model.measured - y, self.rho, self.sigma, self.model.sampled)
         moved, slots = move_by_offsets(theta, slots, offsets, self.knots)
         speed = compute_starting_speed(self.model, theta) + offsets[INITIAL_SPEED]
         simulated = simulate_run(self.model, moved, slots=slots, initial_speed=speed)
         y = compute_instrument_readings(self.model, moved, simulated)
-        if not np.isfinite(y).all():
+        if not np.abs(y).max() < DIVERGED:
             return np.full(len(self.nuisance), BROKEN)
         y[:, CHANNELS.index("longitudinal_acceleration")] += offsets[ACCELERATION_BIAS]
         y[:, CHANNELS.index("pitch")] += offsets[PITCH_OFFSET]
