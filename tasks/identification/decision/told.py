@@ -58,23 +58,19 @@ def tell_members(grams: RunGrams, explanation: Explanation, rules: DecisionRules
     explanation : its members with values and errors
     rules : the odds
     """
-    if explanation.log_odds <= log(rules.named_odds):
-        return ()
-    reach = float(ndtri(rules.named_odds / (1.0 + rules.named_odds)))
-    needed = _take_away(grams, explanation, rules)
-    told = []
-    for member in needed.members:
-        places = needed.find_places(member)
-        certain = np.abs(needed.values[places]) - reach * needed.errors[places]
-        if float(certain.max()) > member.matters:
-            told.append(member)
-    return tuple(told)
+    return find_large_members(take_away_members(grams, explanation, rules), rules)
 
 
-def _take_away(grams: RunGrams, explanation: Explanation, rules: DecisionRules) -> Explanation:
+def take_away_members(grams: RunGrams, explanation: Explanation, rules: DecisionRules) -> Explanation:
     """Return an explanation without the members that it does not need, one after the other, the least needed first.
 
     Of two that stand in for each other neither is needed, but one of them is.
+
+    Parameters
+    ----------
+    grams : of the runs
+    explanation : its members with values and errors
+    rules : the odds at which a member is needed
     """
     while explanation.members:
         rest = [
@@ -86,6 +82,24 @@ def _take_away(grams: RunGrams, explanation: Explanation, rules: DecisionRules) 
             break
         explanation = best
     return explanation
+
+
+def find_large_members(explanation: Explanation, rules: DecisionRules) -> tuple[Candidate, ...]:
+    """Return the members that are larger than what matters, at the odds of a name.
+
+    Parameters
+    ----------
+    explanation : its members with values and errors
+    rules : the odds
+    """
+    reach = float(ndtri(rules.named_odds / (1.0 + rules.named_odds)))
+    large = []
+    for member in explanation.members:
+        places = explanation.find_places(member)
+        certain = np.abs(explanation.values[places]) - reach * explanation.errors[places]
+        if float(certain.max()) > member.matters:
+            large.append(member)
+    return tuple(large)
 
 
 def list_open_explanations(
@@ -103,11 +117,16 @@ def list_open_explanations(
     explanations : the best first
     rules : the odds
     """
-    ranked = list(explanations)[: rules.most_compared]
+    listed = list(explanations)
+    ranked = listed[: rules.most_compared]
+    # what an effect of the library explains is held against every form
+    plain = [e for e in listed if all(m.effect is not None for m in e.members)]
+    ranked += [e for e in plain[: rules.most_compared // 2] if not any(e is known for known in ranked)]
     by_told: dict[Told, OpenExplanation] = {}
-    for explanation in ranked:
-        told = tell_members(grams, explanation, rules)
-        against = -compare_explanations(grams, ranked[0], explanation, rules.signature_error)
+    for explanation in {e.names: e for e in (take_away_members(grams, e, rules) for e in ranked)}.values():
+        told = find_large_members(explanation, rules)
+        # a run that does not count may leave another explanation as good as the best, and no better
+        against = min(-compare_explanations(grams, ranked[0], explanation, rules.signature_error), 0.0)
         known = by_told.get(frozenset(m.name for m in told))
         if known is None or against > known.log_odds:
             found = OpenExplanation(explanation=explanation, told=told, log_odds=against)
@@ -116,9 +135,16 @@ def list_open_explanations(
     most = max(found.log_odds for found in by_told.values())
     within = [found for found in by_told.values() if found.log_odds >= most - span]
     best = max(within, key=lambda found: found.log_odds)
+    # what a form has beyond an effect of the library may be the law of that effect in another car
+    laws = [
+        f
+        for f in by_told.values()
+        if f.told and _has_form(best) > _has_form(f)
+        and compare_explanations(grams, best.explanation, f.explanation, rules.law_error) <= span
+    ]  # fmt: skip
     simplest = min(
-        (f for f in within if f.names <= best.names or _has_form(best) > _has_form(f)),
-        key=lambda found: (_has_form(found), len(found.names), -found.log_odds),
+        [f for f in within if not f.told] or laws or [f for f in within if f.names <= best.names],
+        key=lambda found: (len(found.names), -found.log_odds),
     )
     apart = [f for f in within if not f.numbers >= simplest.numbers and not _holds_again(f, simplest)]
     # of explanations that add to one another the simplest stands for all
