@@ -12,7 +12,7 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from tasks.campaign.gauge import denoise_pressure, estimate_gauge_noise
 from tasks.identification.benchmark import make_synthetic_campaign
-from tasks.identification.decision.verdict import find_missing_effects
+from tasks.identification.decision.verdict import judge_runs
 
 TIME = np.arange(600) * 0.01
 STOP = 2.0 * np.clip((TIME - 1.0) / 0.3, 0.0, 1.0)
@@ -70,7 +70,4 @@ def test_stops_of_one_kind_and_a_noisy_gauge_are_no_discovery() -> None:
     model, surface = load_vehicle("paper-reference"), load_surface("dense-asphalt")
     campaign = make_synthetic_campaign(model, surface, {}, 700_100, design=load_closing_study().drives())
     lag = tuple(effect for effect in load_effects() if effect.name in {"brake_lag", "pressure_nonlinearity"})
-    assert (
-        find_missing_effects(campaign, model, surface, lag, load_decision_rules()).verdict.verdict
-        == "NOTHING"
-    )
+    assert judge_runs(campaign, model, surface, lag, load_decision_rules()).verdict.verdict == "NOTHING"

@@ -40,8 +40,10 @@ Change = Callable[[Any], None]
             "0.parameters: the table of effects has no parameter turbo; there are: pressure_gain",
         ),
         ("effects/library.yaml", load_effects, lambda c: c.insert(0, None), "0: must be a table"),
-        ("decision_rules.yaml", load_decision_rules, lambda c: c.pop("rival_span"), "rival_span is missing"),
-        ("decision_rules.yaml", load_decision_rules, lambda c: c["win_share"].update(value=2), "win_share"),
+        ("effects/library.yaml", load_effects, lambda c: c[7].pop("because"), "7.because is missing"),
+        ("effects/library.yaml", load_effects, lambda c: c[7].update(matters=0), "7.matters"),
+        ("decision_rules.yaml", load_decision_rules, lambda c: c.pop("named_odds"), "named_odds is missing"),
+        ("decision_rules.yaml", load_decision_rules, lambda c: c["spike_width"].update(value=2), "spike_width"),
         ("decision_rules.yaml", load_decision_rules, lambda c: c["longest_lag"].update(unit="ms"), "longest_lag"),
         (
             "decision_rules.yaml",

@@ -32,7 +32,7 @@ def make_wheel_cycle(run: RunModel) -> RunModel:
 def evidence_of(*runs: RunModel) -> Evidence:
     derived = tuple(differentiate_run(r, np.zeros(7), NOISE, NOTHING, (), TOLERANCES, QUIET) for r in runs)
     return Evidence(
-        train=derived[:2], held_out=derived[2:], effects=(), tolerances=TOLERANCES, disturbance=QUIET,
+        train=derived, held_out=(), effects=(), tolerances=TOLERANCES, disturbance=QUIET,
         sensors=(np.zeros(7), NOISE), rules=load_decision_rules(),
     )  # fmt: skip
 
@@ -43,9 +43,7 @@ def make_plain_run(seed: int, peak: float = 1.5) -> RunModel:
 
 @pytest.fixture(scope="module")
 def widened_evidence() -> Evidence:
-    evidence = evidence_of(
-        make_plain_run(1), make_wheel_cycle(make_plain_run(2)), make_wheel_cycle(make_plain_run(3))
-    )
+    evidence = evidence_of(make_plain_run(1), make_wheel_cycle(make_plain_run(2)))
     null = fit_hypotheses(evidence.train, (), evidence.session_sigma)
     return set_run_noise(evidence, estimate_run_noise(evidence, null))
 
@@ -62,18 +60,11 @@ def test_a_channel_that_cycles_is_widened_evidence_where_it_cycles_alone(widened
     assert run.rho[FRONT] > 0.8, "a cycle of sixteen samples is no white noise"
 
 
-def test_held_out_runs_are_widened_evidence_alike(widened_evidence: Evidence) -> None:
-    assert widened_evidence.held_out[0].sigma[FRONT] > 4.0 * NOISE[FRONT]
-
-
 def test_what_a_better_fit_follows_again_has_its_sensors_noise_again() -> None:
-    evidence = evidence_of(make_plain_run(1), make_plain_run(2), make_plain_run(3))
+    evidence = evidence_of(make_plain_run(1), make_plain_run(2))
     null = fit_hypotheses(evidence.train, (), evidence.session_sigma)
-    wide = replace(
-        evidence, train=(evidence.train[0], replace(evidence.train[1], sigma=8.0 * NOISE)),
-        held_out=(replace(evidence.held_out[0], sigma=8.0 * NOISE),),
-    )  # fmt: skip
+    wide = replace(evidence, train=(evidence.train[0], replace(evidence.train[1], sigma=8.0 * NOISE)))
     again = set_run_noise(wide, estimate_run_noise(wide, null))
-    assert np.array_equal(again.train[1].sigma, NOISE) and np.array_equal(again.held_out[0].sigma, NOISE)
+    assert np.array_equal(again.train[1].sigma, NOISE)
     # its derivatives were whitened by the sensors' noise and are read as of the wide one: eight times larger now
     assert again.train[1].nuisance == pytest.approx(8.0 * evidence.train[1].nuisance)

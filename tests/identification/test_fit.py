@@ -4,22 +4,25 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tasks.identification.decision.screening import screen_library
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
+from tasks.campaign.campaign import SESSION
 from tasks.errors import InputError
+from tasks.identification.decision.candidates import Candidate, list_columns
 from tasks.identification.decision.forms import (
+    KNOTS,
     RANGE,
     RIDGE,
     differentiate_by_splines,
     find_scanned_ranges,
-    fit_residual_splines,
     make_form_hypotheses,
     make_form_in_range,
 )
+from tasks.identification.decision.odds import search_explanations
+from tasks.identification.decision.search import gather_grams
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.derivatives import differentiate_run, list_second_values
+from tasks.identification.inference.derivatives import differentiate_run
 from tasks.identification.inference.disturbance import Disturbance
 from tasks.identification.inference.fit import Fit, fit_hypotheses
 from tasks.identification.inference.forward import (
@@ -28,10 +31,10 @@ from tasks.identification.inference.forward import (
     predict_channels,
     prepare_run,
 )
-from tasks.identification.inference.hypothesis import make_library_hypothesis
+from tasks.identification.inference.hypothesis import Hypothesis, make_library_hypothesis
 from tasks.identification.inference.linearisation import (
     compute_whitened_residuals,
-    differentiate_about_fit,
+    differentiate_at,
     fit_disturbance,
 )
 from tasks.vehicle.effects.forms import SHAPES, Form, count_coefficients, name_form
@@ -48,7 +51,7 @@ PLAIN = np.zeros(len(EFFECT_TABLE))
 def evidence_of(models: list[RunModel], effects: tuple[Effect, ...]) -> Evidence:
     runs = tuple(differentiate_run(m, np.zeros(7), NOISE, PLAIN, effects, TOLERANCES, QUIET) for m in models)
     return Evidence(
-        train=runs, held_out=runs[-2:], effects=effects, tolerances=TOLERANCES, disturbance=QUIET,
+        train=runs, held_out=(), effects=effects, tolerances=TOLERANCES, disturbance=QUIET,
         sensors=(np.zeros(7), NOISE),
         rules=load_decision_rules(),
     )  # fmt: skip
@@ -113,34 +116,35 @@ def test_a_threshold_of_what_starts_at_nothing_is_fitted_once_that_has_moved() -
     assert fitted.values == pytest.approx([250.0, 5.0], rel=0.2)
 
 
-@pytest.mark.parametrize(
-    ("values", "at_bound"), [((0.0, 5.0), True), ((250.0, 0.0), False), ((250.0, 5.0), False), ((250.0, 9.0), True)]
-)  # fmt: skip
-def test_a_second_parameter_at_nothing_is_not_at_its_bound(
-    values: tuple[float, float], at_bound: bool
-) -> None:
-    creep = replace(
-        make_library_hypothesis(LIBRARY["idle_creep"]), lower=np.zeros(2), upper=np.array([600.0, 9.0])
-    )
-    fitted = Fit(
-        parts=(creep,), values=np.array(values), session=np.zeros(7), session_sigma=np.ones(7), objective=0.0,
-        by_run=np.zeros(1), covariance=np.eye(2), session_error=np.ones(7), residuals=(), offsets=(),
-    )  # fmt: skip
-    assert fitted.at_bound is at_bound
-
-
-def test_the_screen_sees_an_effect_whose_threshold_is_far_from_its_first_value() -> None:
-    creep = LIBRARY["idle_creep"]
-    truth = build_parameter_vector({"creep_force": 600.0, "creep_speed": 8.0})
+def test_a_free_parameter_takes_its_session_nuisance_over() -> None:
+    gain = build_parameter_vector({"pressure_gain": 0.1})
     models = [
-        measured(plain_run(v, p), truth, i) for i, (v, p) in enumerate(((9.0, 0.0), (8.0, 0.2), (7.0, 0.0)))
+        measured(plain_run(v, p), gain, i) for i, (v, p) in enumerate(((28.0, 1.5), (25.0, 1.8), (15.0, 0.0)))
     ]
-    evidence = evidence_of(models, (creep,))
-    null = fit_hypotheses(evidence.train, (), evidence.session_sigma)
-    gains, estimates, seconds = screen_library(evidence, null)
-    tried = [value for _, value in list_second_values(evidence.effects)]
-    assert seconds[0] == min(tried, key=lambda value: abs(value - 8.0)) != creep.parameters[1].start
-    assert gains[0] > 50.0 and estimates[0] > 300.0
+    evidence = evidence_of(models, (LIBRARY["retuned_pressure_gain"],))
+    fitted = fit_hypotheses(
+        evidence.train, (make_library_hypothesis(LIBRARY["retuned_pressure_gain"]),), evidence.session_sigma,
+        iterations=8,
+    )  # fmt: skip
+    assert abs(fitted.session[SESSION.index("pressure_gain")]) < 1e-12
+    assert fitted.values[0] == pytest.approx(0.1, abs=0.01)
+
+
+def test_an_interval_does_not_depend_on_the_unit_of_its_parameter() -> None:
+    models = [measured(plain_run(v, p), PLAIN, i) for i, (v, p) in enumerate(((28.0, 1.5), (25.0, 1.8)))]
+    evidence = evidence_of(models, (LIBRARY["progressive_spring"],))
+    spring = make_library_hypothesis(LIBRARY["progressive_spring"])
+    build = spring.build
+    scaled = replace(
+        spring, build=lambda x: build(1e9 * x), **{
+            key: getattr(spring, key) / 1e9 for key in ("lower", "upper", "step", "start")
+        },
+    )  # fmt: skip
+    sigmas = [
+        np.sqrt(fit_hypotheses(evidence.train, (h,), evidence.session_sigma).covariance[0, 0])
+        for h in (spring, scaled)
+    ]
+    assert sigmas[0] > 0.0 and sigmas[0] == pytest.approx(1e9 * sigmas[1], rel=1e-3)
 
 
 def test_a_run_starts_at_the_speed_the_sensor_read_less_its_scale_error() -> None:
@@ -169,6 +173,17 @@ def hump_in_the_brake() -> Evidence:
     return evidence_of(models, (LIBRARY["brake_fade"],))
 
 
+def find_best_form(evidence: Evidence, null: Fit) -> tuple[Candidate, list[Hypothesis]]:
+    """The form that alone explains most of what a fit leaves over, and the shapes that follow it best."""
+    rules = load_decision_rules()
+    columns = list_columns(evidence.effects, (), evidence.session_sigma, rules)
+    grams = gather_grams(evidence, null, differentiate_by_splines(evidence, null), columns)
+    best = search_explanations(grams, most=1, width=1, spread=False)[0]
+    (form,) = best.members
+    grid = np.linspace(*find_scanned_ranges(evidence.train)[form.variable], KNOTS)
+    return form, make_form_hypotheses(form.port, form.variable, grid, best.values, best.errors)
+
+
 def test_a_form_outside_the_library_does_not_pass_for_a_disturbance() -> None:
     evidence = hump_in_the_brake()
     null = fit_hypotheses(evidence.train, (), evidence.session_sigma)
@@ -191,9 +206,9 @@ def test_a_form_outside_the_library_does_not_pass_for_a_disturbance() -> None:
 def test_a_bump_is_in_the_grammar() -> None:
     evidence = hump_in_the_brake()
     null = fit_hypotheses(evidence.train, (), evidence.session_sigma)
-    best = fit_residual_splines(evidence, null)[0]
+    best, shapes = find_best_form(evidence, null)
     assert (best.port, best.variable) == ("brake_torque", "speed")
-    assert "a exp(-(4x - 2)^2)" in make_form_hypotheses(best, evidence.samples)[0].name
+    assert "a exp(-(4x - 2)^2)" in shapes[0].name
 
 
 def test_what_a_stop_at_the_limit_of_friction_tells_of_the_brake_does_not_hang_on_its_noise() -> None:
@@ -209,7 +224,7 @@ def test_what_a_stop_at_the_limit_of_friction_tells_of_the_brake_does_not_hang_o
         first = fit_hypotheses(
             evidence.train, (make_library_hypothesis(curve, 0.04),), evidence.session_sigma
         )
-        here = differentiate_about_fit(evidence, first)
+        here = differentiate_at(evidence, first)
         fitted = fit_hypotheses(
             here.train, first.parts, here.session_sigma, values=first.values, session=first.session,
             offsets=first.offsets,
@@ -237,9 +252,9 @@ def test_a_form_over_pressure_is_found_as_far_as_weak_brakes_are_pressed() -> No
         "pressure": (0.0, 8.0),
         "pressure_rate": (-26.7, 26.7),
     }
-    best = fit_residual_splines(evidence, fit_hypotheses(evidence.train, (), evidence.session_sigma))[0]
-    assert (best.port, best.variable, best.grid[-1]) == ("brake_torque", "pressure", 8.0)
-    assert make_form_hypotheses(best, evidence.samples)[0].name == bump.name
+    best, shapes = find_best_form(evidence, fit_hypotheses(evidence.train, (), evidence.session_sigma))
+    assert (best.port, best.variable) == ("brake_torque", "pressure")
+    assert shapes[0].name == bump.name
 
 
 def test_the_noise_of_a_pressure_at_the_end_of_its_range_makes_no_other_scale() -> None:

@@ -51,10 +51,7 @@ def prepared_evidence(slow_campaign: Campaign) -> tuple[Evidence, Fit]:
 
 def test_residuals_and_derivatives_are_zero_between_samples(prepared_evidence: tuple[Evidence, Fit]) -> None:
     evidence, null = prepared_evidence
-    noisier = {
-        run.model.run.name: RunNoise(rho=run.rho, sigma=2.0 * run.sigma)
-        for run in (*evidence.train, *evidence.held_out)
-    }
+    noisier = {run.model.run.name: RunNoise(rho=run.rho, sigma=2.0 * run.sigma) for run in evidence.train}
     for seen in (evidence, set_run_noise(evidence, noisier)):
         splines = differentiate_by_splines(seen, null)
         for run, knots in zip(seen.train, splines, strict=True):
@@ -69,12 +66,6 @@ def test_residuals_and_derivatives_are_zero_between_samples(prepared_evidence: t
                 knots,
             ):
                 assert (columns[between] == 0.0).all() and (columns[~between] != 0.0).any()
-
-
-def test_the_score_counts_samples_and_no_instants(prepared_evidence: tuple[Evidence, Fit]) -> None:
-    evidence, _ = prepared_evidence
-    instants = sum(run.model.samples for run in evidence.train)
-    assert evidence.samples == pytest.approx(6 * instants + instants / 10, abs=2)
 
 
 def test_a_model_without_fault_leaves_the_noise_of_its_samples(

@@ -1,17 +1,18 @@
-"""A verdict of NOTHING says by which rule the best candidate was refused."""
+"""A verdict in plain words: what is named and what that does, what stays open, and why nothing is named."""
 
+from collections.abc import Sequence
 from dataclasses import replace
-from types import SimpleNamespace
 
-import pytest
-from tasks.identification.decision.attribution import Candidate
+import numpy as np
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter
-from tasks.identification.decision.verdict import find_pair_to_confirm
-from tasks.identification.decision.words import say_confirmation, say_rejection, tell_verdict
+from tasks.identification.decision.odds import Explanation, search_explanations
+from tasks.identification.decision.told import OpenExplanation
+from tasks.identification.decision.words import say_not_named, tell_open_explanations, tell_verdict
 from tasks.vehicle.tyres.burckhardt import compute_burckhardt_friction, scale_burckhardt
+from tests.identification.explained import effect_of, grams_of
 
 RULES = load_decision_rules()
 FORM = NamedEffect(
@@ -26,36 +27,44 @@ ERROR = ChannelError(
 LATE = Parameter(name="dead_time", value=0.021, ci_low=0.01, ci_high=0.03, lower=0.0, upper=0.5, unit="s")
 
 
-def judged(
-    name: str, score: float, *, held_out_gain: float = 0.0, crossed: float = 0.0, at_bound: bool = False
-) -> Candidate:
-    return Candidate(
-        hypothesis=SimpleNamespace(name=name), fitted=SimpleNamespace(at_bound=at_bound), gain=2.0 * score,
-        inflation=1.5, score=score, held_out_gain=held_out_gain, cross_validated_gain=crossed, informed=5, rules=RULES,
-    )  # fmt: skip
+def weigh_lag(values: Sequence[float], matters: float = 1.0) -> list[Explanation]:
+    """All explanations by a lag and a drag of what four runs say, whose error is a tenth."""
+    candidates = [
+        effect_of("brake_lag", 0, matters=matters), effect_of("aerodynamic_drag", 1),
+    ]  # fmt: skip
+    design = 5.0 * np.eye(2)
+    grams = grams_of(candidates, [design] * 4, [design @ np.array(values)] * 4)
+    return search_explanations(grams, most=2, width=4)
 
 
-@pytest.mark.parametrize(
-    ("candidate", "says"),
-    [
-        (judged("brake_lag", 19.14), "the best candidate, brake_lag, scores 19.1; a name needs 20"),
-        (
-            judged("anti_dive", 45.6, held_out_gain=0.44, crossed=-1.3),
-            "gain 0.4, a name needs 4, cross-validated -1.3 of 40",
-        ),
-        (judged("bump_stop", 158.4, held_out_gain=-14.8), "the held-out runs contradict it: gain -14.8"),
-        (judged("tyre_heating", 40.0, held_out_gain=9.0, at_bound=True), "a number at the end of its range"),
-    ],
-)
-def test_a_refusal_names_the_rule_and_the_figure(candidate: Candidate, says: str) -> None:
-    assert says in say_rejection([judged("pad_drag", 1.0), candidate])
+def test_a_verdict_of_nothing_says_whether_the_odds_or_the_size_fall_short() -> None:
+    best, *_ = weigh_lag([1.0, 0.0], matters=3.0)
+    assert best.names == ("brake_lag",)
+    (told,) = say_not_named([], best, (), RULES)
+    assert told == "the runs show brake_lag, smaller than what matters, or not surely larger: not named"
+    weak = replace(best, log_odds=1.0)
+    (told,) = say_not_named([replace(FORM, name="brake_lag", score=np.log(2.7))], weak, (), RULES)
+    assert told == "the best candidate, brake_lag, has odds of 2.7 : 1 against nothing; a name needs 20 : 1"
+    (told,) = say_not_named([], replace(best, members=()), (), RULES)
+    assert told == "no effect of the library explains anything of what the model leaves over"
 
 
-def test_without_any_candidate_the_refusal_says_that_nothing_acts_on_the_channels() -> None:
-    assert "explains enough of what the model leaves over" in say_rejection([])
+def test_what_is_open_is_told_with_its_odds_and_one_explanation_alone_is_not() -> None:
+    best, *others = weigh_lag([2.0, 0.0])
+    none = next(e for e in others if not e.members)
+    opened = [
+        OpenExplanation(explanation=best, told=best.members, log_odds=0.0),
+        OpenExplanation(explanation=none, told=(), log_odds=float(np.log(0.25))),
+    ]
+    (told,) = tell_open_explanations(opened, [best, *others], RULES)
+    assert (
+        told
+        == "of 4 explanations these runs leave 2 open within 20 : 1; against brake_lag: nothing (0.25 : 1)"
+    )
+    assert tell_open_explanations(opened[:1], [best, *others], RULES) == []
 
 
-def test_what_only_the_training_runs_show_is_suggested_and_not_named() -> None:
+def test_what_has_too_small_odds_for_a_name_is_suggested_and_not_named() -> None:
     told = tell_verdict((), (), (), {}, {}, FORM)
     assert told.startswith("These runs prove nothing")
     assert "the pitch moment depends on speed" in told
@@ -98,8 +107,8 @@ def test_a_name_is_not_credited_with_what_the_vehicles_own_numbers_do() -> None:
     error = replace(ERROR, frozen=0.86, retuned=1.04, after=0.092)
     told = tell_verdict((late,), (), (effect,), {"speed": error}, {}, own="the brakes give 9.9 % below")
     assert told == (
-        "The brakes answer 0.021 s late; with the vehicle's own numbers fitted too (the brakes give 9.9 % below), that"
-        " takes the error of the speed from 0.86 (re-tuned 1) to 0.092 m/s, on runs to which no number was fitted."
+        "The brakes answer 0.021 s late. With the vehicle's own numbers fitted too (the brakes give 9.9 % below), that"
+        " lowers the error of the speed from 0.86 (re-tuned 1) to 0.092 m/s, on runs to which no number was fitted."
     )
 
 
@@ -113,7 +122,7 @@ def test_rivals_of_one_of_several_names_are_no_rivals_of_all() -> None:
         for name in ("brake_dead_time", "engine_braking", "rolling_resistance")
     )  # fmt: skip
     told = tell_verdict((late, engine), (rolling, rolling), library, {"speed": replace(ERROR, after=0.1)}, {})
-    assert "in the place of one of these, which these runs cannot tell apart; together they take" in told
+    assert "in the place of one of these, which these runs cannot tell apart. That lowers" in told
     assert "2 other explanations" not in told, "one effect may be the rival of both"
 
 
@@ -142,39 +151,6 @@ def test_an_error_is_said_without_an_exponent() -> None:
     assert "of the speed from 121 (re-tuned 100) to 0.056 m/s and of the stopping distance from 121" in told
 
 
-@pytest.mark.parametrize(
-    ("gain", "at_bound", "is_open"), [(0.4, False, True), (-14.8, False, False), (0.4, True, False)]
-)
-def test_only_a_candidate_that_held_out_runs_neither_confirm_nor_contradict_is_open(
-    gain: float, at_bound: bool, is_open: bool
-) -> None:
-    assert judged("anti_dive", 45.6, held_out_gain=gain, at_bound=at_bound).is_open is is_open
-    assert not judged("anti_dive", 19.9, held_out_gain=gain, at_bound=at_bound).is_open
-
-
-def test_the_next_run_is_planned_for_the_best_candidate_that_is_open() -> None:
-    contradicted = judged("bump_stop", 158.4, held_out_gain=-14.8)
-    best, other = judged("anti_dive", 45.6, held_out_gain=0.4), judged("brake_lag", 30.0)
-    null = SimpleNamespace()
-    assert find_pair_to_confirm([contradicted, other, best], null) == (best.fitted, null)
-    assert find_pair_to_confirm([contradicted], null) is None
-
-
-@pytest.mark.parametrize(
-    ("held_out", "crossed", "passes"),
-    [(9.0, 0.0, True), (0.4, 134.0, True), (0.4, 39.0, False), (-14.8, 0.0, False)],
-)
-def test_runs_that_no_fit_has_seen_must_confirm_a_name(held_out: float, crossed: float, passes: bool) -> None:
-    assert judged("anti_dive", 45.6, held_out_gain=held_out, crossed=crossed).passes is passes
-    assert not judged("anti_dive", 19.9, held_out_gain=held_out, crossed=crossed).passes
-
-
-def test_the_verdict_says_when_cross_validation_confirmed_a_name() -> None:
-    said = say_confirmation(judged("anti_dive", 45.6, held_out_gain=0.4, crossed=134.0))
-    assert said is not None and "(gain 134.0, a name needs 40)" in said
-    assert say_confirmation(judged("anti_dive", 45.6, held_out_gain=9.0)) is None
-
-
 def test_an_instruments_error_is_told_by_its_own_channel_and_not_by_the_speed() -> None:
     speed = replace(ERROR, frozen=0.065, retuned=0.44, after=0.094, change_low=0.0, change_high=1.0)
     error = {
@@ -194,7 +170,11 @@ def test_a_name_that_the_speed_does_not_show_is_told_by_the_channel_that_does() 
     felt = replace(speed, frozen=0.79, retuned=0.78, after=0.29, unit="m/s^2")
     error = {"speed": speed, "longitudinal_acceleration": felt}
     told = tell_verdict((FORM,), (), (), error, {})
-    assert "longitudinal acceleration from 0.79 (re-tuned 0.78) to 0.29 m/s^2 and of the speed" in told
+    assert (
+        "lowers the error of the longitudinal acceleration from 0.79 (re-tuned 0.78) to 0.29 m/s^2 and raises that of"
+        in told
+    )
+    assert "of the speed from 0.22 (re-tuned 0.22) to 0.25 m/s" in told
     assert "acceleration" not in tell_verdict(
         (FORM,), (), (), {**error, "speed": replace(speed, after=0.1)}, {}
     )

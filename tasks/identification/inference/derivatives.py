@@ -103,8 +103,6 @@ def differentiate_run(
         others=np.zeros((len(nuisance), 1)),
         factor=np.empty(0),
         session_q=np.empty(0),
-        library_q=np.empty(0),
-        others_q=np.empty(0),
     )
     evidence = set_disturbance_prior(evidence, tolerances, disturbance)
     return differentiate_by_library(evidence, base, effects, slots) if effects else evidence
@@ -146,10 +144,7 @@ def differentiate_by_library(
         whiten_channels(np.stack(part, axis=-1), run.rho, run.sigma, run.model.sampled)
         for part in (library, others or [np.zeros_like(library[0])])
     )
-    return replace(
-        run, library=columns, others=more,
-        library_q=run.project_on_nuisances(columns), others_q=run.project_on_nuisances(more),
-    )  # fmt: skip
+    return replace(run, library=columns, others=more)
 
 
 def _prepare_quotients(

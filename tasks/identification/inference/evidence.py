@@ -57,7 +57,6 @@ class RunEvidence:
     others : float64 [M, X] the same with the second parameter at `list_second_values`
     factor : Cholesky factor (lower) of information + prior precision
     session_q : float64 [D, 7] factor^-1 nuisance' session
-    library_q, others_q : float64 [D, E], [D, X] factor^-1 nuisance' library, and others
     origin : float64 [D] the run's offsets about which the derivatives are taken; None for 0
     """
 
@@ -72,8 +71,6 @@ class RunEvidence:
     others: NDArray[np.float64]
     factor: NDArray[np.float64]
     session_q: NDArray[np.float64]
-    library_q: NDArray[np.float64]
-    others_q: NDArray[np.float64]
     origin: NDArray[np.float64] | None = None
 
     def compute_residual(
@@ -185,6 +182,4 @@ def set_disturbance_prior(
     return replace(
         changed,
         session_q=changed.project_on_nuisances(changed.session),
-        library_q=changed.project_on_nuisances(changed.library),
-        others_q=changed.project_on_nuisances(changed.others),
     )

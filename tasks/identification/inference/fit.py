@@ -69,18 +69,6 @@ class Fit:
         """Return how far each number of the session is pulled, in its prior sigmas and either way, float64 [7]."""
         return np.asarray(np.abs(self.session) / self.session_sigma)
 
-    @property
-    def at_bound(self) -> bool:
-        """Return whether a parameter sits on its bound, other than at 0 for a second parameter."""
-        lower = np.concatenate([p.lower for p in self.parts]) if self.parts else np.empty(0)
-        upper = np.concatenate([p.upper for p in self.parts]) if self.parts else np.empty(0)
-        first = (
-            np.concatenate([np.arange(len(p.names)) == 0 for p in self.parts]) if self.parts else np.empty(0)
-        )
-        margin = 1e-6 * (upper - lower)
-        touching = (self.values <= lower + margin) | (self.values >= upper - margin)
-        return bool(np.any(touching & (first.astype(bool) | (self.values != 0.0))))
-
 
 @dataclass(frozen=True, kw_only=True)
 class _State:
@@ -266,42 +254,6 @@ def _compute_gauss_newton_step(
             break
         free[:k] &= ~outside
     return move
-
-
-def compute_misfit_by_run(
-    evidence: tuple[RunEvidence, ...], fitted: Fit
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the marginalised misfit of runs under a fit to other runs, and its linearisation error, float64 [R] each.
-
-    Parameters
-    ----------
-    evidence : the runs
-    fitted : fit, usually to other runs
-    """
-    points = linearise_runs(evidence, fitted.parts, fitted.values, fitted.session)
-    return collect_misfits(points), np.array([point.linearisation_error for point in points])
-
-
-def sum_misfit_falls(
-    before: tuple[NDArray[np.float64], NDArray[np.float64]],
-    after: tuple[NDArray[np.float64], NDArray[np.float64]],
-) -> float:
-    """Return the fall of the misfit summed over runs, of which `compute_misfit_falls` says more."""
-    return float(np.sum(compute_misfit_falls(before, after)))
-
-
-def compute_misfit_falls(
-    before: tuple[NDArray[np.float64], NDArray[np.float64]],
-    after: tuple[NDArray[np.float64], NDArray[np.float64]],
-) -> NDArray[np.float64]:
-    """Return the fall of the misfit of each run, float64 [R]; a change counts only beyond its numerical error.
-
-    Parameters
-    ----------
-    before, after : results of `compute_misfit_by_run`
-    """
-    change = before[0] - after[0]
-    return np.asarray(np.sign(change) * np.maximum(np.abs(change) - before[1] - after[1], 0.0))
 
 
 def _compute_total_misfit(

@@ -1,8 +1,6 @@
 """Linearisation of all runs about a fit, and the scales of their disturbances."""
 
-from collections.abc import Mapping
 from dataclasses import replace
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +40,6 @@ def prepare_evidence(
     surface: SurfaceParameters,
     effects: tuple[Effect, ...],
     rules: DecisionRules,
-    hardly_known: Mapping[str, tuple[float, float]] = MappingProxyType({}),
 ) -> tuple[Evidence, Fit]:
     """Return noise and derivatives under the first guess of the disturbances, and the fit without effects.
 
@@ -55,11 +52,10 @@ def prepare_evidence(
     vehicle, surface : judged model
     effects : library of candidates
     rules : decision rules; they say which runs are left out
-    hardly_known : numbers of the session that the vehicle's file hardly knows: a first value, and the prior's sigma
     """
     rho, sigma = estimate_channel_noise(campaign)
-    tolerances = _leave_out_unseen(campaign).with_session({n: wide for n, (_, wide) in hardly_known.items()})
-    first = np.array([hardly_known.get(name, (0.0, 0.0))[0] for name in SESSION])
+    tolerances = _leave_out_unseen(campaign)
+    first = np.zeros(len(SESSION))
     guess = Disturbance()
     models = [
         prepare_run(replace(run, pressure=denoise_pressure(run.pressure)), vehicle, surface)
@@ -81,7 +77,7 @@ def prepare_evidence(
     base, session_sigma = compose_parameters((), np.empty(0), first)[0], np.array(tolerances.session)
     runs = differentiate_runs(train, base)
     null = fit_hypotheses(runs, (), session_sigma, session=first, iterations=6)
-    if hardly_known or np.max(null.pulls) > rules.relinearisation_pull:
+    if np.max(null.pulls) > rules.relinearisation_pull:
         base = compose_parameters((), np.empty(0), null.session)[0]
         runs = differentiate_runs(train, base)
         null = fit_hypotheses(runs, (), session_sigma, session=null.session, iterations=6)

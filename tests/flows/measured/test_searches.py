@@ -1,6 +1,8 @@
-"""A campaign is judged by the rules, effects and numbers of the catalogues."""
+"""A campaign is judged by the rules, effects and numbers of the catalogues, and by the joint fit where it asks for that."""
 
 from types import SimpleNamespace
+
+import pytest
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
@@ -8,10 +10,17 @@ from catalogs.joint_numbers import load_joint_numbers
 from flows.measured import searches
 
 
-def test_single_effects_leave_out_what_only_a_joint_fit_looks_for(monkeypatch):
+@pytest.mark.parametrize("says_little", [False, True])
+def test_a_campaign_is_judged_by_the_whole_library_or_by_the_numbers_of_the_joint_fit(
+    monkeypatch: pytest.MonkeyPatch, says_little: bool
+) -> None:
     given = SimpleNamespace(), SimpleNamespace(), SimpleNamespace()
-    monkeypatch.setattr(searches, "judge_by_two_searches", lambda *asked: asked)
-    *same, single, numbers, rules = searches.judge_campaign(*given, load_effects())
-    assert tuple(same) == given and numbers == load_joint_numbers() and rules == load_decision_rules()
-    left = {effect.name for effect in load_effects()} - {effect.name for effect in single}
-    assert left == {"retuned_wet_friction", "retuned_snow_friction", "engine_braking_gears"}
+    monkeypatch.setattr(searches, "needs_joint_fit", lambda *_: says_little)
+    for name in ("judge_runs", "judge_jointly"):
+        monkeypatch.setattr(searches, name, lambda *asked, name=name: (name, *asked))
+    judge, *same, looked_for, rules = searches.judge_campaign(*given, load_effects())
+    assert tuple(same) == given and rules == load_decision_rules()
+    if says_little:
+        assert (judge, looked_for) == ("judge_jointly", load_joint_numbers())
+    else:
+        assert (judge, looked_for) == ("judge_runs", load_effects())

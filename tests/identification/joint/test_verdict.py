@@ -49,14 +49,6 @@ def test_the_answer_does_not_depend_on_the_numbers_that_the_file_starts_from():
     assert 0.4 * (1.0 + found["retuned_pressure_gain"][1]) == pytest.approx(1.3, abs=0.02)
 
 
-def test_why_single_effects_could_not_be_told_is_the_first_reason():
-    numbers = [n for n in load_joint_numbers() if n.name == "pressure_gain"]
-    why = "the runs disagree"
-    told = judge_jointly(campaign_of({}), VEHICLE, SURFACE, numbers, RULES, disagreement=why).verdict
-    assert told.reasons[0] == told.disagreement == why
-    assert why not in judge_jointly(campaign_of({}), VEHICLE, SURFACE, numbers, RULES).verdict.reasons
-
-
 def test_a_mass_and_frictions_are_wrong_by_the_tolerances_of_their_campaign():
     numbers = {n.name: n for n in load_joint_numbers()}
     campaign = campaign_of({})
@@ -196,21 +188,6 @@ def test_tyres_at_their_limit_are_a_rival_of_the_brakes_curve():
     assert [rival.name for _, rival in found] == ["retuned_wet_friction"]
     wet = replace(curve, name="retuned_wet_friction")
     assert name_rivals(fitted, [], [curve, wet], RULES.joint) == [], "no name is a rival of one beside it"
-
-
-def test_numbers_alone_are_calibrated_and_not_named_where_the_whole_library_was_searched():
-    """A valley of friction over speed, of which one channel shows little, passed for wet roads that grip less."""
-    strong = campaign_of({"pressure_gain": 0.9})
-    named, own = (
-        judge_jointly(strong, VEHICLE, SURFACE, FEW, RULES, names_numbers=alone) for alone in (True, False)
-    )
-    assert [e.name for e in named.verdict.effects] == ["retuned_pressure_gain"]
-    assert own.verdict.verdict == "NOTHING" and not own.verdict.rivals and not own.substitutes
-    assert [e.name for e in own.calibrated] == ["retuned_pressure_gain"]
-    slow = judge_jointly(
-        campaign_of({"pressure_gain": 0.9, "lag": 0.09}), VEHICLE, SURFACE, FEW, RULES, names_numbers=False
-    )
-    assert "brake_lag" in [e.name for e in slow.verdict.effects]
 
 
 def test_a_number_within_its_tolerance_that_other_physics_explains_as_well_is_named_with_its_rival(

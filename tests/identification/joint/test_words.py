@@ -116,7 +116,10 @@ def test_a_full_stop_that_the_road_slows_less_than_the_model_is_told_for_what_it
     run = plain_run(30.0, 15.0, seconds=4.0)
     slowed = run.response.copy()
     slowed[100:, 0] -= deceleration * 0.01 * np.arange(300) * (slowed[100:, 0] > 0.0)
-    campaign = make_campaign((replace(run, response=np.maximum(slowed, 0.0)),))
+    campaign = Campaign(
+        name="stops", vehicle="paper-reference", runs=(replace(run, response=np.maximum(slowed, 0.0)),),
+        tolerances=TOLERANCES, content_hash="", split_hash="", channels=("speed", "longitudinal_acceleration"),
+    )  # fmt: skip
     stops = [make_stop(run, VEHICLE, SURFACE, campaign.channels, rules) for run in campaign.train]
     text = "; ".join(tell_what_was_used(campaign, stops, (1, 1), rules))
     assert ("no run slowed down harder than the model's tyres allow" in text) is told
