@@ -145,6 +145,17 @@ def test_two_explanations_that_half_of_the_runs_decide_either_way_are_not_told_a
     assert plain[1] > 20.0 and abs(compared[1]) < 1.0
 
 
+def test_what_the_runs_disagree_about_does_not_gain_by_that() -> None:
+    """A force along the road that fitted one of three stops was held to be e^109 times as likely as the lag."""
+    sizes, drags = (10.0, 1.0, 1.0, 1.0), (1.0, 8.0, 9.0, 10.0)
+    designs = [size * np.eye(2) for size in sizes]
+    grams = grams_of((LAG, DRAG), designs, [x @ (10.0, drag) for x, drag in zip(designs, drags, strict=True)])
+    lag, drag = (weigh_explanation(grams, [c]) for c in grams.columns.candidates)
+    assert lag is not None and drag is not None
+    assert lag.gain > 50.0 * drag.gain and drag.spreads[0] > 1.0
+    assert compare_explanations(grams, lag, drag, 0.0) > 3.0
+
+
 def test_what_an_error_of_the_signature_may_make_is_no_evidence() -> None:
     assert temper_odds(10.0, 100.0, 0.1) == pytest.approx(5.0)
     assert temper_odds(-10.0, 100.0, 0.1) == pytest.approx(-5.0)

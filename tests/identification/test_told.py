@@ -11,6 +11,7 @@ from catalogs.decision_rules import load_decision_rules
 from tasks.identification.decision.candidates import Candidate
 from tasks.identification.decision.odds import RunGrams, search_explanations
 from tasks.identification.decision.told import OpenExplanation, list_open_explanations
+from tasks.identification.rules import DecisionRules
 from tests.identification.explained import effect_of, form_of, grams_of
 
 RULES = replace(load_decision_rules(), signature_error=0.0)
@@ -18,12 +19,15 @@ LAG, DRAG = effect_of("brake_lag", 0), effect_of("aerodynamic_drag", 1)
 
 
 def open_explanations(
-    candidates: Sequence[Candidate], design: NDArray[np.float64], values: Sequence[float], runs: int = 4
+    candidates: Sequence[Candidate],
+    design: NDArray[np.float64],
+    values: Sequence[float],
+    rules: DecisionRules = RULES,
 ) -> list[OpenExplanation]:
     """The explanations that runs of a car with these values leave open, without noise."""
-    designs = [design] * runs
+    designs = [design] * 4
     grams: RunGrams = grams_of(candidates, designs, [x @ np.array(values) for x in designs])
-    return list_open_explanations(grams, search_explanations(grams, most=2, width=8), RULES)
+    return list_open_explanations(grams, search_explanations(grams, most=2, width=8), rules)
 
 
 def names(opened: Sequence[OpenExplanation]) -> list[set[str]]:
@@ -62,14 +66,22 @@ def test_two_numbers_that_the_runs_hardly_tell_apart_are_both_open_with_their_od
 
 
 @pytest.mark.parametrize(
-    ("miss", "told"), [(0.3, {"pressure_nonlinearity"}), (6.0, {"form brake_torque(pressure)"})]
+    ("miss", "law_error", "told"),
+    [
+        (0.3, 0.0, {"pressure_nonlinearity"}),
+        (6.0, 0.0, {"form brake_torque(pressure)"}),
+        (6.0, 0.3, {"pressure_nonlinearity"}),  # as far off as the law of the effect in another car
+    ],
 )
-def test_a_form_is_told_where_no_effect_of_the_library_is_as_likely(miss: float, told: set[str]) -> None:
+def test_a_form_is_told_where_no_effect_of_the_library_is_as_likely(
+    miss: float, law_error: float, told: set[str]
+) -> None:
     curve = effect_of("pressure_nonlinearity", 0)
     form = form_of("brake_torque", "pressure", (1, 2))
     # the form holds what the effect is, and what the effect misses
     design = np.array([[10.0, 10.0, 0.0], [0.0, 0.0, 10.0]])
-    opened = open_explanations([curve, form], design, [0.0, 3.0, 0.1 * miss], runs=3)
+    rules = replace(RULES, law_error=law_error)
+    opened = open_explanations([curve, form], design, [0.0, 3.0, 0.1 * miss], rules=rules)
     assert names(opened) == [told], "nor is the form the rival of what it is without its law"
 
 

@@ -64,7 +64,8 @@ class Explanation:
     errors : float64 [K] their standard deviations
     spreads : standard deviation from run to run of each member, over its size [1]
     session : float64 [7] numbers of the session
-    everything : float64 [C] mean of every column's number; 0 where it takes no part
+    everything : float64 [C] mean of every column's number where the gain is taken, without spread of the runs; 0 where
+        it takes no part
     """
 
     members: tuple[Candidate, ...]
@@ -122,6 +123,8 @@ def weigh_explanation(
     score = grams.score[:, prior.columns]
     total, right = information.sum(axis=0), score.sum(axis=0)
     mean, factor, evidence = _integrate(total, right, prior)
+    everything = np.zeros(grams.columns.count)
+    everything[prior.columns] = mean + prior.centre
     plain = _integrate(*_take(grams, nobody), nobody)[2]
     gain, spreads = evidence - plain, [0.0] * len(members)
     if spread and members:
@@ -145,12 +148,10 @@ def weigh_explanation(
     if any(not low - 1e-12 <= x <= high + 1e-12 for x, (low, high) in zip(values, bounds, strict=True)):
         return None
     inverse = solve_triangular(factor, np.eye(len(mean)), lower=True, check_finite=False)
-    everything = np.zeros(grams.columns.count)
-    everything[prior.columns] = mean + prior.centre
     return Explanation(
         members=tuple(members), log_odds=gain_with_spread + sum(m.log_prior for m in members), gain=gain, values=values,
         errors=np.sqrt(np.einsum("ij,ij->j", inverse, inverse))[at], spreads=tuple(spreads),
-        session=everything[-7:], everything=everything,
+        session=(mean + prior.centre)[len(nobody.columns) - 7 : len(nobody.columns)], everything=everything,
     )  # fmt: skip
 
 
