@@ -163,7 +163,7 @@ def test_the_report_needs_no_other_file_and_its_names_are_text(closed: Path) -> 
     assert text.count("href=") == text.count('href="data:,"') == 1
     assert HOSTILE not in page and HOSTILE.replace("<", "&lt;").replace(">", "&gt;") in page
     for heading in (
-        "What was tried",
+        "Explanations and their odds",
         "Where the residual of the training runs lies",
         "How often this method is right",
     ):
@@ -180,7 +180,7 @@ def test_the_verdict_is_told_in_plain_words(closed: Path) -> None:
     verdict = json.loads((closed / "verdict.json").read_text())
     sentence, distance = verdict["sentence"], verdict["manoeuvre_error"]["stopping_distance"]
     assert sentence.startswith(
-        "The brakes follow the pressure with a lag of 0.1 s; that takes the error of the speed"
+        "The brakes follow the pressure with a lag of 0.1 s. That lowers the error of the speed"
     )
     frozen, retuned, after = (f"{distance[key]:.2g}" for key in ("frozen", "retuned", "after"))
     assert f"of the stopping distance from {frozen} (re-tuned {retuned}) to {after} m" in sentence
