@@ -1,4 +1,4 @@
-"""A campaign is judged by the rules, effects and numbers of the catalogues, and by the joint fit where it asks for that."""
+"""A campaign is judged by the catalogues' rules and effects, and by the joint fit where it says too little for them."""
 
 from types import SimpleNamespace
 

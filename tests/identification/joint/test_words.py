@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.identification.joint.test_calibration import make_campaign
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
