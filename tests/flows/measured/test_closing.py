@@ -25,7 +25,7 @@ from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS, SESSION, Campaign
 from tasks.campaign.planned_runs import RunPlan
 from tasks.errors import InputError
 from tasks.identification.benchmark import TOLERANCES, make_synthetic_campaign
-from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter, Verdict
+from tasks.identification.decision.answer import ChannelError, NamedEffect, OpenOdds, Parameter, Verdict
 from tasks.identification.inference.disturbance import Disturbance
 
 VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
@@ -289,10 +289,13 @@ def verdict_of(*effects: NamedEffect) -> Verdict:
 
 
 def test_the_verdict_has_the_keys_that_others_read_and_is_plain_json() -> None:
-    content = verdict_json(verdict_of(named("aerodynamic_drag", "effect", parameter("drag_area", 0.7, "m2"))))
+    found = verdict_of(named("aerodynamic_drag", "effect", parameter("drag_area", 0.7, "m2")))
+    odds = (OpenOdds(names=("aerodynamic_drag",), odds=1.0), OpenOdds(names=(), odds=0.25))
+    content = verdict_json(replace(found, odds=odds))
     assert {"verdict", "effects", "rivals", "discriminating_experiment", "error"} <= set(content)
     effect = content["effects"][0]
-    assert {"name", "class", "port", "variable", "parameters", "score"} <= set(effect)
+    assert {"name", "class", "port", "variable", "parameters", "score", "gain", "spread"} <= set(effect)
+    assert content["odds"] == [{"names": ["aerodynamic_drag"], "odds": 1.0}, {"names": [], "odds": 0.25}]
     assert {"value", "ci_low", "ci_high", "unit"} <= set(effect["parameters"]["drag_area"])
     assert {"frozen", "retuned", "after", "ci_low", "ci_high", "unit"} <= set(content["error"]["speed"])
     json.dumps(content, allow_nan=False)
