@@ -4,12 +4,12 @@ import gc
 import io
 import os
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stderr
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, redirect_stderr, suppress
 from pathlib import Path
 
 import pytest
-from filelock import FileLock
+from filelock import FileLock, Timeout
 from hypothesis import HealthCheck, settings
 
 # small matrices: more threads than one cost twice the time (read by numpy when it is first imported)
@@ -38,36 +38,39 @@ def pytest_collection(session):
         return (yield)
     shared = Path(session.config.option.basetemp).parent
     if worker != "gw0":
-        compile_kernels(shared)
+        compile_kernels(shared, ["rasteriser", "vehicle", "pose_solver"], wait=False)
     with FileLock(shared / "collected.lock") as lock:
         if (shared / "collected").exists():
             lock.release()  # there is nothing left to compile: all others import at once
         collected = yield
         (shared / "collected").touch()
     if worker == "gw0":
-        compile_kernels(shared)
+        compile_kernels(shared, ["rasteriser", "vehicle", "rain"], wait=True)
     return collected
 
 
-def compile_kernels(shared: Path) -> None:
-    """Compile each of the large kernels that no other worker has compiled or is compiling.
+def compile_kernels(shared: Path, names: Sequence[str], *, wait: bool) -> None:
+    """Compile large kernels that no other worker has compiled.
 
-    The second worker does three while the first imports, which then does the fourth: the longest.
+    Parameters
+    ----------
+    shared : folder of all workers
+    names : of `tests.kernels`, each of which may need those before it
+    wait : until another worker has compiled what it compiles now; else that is passed over
     """
     from tests import kernels
 
-    for job in (
-        kernels.compile_rasteriser,
-        kernels.compile_vehicle,
-        kernels.compile_pose_solver,
-        kernels.compile_rain,
-    ):
-        try:
-            (shared / job.__name__).mkdir()
-        except FileExistsError:
-            continue
-        with tempfile.TemporaryDirectory() as folder, own_notes(Path(folder)), redirect_stderr(io.StringIO()):
-            job(Path(folder))
+    for name in names:
+        with suppress(Timeout), FileLock(shared / f"{name}.lock", timeout=-1 if wait else 0):
+            if (shared / name).exists():
+                continue
+            with (
+                tempfile.TemporaryDirectory() as folder,
+                own_notes(Path(folder)),
+                redirect_stderr(io.StringIO()),
+            ):
+                getattr(kernels, f"compile_{name}")(Path(folder))
+            (shared / name).touch()
 
 
 def pytest_collection_finish() -> None:
