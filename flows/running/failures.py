@@ -13,7 +13,6 @@ from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
-from flows.store.layout import STAGING
 from tasks.errors import InputError
 from tasks.kernel_cache import cache_root
 
@@ -152,6 +151,8 @@ def disk_full_sentence(error: BaseException) -> str | None:
 
 def _name_place(path: str) -> str:
     """The path, or the dataset's folder in place of what lies in its staging folder, of which no user has heard."""
+    from flows.store.layout import STAGING
+
     place = Path(path)
     return next((str(above.parent) for above in (place, *place.parents) if above.name == STAGING), path)
 
