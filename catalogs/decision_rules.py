@@ -51,7 +51,6 @@ class DecisionRulesEntry(CatalogueEntry):
     slab_width: Level
     spike_width: Share
     signature_error: Share
-    law_error: Share
     form_width: Level
     form_odds: Level
     most_effects: Count

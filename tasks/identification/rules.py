@@ -77,7 +77,6 @@ class DecisionRules:
     slab_width : standard deviation of what a car may lack, over the smallest size that matters [1]
     spike_width : the same of a number that is not named [1]
     signature_error : relative error of an effect's signature in a model of the car [1]
-    law_error : relative error of an effect's law, beyond which a form takes its place [1]
     form_width : standard deviation of a form's values, over the size that matters at its port [1]
     form_odds : odds against a form outside the library, before any run [1]
     most_effects : candidates that one explanation can hold [1]
@@ -99,7 +98,6 @@ class DecisionRules:
     slab_width: float
     spike_width: float
     signature_error: float
-    law_error: float
     form_width: float
     form_odds: float
     most_effects: int

@@ -66,21 +66,21 @@ def test_two_numbers_that_the_runs_hardly_tell_apart_are_both_open_with_their_od
 
 
 @pytest.mark.parametrize(
-    ("miss", "law_error", "told"),
+    ("miss", "signature_error", "told"),
     [
-        (0.3, 0.0, {"pressure_nonlinearity"}),
-        (6.0, 0.0, {"form brake_torque(pressure)"}),
-        (6.0, 0.3, {"pressure_nonlinearity"}),  # as far off as the law of the effect in another car
+        (0.3, 0.01, {"pressure_nonlinearity"}),
+        (6.0, 0.01, {"form brake_torque(pressure)"}),
+        (6.0, 0.3, {"pressure_nonlinearity"}),  # as far off as the effect's signature in another car
     ],
 )
 def test_a_form_is_told_where_no_effect_of_the_library_is_as_likely(
-    miss: float, law_error: float, told: set[str]
+    miss: float, signature_error: float, told: set[str]
 ) -> None:
     curve = effect_of("pressure_nonlinearity", 0)
     form = form_of("brake_torque", "pressure", (1, 2))
     # the form holds what the effect is, and what the effect misses
     design = np.array([[10.0, 10.0, 0.0], [0.0, 0.0, 10.0]])
-    rules = replace(RULES, law_error=law_error)
+    rules = replace(RULES, signature_error=signature_error)
     opened = open_explanations([curve, form], design, [0.0, 3.0, 0.1 * miss], rules=rules)
     assert names(opened) == [told], "nor is the form the rival of what it is without its law"
 

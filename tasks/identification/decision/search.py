@@ -169,7 +169,7 @@ def _settle_explanation(
 
 def _is_worth_it(best: Explanation, here: Explanation, grams: RunGrams, rules: DecisionRules) -> bool:
     """Whether an explanation with a form is so much more likely than the fitted one that it takes its place."""
-    return best is not here and compare_explanations(grams, best, here, rules.law_error) > log(
+    return best is not here and compare_explanations(grams, best, here, rules.signature_error) > log(
         rules.named_odds
     )
 

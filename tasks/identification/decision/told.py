@@ -13,6 +13,7 @@ from tasks.identification.decision.odds import (
     RunGrams,
     can_stand_for,
     compare_explanations,
+    temper_odds,
     weigh_explanation,
 )
 from tasks.identification.rules import DecisionRules
@@ -136,17 +137,16 @@ def list_open_explanations(
     span = log(rules.named_odds)
     most = max(found.log_odds for found in by_told.values())
     within = [found for found in by_told.values() if found.log_odds >= most - span]
-    best = max(within, key=lambda found: found.log_odds)
-    # what a form has beyond an effect of the library may be the law of that effect in another car
+    best = max(within, key=lambda found: (found.log_odds, found.explanation.log_odds))
+    # what an effect of the library explains as well is no form
     laws = [
         f
         for f in by_told.values()
-        if f.told and _has_form(best) > _has_form(f)
-        and compare_explanations(grams, best.explanation, f.explanation, rules.law_error) <= span
+        if f.told and _has_form(best) > _has_form(f) and _explains_as_much(f.explanation, best.explanation, rules)
     ]  # fmt: skip
     simplest = min(
         [f for f in within if not f.told] or laws or [f for f in within if f.names <= best.names],
-        key=lambda found: (len(found.names), -found.log_odds),
+        key=lambda found: (len(found.names), -found.log_odds, -found.explanation.log_odds),
     )
     apart = [f for f in within if not f.numbers >= simplest.numbers and not _holds_again(f, simplest)]
     # of explanations that add to one another the simplest stands for all
@@ -167,3 +167,11 @@ def _holds_again(other: OpenExplanation, first: OpenExplanation) -> bool:
     forms = [member for member in other.told if member.effect is None]
     known = [member for member in first.told if member.effect is not None]
     return any(can_stand_for(form, member) for form in forms for member in known)
+
+
+def _explains_as_much(plain: Explanation, best: Explanation, rules: DecisionRules) -> bool:
+    """Whether all runs together leave an explanation open beside the best one, however its size scatters over them."""
+    prior = sum(m.log_prior for m in best.members) - sum(m.log_prior for m in plain.members)
+    return temper_odds(best.gain - plain.gain + prior, best.gain, rules.signature_error) <= log(
+        rules.named_odds
+    )
