@@ -56,7 +56,7 @@ HEAT_COLUMN = "braking_heat_j_kg"
 SLOPE_COLUMN = "felt_slope_rad"
 """Column of runs.csv with the slope of the road that an import reads off the accelerometer; a campaign may lack it."""
 STEEPEST_ROAD = 0.4
-"""Slope beyond which no road goes; Baldwin Street has 0.35 [rad]."""
+"""Slope beyond which no road goes: our own choice, above the grade that `physical_limits.yaml` allows [rad]."""
 
 
 class Split(BaseModel):

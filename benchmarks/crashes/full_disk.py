@@ -46,15 +46,15 @@ def full_disk_study(
 
 
 def _fill_disks(place: Path, words: list[str], disks: int, draw: random.Random) -> dict[str, Any]:
-    place.mkdir()
-    finish_command(*words, "--out", str(place / "whole"))
-    wanted = files_of(place / "whole")
-    size = sum(path.stat().st_size for path in (place / "whole").rglob("*") if path.is_file())
+    with _small_disk(place, ROOM) as disk:
+        finish_command(*words, "--out", str(disk / "data"))
+        wanted = files_of(disk / "data")
+        size = sum(path.stat().st_size for path in (disk / "data").rglob("*") if path.is_file())
     found = {"disks": disks, "told": 0, "equal": 0}
     for turn in range(disks):
         # half of them small, where plan, inputs and metadata are written
         bound = min(300_000, size // 3) if turn % 2 else size
-        with _small_disk(place / f"disk-{turn}", draw.randrange(4096, bound)) as disk:
+        with _small_disk(place, draw.randrange(4096, bound)) as disk:
             code, said = finish_command(*words, "--out", str(disk / "data"))
             told = code == 2 and "the disk is full" in said and "Traceback" not in said
             found["told"] += told
@@ -69,7 +69,7 @@ def _fill_disks(place: Path, words: list[str], disks: int, draw: random.Random) 
 
 @contextmanager
 def _small_disk(place: Path, size: int) -> Iterator[Path]:
-    place.mkdir()
+    place.mkdir(exist_ok=True)
     subprocess.run(["/bin/mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(place)], check=True)
     try:
         yield place

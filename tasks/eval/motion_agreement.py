@@ -174,7 +174,7 @@ def judge_pose(
         reasons.append(
             f"pitch correlation is {correlation:.4g}, at least {thresholds.pitch_correlation:g} is needed"
         )
-    blindness = _find_blindness(recovered, thresholds, pitch_rmse, progress_rmse) if reasons else []
+    blindness = _find_blindness(recovered, thresholds, pitch_rmse, progress_rmse, errors) if reasons else []
     return PoseVerdict(
         method=recovered.method,
         passed=None if blindness else not reasons,
@@ -192,25 +192,37 @@ def judge_pose(
 
 
 def _find_blindness(
-    recovered: RecoveredMotion, thresholds: PoseThresholds, pitch_rmse: float, progress_rmse: float
+    recovered: RecoveredMotion,
+    thresholds: PoseThresholds,
+    pitch_rmse: float,
+    progress_rmse: float,
+    errors: BodyErrors,
 ) -> list[str]:
     """Return a sentence for each figure that the check sees less well than its limit needs.
 
     There is none where an error exceeds its limit by more than such a sight explains: then the motion is another.
+    Roll and yaw are seen about as well as pitch, the rig's place about as well as progress.
     """
-    found = [TOO_LITTLE] if recovered.blind else []
     seen = ~recovered.failed
-    pitch_std = float(np.rad2deg(recovered.pitch_std[seen].max()))
-    figures = [("pitch", pitch_rmse, pitch_std, thresholds.pitch_rmse_deg, "deg")]
-    if thresholds.progress_rmse_m is not None:
-        progress_std = float(recovered.progress_std[seen].max())
-        figures.append(("progress", progress_rmse, progress_std, thresholds.progress_rmse_m, "m"))
-    if any(error > limit + std / SEES for _, error, std, limit, _ in figures):
-        return found
-    return found + [
+    turn_std = float(np.rad2deg(recovered.pitch_std[seen].max()))
+    way_std = float(recovered.progress_std[seen].max())
+    figures = [
+        ("pitch", pitch_rmse, turn_std, thresholds.pitch_rmse_deg, "deg"),
+        ("progress", progress_rmse, way_std, thresholds.progress_rmse_m, "m"),
+    ]
+    rig = [
+        (errors.roll_rmse_deg, turn_std, thresholds.roll_rmse_deg),
+        (errors.yaw_rmse_deg, turn_std, thresholds.yaw_rmse_deg),
+        (errors.lateral_rmse_m, way_std, thresholds.lateral_rmse_m),
+        (errors.rise_rmse_m, way_std, thresholds.rise_rmse_m),
+    ]
+    missed = [(error, std, limit) for _, error, std, limit, _ in figures] + rig
+    if any(limit is not None and error > limit + std / SEES for error, std, limit in missed):
+        return []
+    return ([TOO_LITTLE] if recovered.blind else []) + [
         f"not judged: {name} is known to {std:.2g} {unit}, and its limit of {limit:.2g} {unit} needs {SEES * limit:.2g}"
         for name, _, std, limit, unit in figures
-        if std > SEES * limit
+        if limit is not None and std > SEES * limit
     ]
 
 

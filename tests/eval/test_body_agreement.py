@@ -64,6 +64,16 @@ def test_a_rig_that_moves_otherwise_than_claimed_fails_by_its_name(
     assert not verdict.passed and any(NAMED[false] in reason for reason in verdict.reasons), verdict.reasons
 
 
+@pytest.mark.parametrize("false", ["roll", "yaw", "aside"])
+def test_a_rig_that_turns_otherwise_fails_where_pitch_is_seen_as_badly_as_in_a_snowstorm(
+    recovered: RecoveredMotion, hump_clip: Clip, false: str
+) -> None:
+    claim = claim_of(hump_clip)
+    blurred = replace(recovered, pitch_std=np.full(len(claim.heave), np.deg2rad(0.13)))
+    shown = FALSE_RIGS[false](claim, np.arange(len(claim.heave)) / RATE_HZ)
+    assert judge(show_rig(blurred, claim, shown), hump_clip).passed is False
+
+
 def test_a_pitch_that_is_off_all_along_fails_by_the_rise(recovered: RecoveredMotion, hump_clip: Clip) -> None:
     shown = hump_clip.T_world_rig @ pitch_by(hump_clip, np.deg2rad(2))
     verdict = judge(show_rig(recovered, claim_of(hump_clip), shown), hump_clip)

@@ -14,6 +14,7 @@ from tasks.eval.poses.essential import recover_motion_essential
 from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.poses.photometric import recover_motion_photometric
 from tasks.eval.poses.pnp import recover_motion_pnp
+from tests.eval.weathering import add_flakes
 
 THRESHOLDS = PoseThresholds(
     pitch_rmse_deg=0.08, pitch_relative_error=0.10, pitch_correlation=0.98, response_deg=0.2,
@@ -202,7 +203,7 @@ def test_a_missed_limit_is_judged_only_where_the_check_sees_well_enough(
     assert judge_pose(motion, hump_clip.pitch, hump_clip.station, THRESHOLDS).passed is True
 
 
-def test_a_clip_too_dark_to_follow_is_not_judged_and_one_that_shows_other_pictures_fails(
+def test_a_clip_too_dark_or_too_thick_with_flakes_to_follow_is_not_judged_and_one_that_shows_other_pictures_fails(
     hump_clip: Clip,
 ) -> None:
     part = slice(0, 8)
@@ -211,8 +212,9 @@ def test_a_clip_too_dark_to_follow_is_not_judged_and_one_that_shows_other_pictur
     dark = np.clip(0.005 * hump_clip.frames[part] + noise, 0, 255).round().astype(np.uint8)
     other = hump_clip.frames[np.array([0, 4, 1, 5, 2, 6, 3, 7]) * len(hump_clip.frames) // 8]
     verdicts = []
-    for frames in (dark, other):
+    for frames in (dark, add_flakes(hump_clip.frames[part], 1000), other):
         recovered = recover_motion_pnp(frames, depth, hump_clip.K, hump_clip.T_rig_camera, sky)
         verdicts.append(judge_pose(recovered, hump_clip.pitch[part], hump_clip.station[part], THRESHOLDS))
-    assert [verdict.passed for verdict in verdicts] == [None, False]
-    assert verdicts[0].reasons[0] == "not judged: the pictures show too little to follow"
+    assert [verdict.passed for verdict in verdicts] == [None, None, False]
+    for verdict in verdicts[:2]:
+        assert verdict.reasons[0] == "not judged: the pictures show too little to follow"

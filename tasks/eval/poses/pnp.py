@@ -4,7 +4,7 @@ The earlier frame is first warped to the place where the later one is expected, 
 shifts and no change of scale. The tracker measures the pixels, not the expectation.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import cv2
@@ -55,6 +55,8 @@ class PnpSettings:
     crowded_contrast : difference of grey levels, of 255, to the warped earlier frame that shows such a thing [1]
     min_points : fewest points that carry a pose [1]
     min_inlier_share : least share of tracked points that must agree on the pose [1]
+    followed : share of corners that come back below which a failure says that too little can be followed: .02 to .08
+        under flakes that tear the points apart, .3 and more with the depth of other pictures [1]
     noise_floor, noise_ceiling : smallest assumed tracking error, and largest error of a valid track [px]
     depth_error : relative standard error of the rendered depth [1]
     link_span : frames that the longer steps beside the chain span [1]
@@ -75,6 +77,7 @@ class PnpSettings:
     crowded_contrast: int = 40
     min_points: int = 30
     min_inlier_share: float = 0.3
+    followed: float = 0.2
     noise_floor: float = 0.01
     noise_ceiling: float = 2.0
     depth_error: float = 0.01
@@ -291,9 +294,11 @@ def _solve_tracks(
         overlap=max(settings.window / cell_size(frame.grey.shape[1], settings.cells_across), 1.0) ** 2,
         depth_error=settings.depth_error,
     )
-    return solve_pnp(
+    step = solve_pnp(
         points, tracks.places[tracked].astype(np.float64), invert_pose(view.T_anchor_frame), K, limits
     )
+    torn = bool(step.failure) and count < settings.followed * len(corners)
+    return replace(step, blind=True) if torn else step
 
 
 def _sample_inverse_depth(

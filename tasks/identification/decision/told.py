@@ -123,7 +123,9 @@ def list_open_explanations(
     plain = [e for e in listed if all(m.effect is not None for m in e.members)]
     ranked += [e for e in plain[: rules.most_compared // 2] if not any(e is known for known in ranked)]
     by_told: dict[Told, OpenExplanation] = {}
-    for explanation in {e.names: e for e in (take_away_members(grams, e, rules) for e in ranked)}.values():
+    needed = [take_away_members(grams, explanation, rules) for explanation in reversed(ranked)]
+    # of the same members the best comes last, and stays
+    for explanation in {e.names: e for e in needed}.values():
         told = find_large_members(explanation, rules)
         # a run that does not count may leave another explanation as good as the best, and no better
         against = min(-compare_explanations(grams, ranked[0], explanation, rules.signature_error), 0.0)

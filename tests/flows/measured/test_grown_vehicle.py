@@ -38,7 +38,8 @@ def verdict_of(
     return Verdict(
         verdict="SET" if rivals else "FOUND", effects=(effect,), rivals=rivals, odds=(), tried=(), error={},
         manoeuvre_error={}, correlation={}, session_pulls={}, noise={}, disturbance=Disturbance(), detectable={},
-        campaign=campaign, content_hash="c" * 64, split_hash="d" * 64, theta=np.zeros(1), slots=(), experiment=None, reasons=(),
+        campaign=campaign,
+        content_hash="c" * 64, split_hash="d" * 64, theta=np.zeros(1), slots=(), experiment=None, reasons=(),
         step_sensitive=(),
     )  # fmt: skip
 

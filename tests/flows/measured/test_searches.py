@@ -1,4 +1,4 @@
-"""A campaign is judged by the catalogues' rules and effects, and by the joint fit where it says too little for them."""
+"""A campaign is judged by rules, effects and numbers of the catalogues, by the joint fit where it asks for that."""
 
 from types import SimpleNamespace
 
