@@ -56,13 +56,14 @@ def test_the_simpler_of_two_explanations_is_told_unless_the_odds_speak_for_the_o
 
 
 def test_two_numbers_that_the_runs_hardly_tell_apart_are_both_open_with_their_odds() -> None:
-    lag, push = replace(LAG, log_prior=-4.0), effect_of("push_out_pressure", 1, log_prior=-5.0)
+    """Beside each other neither is certain nor needed, and yet it is not nothing."""
+    push = effect_of("push_out_pressure", 1, log_prior=-1.0)
     alike = np.array([[10.0, 10.0], [0.0, 0.1]])
-    opened = open_explanations([lag, push], alike, [3.0, 0.0])
+    opened = open_explanations([LAG, push], alike, [3.0, 0.0])
     assert names(opened) == [{"brake_lag"}, {"push_out_pressure"}]
     assert opened[1].log_odds == pytest.approx(-1.0, abs=0.3)
     apart = np.array([[10.0, 10.0], [0.0, 3.0]])
-    assert names(open_explanations([lag, push], apart, [3.0, 0.0])) == [{"brake_lag"}]
+    assert names(open_explanations([LAG, push], apart, [3.0, 0.0])) == [{"brake_lag"}]
 
 
 @pytest.mark.parametrize(
