@@ -51,6 +51,7 @@ class DecisionRulesEntry(CatalogueEntry):
     slab_width: Level
     spike_width: Share
     signature_error: Share
+    foreign_disagreement: Level
     form_width: Level
     form_odds: Level
     most_effects: Count

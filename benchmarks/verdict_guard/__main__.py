@@ -37,7 +37,7 @@ def find_outcome(truth: list[str], verdict: dict[str, Any]) -> str:
         return "wrong"
     if len(told) == 1:
         return "exact" if told[0] == sorted(truth) else "wrong"
-    return "set" if sorted(truth) in told else "wrong"
+    return "set" if any(set(truth) <= set(names) for names in told) else "wrong"
 
 
 def judge_one(folder: Path, out: Path) -> dict[str, Any]:

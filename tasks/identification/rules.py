@@ -77,6 +77,7 @@ class DecisionRules:
     slab_width : standard deviation of what a car may lack, over the smallest size that matters [1]
     spike_width : the same of a number that is not named [1]
     signature_error : relative error of an effect's signature in a model of the car [1]
+    foreign_disagreement : mean square score of the runs beside the best explanation from which nothing is named [1]
     form_width : standard deviation of a form's values, over the size that matters at its port [1]
     form_odds : odds against a form outside the library, before any run [1]
     most_effects : candidates that one explanation can hold [1]
@@ -98,6 +99,7 @@ class DecisionRules:
     slab_width: float
     spike_width: float
     signature_error: float
+    foreign_disagreement: float
     form_width: float
     form_odds: float
     most_effects: int

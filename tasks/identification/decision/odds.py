@@ -29,6 +29,8 @@ SAME_VARIABLE = {"speed": "wheel_speed", "wheel_speed": "speed"}
 """Variables that differ by the slip of the tyres alone."""
 FEWEST = 3
 """Runs that must inform a direction for their scatter to say something [1]."""
+TOLD = 0.5
+"""Square of the smallest size that matters, over its variance by one run, from which the run tells a number [1]."""
 INFORMED = 1e-6
 """Share of the best informed run's information from which a run informs a direction [1]."""
 
@@ -307,6 +309,32 @@ def estimate_spread(size: NDArray[np.float64], pull: NDArray[np.float64]) -> flo
     heterogeneity = float(weight @ (own - mean) ** 2)
     scale = sum_of_weights - float(weight @ weight) / sum_of_weights
     return max(0.0, (heterogeneity - (len(own) - 1)) / scale) if scale > 0.0 else 0.0
+
+
+def measure_disagreement(grams: RunGrams, explanation: Explanation) -> float:
+    """Return by how much the runs disagree with the model, whatever the explanation names [1].
+
+    Under a correct model the score of a run in the direction of any number is standard normal (Cochran 1954,
+    doi:10.2307/3001666). Returned is the median over the numbers of the table of its mean square over runs; 1 is noise.
+
+    Parameters
+    ----------
+    grams : of the runs
+    explanation : whose residual is taken
+    """
+    numbers = grams.columns.base[: -len(explanation.session)]
+    size = np.einsum("rii->ri", grams.information)[:, numbers]
+    used = np.flatnonzero(explanation.everything != 0.0)
+    moved = (explanation.everything - grams.centre)[used]
+    left = grams.score[:, numbers] - grams.information[:, numbers[:, None], used[None, :]] @ moved
+    matters = np.array(
+        [next(c.matters for c in grams.columns.candidates if c.columns == (n,)) for n in numbers]
+    )
+    told = size * matters**2 > TOLD
+    square = np.where(told, left**2 / np.maximum(size, 1e-300), 0.0).sum(axis=0)
+    count = told.sum(axis=0)
+    enough = count > FEWEST
+    return float(np.median(square[enough] / count[enough])) if enough.any() else 1.0
 
 
 def find_odds(log_odds: float) -> float:

@@ -14,10 +14,11 @@ from tasks.identification.decision.held_out import compute_held_out_errors
 from tasks.identification.decision.log_faults import tell_log_faults
 from tasks.identification.decision.missed import tell_miss
 from tasks.identification.decision.naming import find_detectable_sizes, fit_told, name_members
-from tasks.identification.decision.odds import find_odds
+from tasks.identification.decision.odds import find_odds, measure_disagreement
 from tasks.identification.decision.search import Finding, find_explanations
 from tasks.identification.decision.told import OpenExplanation, list_open_explanations, tell_members
 from tasks.identification.decision.words import (
+    say_foreign,
     say_not_named,
     tell_driven,
     tell_open_explanations,
@@ -91,13 +92,21 @@ def judge_runs(
     runs = begin_at_brake(campaign, vehicle, surface, rules.joint.brake_onset_share) if driven else campaign
     finding = find_explanations(runs, vehicle, surface, library, rules)
     opened = list_open_explanations(finding.grams, finding.explanations, rules)
+    disagreement = measure_disagreement(finding.grams, opened[0].explanation)
+    foreign = bool(opened[0].told) and disagreement > rules.foreign_disagreement
+    if foreign:
+        nothing = next(e for e in finding.explanations if not e.members)
+        opened = [OpenExplanation(explanation=nothing, told=(), log_odds=0.0)]
     first, *others = opened
     fitted = fit_told(finding, first)
     named = name_members(first, finding.grams, fitted)
     rivals = _list_rivals(first, others, finding)
     tried = _list_tried(finding, first)
     reasons = tell_open_explanations(opened, finding.explanations, rules)
-    if not named:
+    why = say_foreign(disagreement, rules) if foreign else ""
+    if foreign:
+        reasons.append(why)
+    elif not named:
         reasons += say_not_named(tried, finding.best, tell_members(finding.grams, finding.best, rules), rules)
     reasons += [tell_driven(drive)] if driven else []
     reasons += tell_log_faults(campaign, named, [rival.name for _, rival in rivals])
@@ -132,9 +141,10 @@ def judge_runs(
         split_hash=campaign.split_hash,
         theta=theta,
         slots=slots,
-        experiment=_plan(finding, fitted, others, vehicle, surface),
+        experiment=None if foreign else _plan(finding, fitted, others, vehicle, surface),
         step_sensitive=evidence.step_sensitive,
         reasons=tuple(reasons),
+        disagreement=why,
     )
     verdict = tell_miss(verdict, campaign, rules.joint.foreign_misfit)
     return Outcome(verdict=verdict, finding=finding, opened=tuple(opened), fitted=fitted)

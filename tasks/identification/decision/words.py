@@ -142,6 +142,20 @@ def tell_open_explanations(
     ]
 
 
+def say_foreign(disagreement: float, rules: DecisionRules) -> str:
+    """Return that the runs disagree with the model whatever is named: the car's equations are not the model's.
+
+    Parameters
+    ----------
+    disagreement : of the runs with the best explanation [1]
+    rules : up to which something is named
+    """
+    return (
+        f"the runs disagree with the model by a factor of {disagreement:.1f} whatever is named; noise alone gives 1,"
+        f" and names can be told up to {rules.foreign_disagreement:g}"
+    )
+
+
 def say_not_named(
     tried: Sequence[NamedEffect], best: Explanation, told: Sequence[Candidate], rules: DecisionRules
 ) -> list[str]:
