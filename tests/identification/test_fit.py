@@ -21,6 +21,7 @@ from tasks.identification.decision.forms import (
 )
 from tasks.identification.decision.odds import search_explanations
 from tasks.identification.decision.search import gather_grams
+from tasks.identification.inference import evidence as inference_evidence
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.derivatives import differentiate_run
 from tasks.identification.inference.disturbance import Disturbance
@@ -145,6 +146,17 @@ def test_an_interval_does_not_depend_on_the_unit_of_its_parameter() -> None:
         for h in (spring, scaled)
     ]
     assert sigmas[0] > 0.0 and sigmas[0] == pytest.approx(1e9 * sigmas[1], rel=1e-3)
+
+
+@pytest.mark.parametrize("reading", [1e200, np.inf, np.nan])
+def test_a_trial_whose_simulation_diverges_is_broken_and_overflows_nowhere(
+    reading: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (run,) = evidence_of([measured(plain_run(25.0, 1.5), PLAIN, 0)], ()).train
+    monkeypatch.setattr(
+        inference_evidence, "predict_channels", lambda *_, **__: np.full((run.model.samples, 7), reading)
+    )
+    assert np.array_equal(run.compute_residual(PLAIN), np.full(len(run.nuisance), inference_evidence.BROKEN))
 
 
 def test_a_run_starts_at_the_speed_the_sensor_read_less_its_scale_error() -> None:
