@@ -211,7 +211,12 @@ def test_a_worker_that_joins_a_run_with_another_version_is_turned_away_before_it
             assert not all(call.done() for call in calls)
             client.gather(calls)
             assert {tuple(workers) for workers in client.who_has(calls).values()} == {(first,)}
-    told = capsys.readouterr().err
+            told = ""
+            for _ in range(200):  # the sentence comes from another thread
+                told += capsys.readouterr().err
+                if "turned away" in told:
+                    break
+                time.sleep(0.05)
     assert f"numpy is 1.0 there and {own['numpy']} here: install the same; it was turned away" in told
     assert told.startswith(f"--scheduler {address}: worker ")
 
