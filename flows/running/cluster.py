@@ -119,6 +119,8 @@ class JoiningCheck(WorkerPlugin):
         problems = find_version_problems(self.here, {worker.address: facts_here()})
         for problem in problems:
             worker.log_event(TURNED_AWAY, f"{problem}; it was turned away")
+            # the event goes in a batch of its own time: a worker that is gone sends none
+            await asyncio.sleep(0.5)
         if problems:
             worker.status = Status.closing_gracefully  # begins nothing from here on
             await worker.scheduler.retire_workers(workers=[worker.address], close_workers=False, remove=True)
