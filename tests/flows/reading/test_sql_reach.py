@@ -189,7 +189,8 @@ def test_an_answer_too_large_to_return_is_refused(toy_dataset, monkeypatch):
 )
 def test_a_query_without_end_is_ended_by_ctrl_c(toy_dataset, query):
     code = (
-        "import sys; from flows.reading import query\n"
+        "import signal, sys; from flows.reading import query\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a shell's background job ignores it
         "run = query.run_interruptibly\n"
         "query.run_interruptibly = lambda *asked: print('asks', flush=True) or run(*asked)\n"
         "try: query.query_dataset(sys.argv[1], sys.argv[2])\n"
