@@ -25,7 +25,7 @@ from tasks.identification.decision.odds import (
 )
 from tasks.identification.decision.told import tell_members
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.discrepancy import estimate_run_noise, set_run_noise
+from tasks.identification.inference.discrepancy import RunNoise, estimate_run_noise, set_run_noise
 from tasks.identification.inference.fit import Fit, fit_hypotheses
 from tasks.identification.inference.forward import prepare_run
 from tasks.identification.inference.hypothesis import Hypothesis, make_library_hypothesis
@@ -76,11 +76,20 @@ class Finding:
 
 @dataclass(frozen=True, kw_only=True)
 class _Place:
-    """Where the search stands: the runs about a fit, and their derivatives by the splines."""
+    """Where the search stands.
+
+    Parameters
+    ----------
+    evidence : the runs about a fit
+    fitted : the fit
+    splines : derivatives by the splines, about ``splined``
+    splined : parts of the fit about which they were taken
+    """
 
     evidence: Evidence
     fitted: Fit
     splines: Splines
+    splined: tuple[Hypothesis, ...] = ()
 
 
 def find_explanations(
@@ -118,22 +127,27 @@ def find_explanations(
     columns = list_columns(numbers, retuned, evidence.session_sigma, rules)
     null = place.fitted
     grams = gather_grams(place.evidence, place.fitted, place.splines, columns)
-    first = _refine_first(search_explanations(grams, most=1, width=1, spread=False, forms=False), place, null)
+    singles = search_explanations(grams, most=1, width=1, spread=False, forms=False)
+    first = _refine_first(singles, place, null, rules)
+    plain = place
     if first is not None:
-        place = _move_to(first, place, null, settle=True)
+        place = _settle_scales(_move_to(first, place, null))
+        plain = _take_scales(plain, place)
     for forms in (False, True):
-        place, grams, found = _settle_explanation(place, null, columns, rules, forms=forms)
+        place, grams, found = _settle_explanation(place, plain, null, columns, rules, forms=forms)
     return Finding(
         evidence=place.evidence, null=null, fitted=place.fitted, grams=grams, explanations=tuple(found)
     )
 
 
-def _refine_first(found: list[Explanation], place: _Place, null: Fit) -> Explanation | None:
+def _refine_first(
+    found: list[Explanation], place: _Place, null: Fit, rules: DecisionRules
+) -> Explanation | None:
     """Return the single candidate that explains most through the simulation, of those that seem to; None without one.
 
     A linear estimate of a delay, or of what decides when an anti-lock brake acts, is a hint.
     """
-    hopeful = [e for e in found if e.members and e.log_odds > 0.0][:REFINED]
+    hopeful = [e for e in found if e.members and e.log_odds > log(rules.named_odds)][:REFINED]
     fits = [
         fit_hypotheses(
             place.evidence.train, make_hypotheses(e, place.evidence),
@@ -148,13 +162,16 @@ def _refine_first(found: list[Explanation], place: _Place, null: Fit) -> Explana
 
 
 def _settle_explanation(
-    place: _Place, null: Fit, columns: Columns, rules: DecisionRules, *, forms: bool
+    place: _Place, plain: _Place, null: Fit, columns: Columns, rules: DecisionRules, *, forms: bool
 ) -> tuple[_Place, RunGrams, list[Explanation]]:
     """Return where what the best explanation tells is fitted, what the runs say there, and all explanations.
 
     Forms come after the library: what an effect of the library explains is no form.
     """
     for turn in range(rules.most_turns):
+        if forms and place.splined is not place.fitted.parts:
+            splines = differentiate_by_splines(place.evidence, place.fitted)
+            place = replace(place, splines=splines, splined=place.fitted.parts)
         grams = gather_grams(place.evidence, place.fitted, place.splines, columns)
         found = search_explanations(grams, most=rules.most_effects, width=rules.beam_width, forms=forms)
         told = keep_members(found[0], tell_members(grams, found[0], rules))
@@ -163,7 +180,7 @@ def _settle_explanation(
             break
         if forms and here is not None and not _is_worth_it(found[0], here, grams, rules):
             break
-        place = _move_to(told, place, null, settle=False)
+        place = _move_to(told, place, null) if told.members else plain
     return place, grams, found
 
 
@@ -285,15 +302,21 @@ def widen_session(explanation: Explanation, sigma: NDArray[np.float64]) -> NDArr
     return wide
 
 
-def _move_to(explanation: Explanation, place: _Place, null: Fit, *, settle: bool) -> _Place:
-    """Return the runs about the fit of an explanation, with the scales of noise and disturbances taken anew."""
+def _move_to(explanation: Explanation, place: _Place, null: Fit) -> _Place:
+    """Return the runs about the fit of an explanation."""
     parts = make_hypotheses(explanation, place.evidence, place.fitted)
     sigma = widen_session(explanation, place.evidence.session_sigma)
     fitted = fit_hypotheses(place.evidence.train, parts, sigma, session=null.session, iterations=STEPS)
     evidence = differentiate_at(place.evidence, fitted)
-    fitted = _refit(evidence, fitted)
-    moved = _Place(evidence=evidence, fitted=fitted, splines=differentiate_by_splines(evidence, fitted))
-    return _settle_scales(moved) if settle else moved
+    return replace(place, evidence=evidence, fitted=_refit(evidence, fitted))
+
+
+def _take_scales(place: _Place, scaled: _Place) -> _Place:
+    """Return the runs about the same fit, with noise and disturbances scaled as at another place."""
+    noise = {run.model.run.name: RunNoise(rho=run.rho, sigma=run.sigma) for run in scaled.evidence.train}
+    evidence = rescale_disturbances(set_run_noise(place.evidence, noise), scaled.evidence.disturbance)
+    splines = rewhiten_splines(place.splines, place.evidence, evidence)
+    return replace(place, evidence=evidence, fitted=_refit(evidence, place.fitted), splines=splines)
 
 
 def _refit(evidence: Evidence, fitted: Fit) -> Fit:
@@ -314,7 +337,7 @@ def _settle_scales(place: _Place) -> _Place:
 def _scale_noise(place: _Place) -> _Place:
     evidence = set_run_noise(place.evidence, estimate_run_noise(place.evidence, place.fitted))
     splines = rewhiten_splines(place.splines, place.evidence, evidence)
-    return _Place(evidence=evidence, fitted=_refit(evidence, place.fitted), splines=splines)
+    return replace(place, evidence=evidence, fitted=_refit(evidence, place.fitted), splines=splines)
 
 
 def _scale_disturbances(place: _Place) -> _Place:

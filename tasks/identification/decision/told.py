@@ -13,11 +13,14 @@ from tasks.identification.decision.odds import (
     RunGrams,
     can_stand_for,
     compare_explanations,
+    is_one_size,
     temper_odds,
     weigh_explanation,
 )
 from tasks.identification.rules import DecisionRules
 
+SIGNATURES = 2.0
+"""Errors of a signature by which the size of an effect may differ from run to run [1]."""
 Told = frozenset[str]
 """Names of the members that an explanation tells."""
 
@@ -59,7 +62,7 @@ def tell_members(grams: RunGrams, explanation: Explanation, rules: DecisionRules
     explanation : its members with values and errors
     rules : the odds
     """
-    return find_large_members(take_away_members(grams, explanation, rules), rules)
+    return find_large_members(grams, take_away_members(grams, explanation, rules), rules)
 
 
 def take_away_members(grams: RunGrams, explanation: Explanation, rules: DecisionRules) -> Explanation:
@@ -79,26 +82,37 @@ def take_away_members(grams: RunGrams, explanation: Explanation, rules: Decision
             for member in explanation.members
         ]
         best = max((e for e in rest if e is not None), key=lambda e: e.log_odds, default=None)
-        if best is None or explanation.log_odds - best.log_odds > log(rules.named_odds):
+        if best is None:
+            break
+        odds = temper_odds(explanation.log_odds - best.log_odds, best.gain, rules.signature_error)
+        if odds > log(rules.named_odds):
             break
         explanation = best
     return explanation
 
 
-def find_large_members(explanation: Explanation, rules: DecisionRules) -> tuple[Candidate, ...]:
-    """Return the members that are larger than what matters, at the odds of a name.
+def find_large_members(
+    grams: RunGrams, explanation: Explanation, rules: DecisionRules
+) -> tuple[Candidate, ...]:
+    """Return the members that are larger than what matters in any run, at the odds of a name.
+
+    One whose size differs from run to run by more than errors of signatures explain is no effect that all runs share.
 
     Parameters
     ----------
+    grams : of the runs
     explanation : its members with values and errors
     rules : the odds
     """
     reach = float(ndtri(rules.named_odds / (1.0 + rules.named_odds)))
     large = []
-    for member in explanation.members:
+    for member, spread in zip(explanation.members, explanation.spreads, strict=True):
         places = explanation.find_places(member)
-        certain = np.abs(explanation.values[places]) - reach * explanation.errors[places]
-        if float(certain.max()) > member.matters:
+        values = explanation.values[places]
+        certain = np.abs(values) - reach * np.hypot(explanation.errors[places], spread * values)
+        if float(certain.max()) > member.matters and is_one_size(
+            grams, explanation, member, SIGNATURES * rules.signature_error
+        ):
             large.append(member)
     return tuple(large)
 
@@ -127,9 +141,8 @@ def list_open_explanations(
     needed = [take_away_members(grams, explanation, rules) for explanation in reversed(ranked)]
     # of the same members the best comes last, and stays
     for explanation in {e.names: e for e in needed}.values():
-        told = find_large_members(explanation, rules)
-        # a run that does not count may leave another explanation as good as the best, and no better
-        against = min(-compare_explanations(grams, ranked[0], explanation, rules.signature_error), 0.0)
+        told = find_large_members(grams, explanation, rules)
+        against = -compare_explanations(grams, ranked[0], explanation, rules.signature_error)
         known = by_told.get(frozenset(m.name for m in told))
         if known is None or against > known.log_odds:
             found = OpenExplanation(explanation=explanation, told=told, log_odds=against)
