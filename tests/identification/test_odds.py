@@ -154,10 +154,12 @@ def test_what_the_runs_disagree_about_does_not_gain_by_that() -> None:
 
 
 def test_what_an_error_of_the_signature_may_make_is_no_evidence() -> None:
-    assert temper_odds(10.0, 100.0, 0.1) == pytest.approx(9.0)
-    assert temper_odds(-10.0, 100.0, 0.1) == pytest.approx(-9.0)
-    assert temper_odds(10.0, 2000.0, 0.1) == 0.0
-    assert temper_odds(10.0, -3.0, 0.1) == temper_odds(10.0, 100.0, 0.0) == 10.0
+    assert temper_odds(10.0, 100.0, 0.0, 0.1) == pytest.approx(5.0)
+    assert temper_odds(-10.0, 100.0, 0.0, 0.1) == pytest.approx(-5.0)
+    assert temper_odds(10.0, -3.0, 0.0, 0.1) == temper_odds(10.0, 100.0, 50.0, 0.0) == 10.0
+    # a small second effect beside a large one, and what a tenth of the large one would make
+    assert temper_odds(100.0, 2100.0, 2000.0, 0.1) == pytest.approx(40.0)
+    assert temper_odds(19.0, 2019.0, 2000.0, 0.1) == 0.0
 
 
 @pytest.mark.parametrize(("sizes", "one"), [((1.0, 1.1, 0.9, 1.0), True), ((0.2, 0.5, 1.0, 2.0), False)])

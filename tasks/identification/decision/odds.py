@@ -281,20 +281,42 @@ def compare_explanations(
         side = float(np.sign(total))
         total = side * max(abs(total) - max(float((side * by_run).max()), 0.0), 0.0)
     prior = sum(m.log_prior for m in one.members) - sum(m.log_prior for m in other.members)
-    odds = one.gain - other.gain + prior - plain + total
-    return temper_odds(odds, max(one.gain, other.gain), signature_error)
+    whole = one.gain - other.gain + prior
+    odds = whole - plain + total
+    if odds * whole <= 0.0:
+        # of two that the runs do not tell apart neither is the better for its fewer numbers
+        return 0.0
+    return temper_odds(odds, max(one.gain, other.gain), find_shared_gain(grams, one, other), signature_error)
 
 
-def temper_odds(log_odds: float, gain: float, signature_error: float) -> float:
-    """Return the logarithm of odds without what an error of the signature alone may make [1].
+def find_shared_gain(grams: RunGrams, one: Explanation, other: Explanation) -> float:
+    """Return what the members that two explanations share gain alone [1].
+
+    Parameters
+    ----------
+    grams : of the runs
+    one, other : the explanations
+    """
+    shared = weigh_explanation(grams, [m for m in one.members if m in other.members], spread=False)
+    return 0.0 if shared is None else shared.gain
+
+
+def temper_odds(log_odds: float, gain: float, shared: float, signature_error: float) -> float:
+    """Return the logarithm of odds without what errors of the signatures alone may make [1].
+
+    What the error of a shared signature leaves over either explanation may take up. That of their own signatures moves
+    the car along the line between them, and the odds are those of two normal distributions with that variance too.
 
     Parameters
     ----------
     log_odds : by the runs' noise alone [1]
-    gain : rise of the log likelihood by the signature [1]
-    signature_error : its relative error in a model of the car [1]
+    gain : rise of the log likelihood by the better explanation [1]
+    shared : by the members that both have [1]
+    signature_error : relative error of a signature in a model of the car [1]
     """
-    return copysign(max(abs(log_odds) - signature_error**2 * max(gain, 0.0), 0.0), log_odds)
+    square = signature_error**2
+    left = max(abs(log_odds) - square * max(shared, 0.0), 0.0)
+    return copysign(left / (1.0 + square * max(gain - max(shared, 0.0), 0.0)), log_odds)
 
 
 def is_one_size(grams: RunGrams, explanation: Explanation, member: Candidate, scatter: float) -> bool:

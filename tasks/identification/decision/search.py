@@ -25,7 +25,7 @@ from tasks.identification.decision.odds import (
 )
 from tasks.identification.decision.told import tell_members
 from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.discrepancy import RunNoise, estimate_run_noise, set_run_noise
+from tasks.identification.inference.discrepancy import estimate_run_noise, set_run_noise
 from tasks.identification.inference.fit import Fit, fit_hypotheses
 from tasks.identification.inference.forward import prepare_run
 from tasks.identification.inference.hypothesis import Hypothesis, make_library_hypothesis
@@ -129,12 +129,10 @@ def find_explanations(
     grams = gather_grams(place.evidence, place.fitted, place.splines, columns)
     singles = search_explanations(grams, most=1, width=1, spread=False, forms=False)
     first = _refine_first(singles, place, null, rules)
-    plain = place
     if first is not None:
         place = _settle_scales(_move_to(first, place, null))
-        plain = _take_scales(plain, place)
     for forms in (False, True):
-        place, grams, found = _settle_explanation(place, plain, null, columns, rules, forms=forms)
+        place, grams, found = _settle_explanation(place, null, columns, rules, forms=forms)
     return Finding(
         evidence=place.evidence, null=null, fitted=place.fitted, grams=grams, explanations=tuple(found)
     )
@@ -147,7 +145,7 @@ def _refine_first(
 
     A linear estimate of a delay, or of what decides when an anti-lock brake acts, is a hint.
     """
-    hopeful = [e for e in found if e.members and e.log_odds > log(rules.named_odds)][:REFINED]
+    hopeful = [e for e in found if e.members and e.log_odds > 0.0][:REFINED]
     fits = [
         fit_hypotheses(
             place.evidence.train, make_hypotheses(e, place.evidence),
@@ -155,14 +153,16 @@ def _refine_first(
         )
         for e in hopeful
     ]  # fmt: skip
-    costs = [
-        0.5 * f.objective - sum(m.log_prior for m in e.members) for f, e in zip(fits, hopeful, strict=True)
+    gains = [
+        0.5 * (null.objective - f.objective) + sum(m.log_prior for m in e.members)
+        for f, e in zip(fits, hopeful, strict=True)
     ]
-    return hopeful[int(np.argmin(costs))] if hopeful else None
+    # the odds of what is fitted are less than its gain
+    return hopeful[int(np.argmax(gains))] if max(gains, default=0.0) > log(rules.named_odds) else None
 
 
 def _settle_explanation(
-    place: _Place, plain: _Place, null: Fit, columns: Columns, rules: DecisionRules, *, forms: bool
+    place: _Place, null: Fit, columns: Columns, rules: DecisionRules, *, forms: bool
 ) -> tuple[_Place, RunGrams, list[Explanation]]:
     """Return where what the best explanation tells is fitted, what the runs say there, and all explanations.
 
@@ -180,7 +180,7 @@ def _settle_explanation(
             break
         if forms and here is not None and not _is_worth_it(found[0], here, grams, rules):
             break
-        place = _move_to(told, place, null) if told.members else plain
+        place = _move_to(told, place, null)
     return place, grams, found
 
 
@@ -311,14 +311,6 @@ def _move_to(explanation: Explanation, place: _Place, null: Fit) -> _Place:
     return replace(place, evidence=evidence, fitted=_refit(evidence, fitted))
 
 
-def _take_scales(place: _Place, scaled: _Place) -> _Place:
-    """Return the runs about the same fit, with noise and disturbances scaled as at another place."""
-    noise = {run.model.run.name: RunNoise(rho=run.rho, sigma=run.sigma) for run in scaled.evidence.train}
-    evidence = rescale_disturbances(set_run_noise(place.evidence, noise), scaled.evidence.disturbance)
-    splines = rewhiten_splines(place.splines, place.evidence, evidence)
-    return replace(place, evidence=evidence, fitted=_refit(evidence, place.fitted), splines=splines)
-
-
 def _refit(evidence: Evidence, fitted: Fit) -> Fit:
     """Return the same fit under the present derivatives and scales."""
     return fit_hypotheses(
@@ -336,6 +328,8 @@ def _settle_scales(place: _Place) -> _Place:
 
 def _scale_noise(place: _Place) -> _Place:
     evidence = set_run_noise(place.evidence, estimate_run_noise(place.evidence, place.fitted))
+    if all(run is before for run, before in zip(evidence.train, place.evidence.train, strict=True)):
+        return place
     splines = rewhiten_splines(place.splines, place.evidence, evidence)
     return replace(place, evidence=evidence, fitted=_refit(evidence, place.fitted), splines=splines)
 
@@ -346,5 +340,7 @@ def _scale_disturbances(place: _Place) -> _Place:
     scales = fit_disturbance(
         here.train, residuals, here.tolerances, here.effects, here.disturbance, place.splines, RIDGE
     )
+    if scales == here.disturbance:
+        return place
     evidence = rescale_disturbances(here, scales)
     return replace(place, evidence=evidence, fitted=_refit(evidence, place.fitted))
