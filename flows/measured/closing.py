@@ -25,8 +25,9 @@ from tasks.campaign.braking_heat import estimate_disc_temperatures
 from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
 from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter, Verdict
 from tasks.identification.decision.excitation import find_reached_range
+from tasks.identification.decision.naming import measure_force
 from tasks.identification.decision.verdict import Outcome
-from tasks.identification.decision.words import join_phrases, say_effect, tell_verdict
+from tasks.identification.decision.words import join_phrases, list_unshared, say_effect, tell_verdict
 from tasks.identification.joint.verdict import JointOutcome
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.table import PARAMETERS
@@ -140,13 +141,13 @@ def tell_search(outcome: Outcome | JointOutcome) -> dict[str, Any]:
     """
     library, verdict = load_effects(), outcome.verdict
     train, held_out = predict_runs(outcome)
-    rivals = [rival for _, rival in verdict.rivals]
     planned_for = verdict.experiment.between[0] if verdict.experiment else None
     suggested = next((effect for effect in verdict.tried if effect.name == planned_for), None)
-    sentence = tell_verdict(
-        verdict.effects, rivals, library, verdict.error, verdict.manoeuvre_error, suggested,
-        verdict.misses or bool(verdict.disagreement and not verdict.effects), _say_own_numbers(outcome, library),
-    )  # fmt: skip
+    force = 0.0
+    if isinstance(outcome, Outcome) and len(verdict.odds) > 1:
+        apart = [effect.name for effect in list_unshared(verdict.effects, verdict.odds)]
+        force = measure_force(outcome.finding, outcome.fitted, apart)
+    sentence = tell_verdict(verdict, library, suggested, _say_own_numbers(outcome, library), force)
     told = {
         "channels": [CHANNELS[c] for c in train[0].channels],
         "sentence": sentence,
