@@ -13,7 +13,7 @@ from tasks.identification.decision.experiment import Experiment, plan_next_exper
 from tasks.identification.decision.held_out import compute_held_out_errors
 from tasks.identification.decision.log_faults import tell_log_faults
 from tasks.identification.decision.missed import tell_miss
-from tasks.identification.decision.naming import find_detectable_sizes, fit_told, name_members
+from tasks.identification.decision.naming import find_detectable_sizes, fit_told, name_members, settle_told
 from tasks.identification.decision.odds import find_odds, measure_disagreement
 from tasks.identification.decision.search import Finding, find_explanations
 from tasks.identification.decision.told import OpenExplanation, list_open_explanations, tell_members
@@ -97,8 +97,8 @@ def judge_runs(
     if foreign:
         nothing = next(e for e in finding.explanations if not e.members)
         opened = [OpenExplanation(explanation=nothing, told=(), log_odds=0.0)]
+    opened, fitted = settle_told(finding, opened, rules)
     first, *others = opened
-    fitted = fit_told(finding, first)
     named = name_members(first, finding.grams, fitted)
     rivals = _list_rivals(first, others, finding)
     tried = _list_tried(finding, first)
