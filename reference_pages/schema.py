@@ -1,10 +1,12 @@
 """The page of a dataset's schema: its views, arrays and grid file, from the tables that name the columns."""
 
+import re
 from typing import Any
 
 from flows.reading.query import list_columns
 from flows.store.arrays import arrays_of
 from reference_pages.markdown import format_table
+from tasks.conventions import CHANNELS_BY_NAME
 
 MEANINGS = {
     "clips": "a row a clip: controls, surface, outcome, verdict",
@@ -14,6 +16,8 @@ MEANINGS = {
     "pairs": "a row two clips that differ in one control, and what that changes",
 }
 """Rows of each view."""
+FOLLOWING = re.compile("_(p05|p50|p95|change)$")
+"""End of the name of a column that is a range or a change of another one."""
 
 
 def write_schema_page() -> str:
@@ -36,6 +40,18 @@ def write_schema_page() -> str:
     return page + "\n## Arrays of the frames\n\n" + _write_arrays(columns["arrays"])
 
 
+def write_symbol_table() -> str:
+    """Return the table of the paper's symbols with their columns, of two axles the front one's, as Markdown."""
+    rows = [
+        (channel.symbol, channel.description, f"`{name}`", channel.unit)
+        for name, channel in CHANNELS_BY_NAME.items()
+        if channel.symbol
+        and not FOLLOWING.search(name)
+        and f"{name.removesuffix('_r')}_f" not in CHANNELS_BY_NAME
+    ]
+    return format_table(("symbol", "meaning", "column", "unit"), rows)
+
+
 def _write_arrays(described: list[dict[str, Any]]) -> str:
     always = arrays_of(labels=False)
     rows = [
@@ -55,3 +71,7 @@ def _write_arrays(described: list[dict[str, Any]]) -> str:
         + "\n## Classes of a pixel\n\n"
         + format_table(("code", "class"), [(code, f"`{name}`") for code, name in enumerate(classes)])
     )
+
+
+TABLES = {"symbols": write_symbol_table}
+"""Function that writes the table, by the name under which a page asks for it."""
