@@ -4,7 +4,7 @@ import types
 from typing import Any, get_args, get_origin
 
 from flows.commands.command import REQUIRED, Command, Option
-from flows.parser import AS_FLOW, AS_JSON
+from flows.parser import AS_FLOW, AS_JSON, SUBCOMMANDS
 from flows.registry import COMMANDS
 from reference_pages.markdown import format_table, format_value
 
@@ -13,11 +13,12 @@ VALUES = {str: "text", int: "whole number", float: "number"}
 
 
 def write_commands() -> str:
-    """Return a section a group, and in it each command with a table of its arguments and options, as Markdown."""
-    sections: dict[str, str] = {}
+    """Return a section for daily work and one a group, each command with a table of its options, as Markdown."""
+    sections = {"": "\n## Daily work\n"}
+    sections |= {word: f"\n## {word}\n\n{sentence}\n" for word, sentence in SUBCOMMANDS.items()}
     for command in COMMANDS:
-        sections[command.group] = sections.get(command.group, "") + _describe(command)
-    return "".join(f"\n## {group}\n{section}" for group, section in sections.items())
+        sections[command.name.rpartition(" ")[0]] += _describe(command)
+    return "".join(sections.values())
 
 
 def _describe(command: Command) -> str:

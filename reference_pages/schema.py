@@ -24,11 +24,10 @@ def write_schema_page() -> str:
     """Return the page of the dataset's schema as Markdown."""
     columns = list_columns()
     page = (
-        "# Schema of a dataset\n\nEvery column of every view and every array of the frames: made from"
-        " `tasks/conventions.py` and `flows/store/arrays.py`, from which the Parquet and Zarr files take their metadata"
-        " too. `musync lab schema` prints the same. [Architecture](../explanation/architecture.md#dataset) lists the files,"
-        " [Query a dataset](../how-to/query-a-dataset.md) says how to read them. A unit of 1 is dimensionless; NaN in"
-        ' Parquet, and NULL in a view, mean "not represented".\n'
+        "# Schema of a dataset\n\nEvery column of every view and every array of the frames; `musync lab schema` prints the"
+        " same, and the Parquet and Zarr files carry it. [Query a dataset](../how-to/query-a-dataset.md) shows how to read"
+        " them. A unit of 1 is dimensionless. NULL in a view, and NaN in files of old datasets, mean"
+        ' "not represented".\n'
     )
     for view, meaning in MEANINGS.items():
         rows = [
