@@ -24,9 +24,9 @@ def write_schema_page() -> str:
     """Return the page of the dataset's schema as Markdown."""
     columns = list_columns()
     page = (
-        "# Schema of a dataset\n\nEvery column of every view and every array of the frames; `musync lab schema` prints the"
-        " same, and the Parquet and Zarr files carry it. [Query a dataset](../how-to/query-a-dataset.md) shows how to read"
-        " them. A unit of 1 is dimensionless. NULL in a view, and NaN in files of old datasets, mean"
+        "# Schema of a dataset\n\nEvery column of every view and every array of the frames. `musync lab schema` prints"
+        " the same, and the Parquet and Zarr files carry it. [Query a dataset](../how-to/query-a-dataset.md) shows how"
+        " to read them. A unit of 1 is dimensionless. NULL in a view, and NaN in files of old datasets, mean"
         ' "not represented".\n'
     )
     for view, meaning in MEANINGS.items():
