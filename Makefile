@@ -60,17 +60,17 @@ study-schedule: $(READY)
 	$(BIN)/python -m benchmarks.scheduled_runs
 
 study-crash: $(READY)
-	$(BIN)/python -m benchmarks.crashes
+	$(BIN)/python -m studies.crashes
 
 study-fuzz: $(READY)
-	$(BIN)/python -m benchmarks.fuzzing
+	$(BIN)/python -m studies.fuzzing
 
 study-faults: $(READY)
-	$(BIN)/python -m benchmarks.store_faults
+	$(BIN)/python -m studies.store_faults
 
 study-double-track: $(READY)
-	$(BIN)/python -m benchmarks.double_track --make datasets/double-track
-	$(BIN)/python -m benchmarks.double_track --judge datasets/double-track
+	$(BIN)/python -m studies.double_track --make datasets/double-track
+	$(BIN)/python -m studies.double_track --judge datasets/double-track
 
 # How memory and time grow with the clips; SCALE="100000 --folder /dev/shm" takes some 4 CPU-minutes.
 study-scale: $(READY)
@@ -80,7 +80,7 @@ study-production: $(READY)
 	$(BIN)/python -m benchmarks.production
 
 study-mutants: $(READY)
-	$(BIN)/python -m benchmarks.mutants
+	$(BIN)/python -m studies.mutants
 
 # The readers of the exported formats, in an environment of their own; nuscenes-devkit asks for old versions of libraries
 # that it runs without.
@@ -100,7 +100,7 @@ study-editors: $(READY)
 
 # A small network learns friction from pictures (docs/tutorial/learn-friction.md): ten minutes, most of them for the dataset.
 study-learning: $(READY)
-	$(BIN)/python -m benchmarks.learn_friction
+	$(BIN)/python -m studies.learn_friction
 
 freeze: $(READY)
 	$(BIN)/musync lab freeze
