@@ -6,7 +6,7 @@ READY := .venv/.ready
 DEMO ?= datasets/demo
 WORKERS ?= 2
 
-.PHONY: demo test test-minutes check docs docs-serve study study-schedule study-crash study-fuzz study-faults study-double-track study-scale study-production study-mutants study-exports study-calibration study-editors study-learning freeze bench lock clean
+.PHONY: demo test test-minutes check docs docs-serve study study-schedule study-crash study-fuzz study-faults study-double-track study-scale study-production study-mutants study-exports study-calibration study-editors study-learning freeze bench lock size clean
 
 # Whatever comes from the network is held against a hash of constraints.txt, but for torch: one version of it has builds
 # with and without CUDA, one an index, and which of them is at hand differs; what a CUDA build needs beyond is not in the
@@ -40,6 +40,10 @@ test: $(READY)
 # Tests that take minutes, which `make test` leaves out.
 test-minutes: $(READY)
 	$(BIN)/python -m pytest -m minutes
+
+# How large the project is: code, tests, words of the documents and their long sentences.
+size: $(READY)
+	$(BIN)/python -m benchmarks.size
 
 check: $(READY)
 	$(BIN)/ruff check .
