@@ -51,7 +51,7 @@ check: $(READY)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-# The documentation as a site, in build/docs; with docs-serve at 127.0.0.1:8000, where its search works too.
+# The documentation as a site, in build/docs, which needs no server; docs-serve shows it at 127.0.0.1:8000 while you write.
 docs docs-serve: export NO_MKDOCS_2_WARNING := 1
 docs docs-serve: $(READY)
 	$(PIP) install --no-build-isolation --editable '.[docs]'
