@@ -51,7 +51,7 @@ check: $(READY)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-# The documentation as a site, in build/docs; with docs-serve at 127.0.0.1:8000, where its search works too.
+# The documentation as a site, in build/docs, which needs no server; docs-serve shows it at 127.0.0.1:8000 while you write.
 docs docs-serve: export NO_MKDOCS_2_WARNING := 1
 docs docs-serve: $(READY)
 	$(PIP) install --no-build-isolation --editable '.[docs]'
@@ -64,17 +64,17 @@ study-schedule: $(READY)
 	$(BIN)/python -m benchmarks.scheduled_runs
 
 study-crash: $(READY)
-	$(BIN)/python -m benchmarks.crashes
+	$(BIN)/python -m studies.crashes
 
 study-fuzz: $(READY)
-	$(BIN)/python -m benchmarks.fuzzing
+	$(BIN)/python -m studies.fuzzing
 
 study-faults: $(READY)
-	$(BIN)/python -m benchmarks.store_faults
+	$(BIN)/python -m studies.store_faults
 
 study-double-track: $(READY)
-	$(BIN)/python -m benchmarks.double_track --make datasets/double-track
-	$(BIN)/python -m benchmarks.double_track --judge datasets/double-track
+	$(BIN)/python -m studies.double_track --make datasets/double-track
+	$(BIN)/python -m studies.double_track --judge datasets/double-track
 
 # How memory and time grow with the clips; SCALE="100000 --folder /dev/shm" takes some 4 CPU-minutes.
 study-scale: $(READY)
@@ -84,7 +84,7 @@ study-production: $(READY)
 	$(BIN)/python -m benchmarks.production
 
 study-mutants: $(READY)
-	$(BIN)/python -m benchmarks.mutants
+	$(BIN)/python -m studies.mutants
 
 # The readers of the exported formats, in an environment of their own; nuscenes-devkit asks for old versions of libraries
 # that it runs without.
@@ -104,7 +104,7 @@ study-editors: $(READY)
 
 # A small network learns friction from pictures (docs/tutorial/learn-friction.md): ten minutes, most of them for the dataset.
 study-learning: $(READY)
-	$(BIN)/python -m benchmarks.learn_friction
+	$(BIN)/python -m studies.learn_friction
 
 freeze: $(READY)
 	$(BIN)/musync lab freeze

@@ -17,7 +17,6 @@ from benchmarks.size import list_sentences, measure_documents
 from catalogs.channel_maps.conditions import Conditions
 from catalogs.grids import load_grid
 from flows.cli import app
-from flows.registry import COMMANDS
 from manifests.provenance import SOURCE_ROOT
 from reference_pages.pages import WRITERS
 from tasks.conventions import CHANNELS_BY_NAME
@@ -100,12 +99,6 @@ def test_files_of_the_source_that_a_document_names_exist(document):
         )
     )
     assert sorted(file for file in named if not (SOURCE_ROOT / file).exists()) == []
-
-
-def test_the_page_of_commands_says_of_each_what_its_help_says():
-    text = (DOCS / "reference" / "commands.md").read_text()
-    said = {c.name: re.findall(rf"^\| `musync {c.name}[ `].*", text, flags=re.M) for c in COMMANDS}
-    assert not [c.name for c in COMMANDS if not any(c.sentence.rstrip(".") in row for row in said[c.name])]
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
