@@ -5,7 +5,7 @@ import pytest
 
 from tasks.campaign.assembly import assemble_run
 from tasks.campaign.channels import UNITS, guess_unit, unit_factor
-from tasks.campaign.episodes import find_pressure_episodes
+from tasks.campaign.events import find_pressure_episodes
 from tasks.campaign.signals import (
     ChannelRule,
     Gain,
@@ -15,6 +15,7 @@ from tasks.campaign.signals import (
     resample_on_clock,
 )
 from tasks.errors import InputError
+from tests.campaign.telling import TABLE
 
 
 @pytest.mark.parametrize(
@@ -97,9 +98,9 @@ def test_the_common_clock_covers_only_what_all_signals_have() -> None:
 def test_a_run_with_a_problem_gives_no_columns() -> None:
     t = np.arange(300) / 100
     rule = ChannelRule(channel="pitch", sources=("x",), unit="deg")
-    sound = assemble_run({"x": Signal(time=t, values=np.sin(t))}, [rule], -np.inf, np.inf, 100.0)
+    sound = assemble_run({"x": Signal(time=t, values=np.sin(t))}, [rule], -np.inf, np.inf, 100.0, TABLE)
     assert list(sound.columns) == ["pitch"] and not sound.problems
-    broken = assemble_run({"x": Signal(time=t, values=90 * np.sin(t))}, [rule], -np.inf, np.inf, 100.0)
+    broken = assemble_run({"x": Signal(time=t, values=90 * np.sin(t))}, [rule], -np.inf, np.inf, 100.0, TABLE)
     assert broken.problems and not broken.columns
 
 
