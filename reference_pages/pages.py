@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable
 
-from reference_pages import catalogues, modules, verdict_rules
+from reference_pages import campaign_checks, catalogues, modules, verdict_rules
 from reference_pages.schema import write_schema_page
 
 WRITERS: dict[str, Callable[[], str]] = {
@@ -12,7 +12,7 @@ WRITERS: dict[str, Callable[[], str]] = {
     "reference/schema.md": write_schema_page,
 }
 """Pages, by their path below ``docs/``."""
-TABLES: dict[str, Callable[[], str]] = verdict_rules.TABLES
+TABLES: dict[str, Callable[[], str]] = campaign_checks.TABLES | verdict_rules.TABLES
 """Tables of pages that people write, by the name under which a page asks for them."""
 ASKED = re.compile(r"^<!-- table: (.+) -->$", flags=re.M)
 """Line of a page at whose place a table belongs."""

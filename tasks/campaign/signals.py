@@ -89,11 +89,11 @@ class ChannelRule:
         return self.sign * self.scale * inward * self.gain.value * unit_factor(self.gain.target_unit, target)
 
     def tell_pressure(self, pressure: float) -> str:
-        """Return a pressure, or what stands for it [MPa], as the signal of this brake was logged, such as 15 %."""
+        """Return a pressure [MPa] as this signal of the brake was logged, such as 15 % (taken for 1.5 MPa)."""
+        if self.channel == "brake_pressure" and self.gain is None:
+            return f"{pressure:.3g} MPa"
         logged = (pressure / BRAKE_SIGNALS[self.channel] - self.offset) / self.factor
-        unit = "" if self.unit == "1" else f" {self.unit}"
-        same = self.channel == "brake_pressure" and self.gain is None and self.unit == "MPa"
-        return f"{logged:.3g}{unit}" + ("" if same else f", which stands for {pressure:.3g} MPa")
+        return f"{logged:.3g}{'' if self.unit == '1' else f' {self.unit}'} (taken for {pressure:.3g} MPa)"
 
 
 def convert_to_channel(signal: Signal, rule: ChannelRule) -> Signal:
