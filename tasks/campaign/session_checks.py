@@ -63,7 +63,7 @@ def _measure_clocks(
         step = min((step for step in steps if step > 0.0), default=0.0)
         if not step:
             continue
-        words = {"taken": recordings.clock_unit, "falls": "", "hint": "", "fall": None}
+        words: dict[str, object] = {"taken": recordings.clock_unit, "falls": "", "hint": ""}
         words["step"] = f"{step:.3g} s" if step >= 0.1 else f"{1e3 * step:.3g} ms"
         speed = None if rule is None else average_sources(signals, rule)
         fall = None if speed is None else measure_fall(speed.time, speed.values, **conditions)
@@ -121,11 +121,11 @@ class Braking:
 
 
 def _collect_braking(
-    session: Session, *, deceleration: float, pressed: float, fewest_samples: float, slippery: bool = True
+    session: Session, gripping: bool, /, *, deceleration: float, pressed: float, fewest_samples: float
 ) -> list[Braking]:
-    """Return the samples of each run in which the car brakes, of runs that have enough."""
+    """Return the samples of each run in which the car brakes, of runs that have enough, all or on grip alone."""
     found = []
-    for run in (run for run in session.runs if slippery or not run.slippery):
+    for run in (run for run in session.runs if not (gripping and run.slippery)):
         pressure = run.smooth["brake_pressure"]
         chosen = run.moving & (run.rate < -deceleration) & (pressure > pressed * float(np.max(pressure)))
         torque = run.smooth.get("engine_torque", np.zeros(len(pressure)))
@@ -141,12 +141,14 @@ def _measure_largest_gain(session: Session, **conditions: float) -> Iterator[Fig
     A driver who stands on the pedal on snow puts 15 MPa into the master cylinder and slows by 2 m/s^2: slippery runs do
     not tell that the pressure is too large.
     """
-    yield from (part.tell(part.gain()) for part in _collect_braking(session, slippery=False, **conditions))
+    yield from (part.tell(part.gain()) for part in _collect_braking(session, True, **conditions))
 
 
 def _measure_least_gain(session: Session, *, without_brake: float, **conditions: float) -> Iterator[Figure]:
     """Return the least gain of the brake of each run, which leaves all it may to engine and drag [m/s^2 per MPa]."""
-    yield from (part.tell(part.gain(without_brake)) for part in _collect_braking(session, **conditions))
+    yield from (
+        part.tell(part.gain(without_brake)) for part in _collect_braking(session, False, **conditions)
+    )
 
 
 def _measure_common_gain(
@@ -158,7 +160,7 @@ def _measure_common_gain(
     was measured. A slope alone would call a car at its limit of friction wrong, where more pressure gives no more
     deceleration; so the intercept is at most what a car loses without its brake.
     """
-    if not (parts := _collect_braking(session, **conditions)):
+    if not (parts := _collect_braking(session, False, **conditions)):
         return
     together = Braking(
         runs=tuple(name for part in parts for name in part.runs),

@@ -31,7 +31,7 @@ def _count_not_finite(signal: LoggedSignal) -> Iterator[Figure]:
     bad = ~np.isfinite(signal.logged.values)
     if bad.any():
         at = float(signal.logged.time[np.argmax(bad)])
-        yield Figure(value=np.count_nonzero(bad), channel=signal.channel, words={"at": at})
+        yield Figure(value=int(np.count_nonzero(bad)), channel=signal.channel, words={"at": at})
 
 
 def _judge_digits(signal: LoggedSignal) -> Iterator[Figure]:
@@ -77,7 +77,7 @@ def _count_outliers(signal: LoggedSignal, *, few: float) -> Iterator[Figure]:
         at = int(np.argmax(beyond))
         span = f"{high:g} {CHANNELS_BY_NAME[signal.channel].unit}"
         words = {"at": signal.logged.time[at], "logged": signal.logged.values[at], "span": span}
-        yield Figure(value=np.count_nonzero(beyond), channel=signal.channel, words=words)
+        yield Figure(value=int(np.count_nonzero(beyond)), channel=signal.channel, words=words)
 
 
 def _measure_hold(

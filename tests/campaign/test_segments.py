@@ -94,11 +94,6 @@ def test_no_segment_reaches_into_the_next_application() -> None:
     assert first.end == second.start == pytest.approx(12.5, abs=0.01)
 
 
-@pytest.mark.parametrize("applied", [(), ((10.0, 10.2),)], ids=["a coast-down", "a touch of the pedal"])
-def test_a_drive_without_a_long_application_has_no_segment(applied: tuple[tuple[float, float], ...]) -> None:
-    assert cut_drive(*applied) == []
-
-
 def test_a_brake_of_a_standing_car_is_no_run() -> None:
     speed = np.clip(2.0 * (TIME - 5.0), 0.0, 20.0)
     standing, driving = cut_drive((0.0, 4.0), (20.0, 22.0), speed=speed)
