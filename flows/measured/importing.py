@@ -2,6 +2,7 @@
 
 import csv
 import io
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -254,7 +255,7 @@ def _brake_facts(channel_map: ChannelMap) -> dict[str, str]:
     return {"brake_signal": found[0]} if found else {}
 
 
-def run_table(columns: dict[str, np.ndarray], rate: float) -> pa.Table:
+def run_table(columns: Mapping[str, np.ndarray], rate: float) -> pa.Table:
     """A run's Parquet table: time from 0 and its channels, units in the field metadata."""
     count = len(next(iter(columns.values())))
     fields = [pa.field("time", pa.float64(), metadata={"units": "s"})] + [

@@ -36,14 +36,11 @@ LEAST_RANGE = 0.1
 """Range of pressure from which a run brakes at all [MPa]."""
 LEAST_THROTTLE, MOST_THROTTLE = 0.02, 0.3
 """Throttle from which and up to which it may rest: sensors are off by less, a foot on both pedals reads more [1]."""
-COMMON_REST = (
-    "channel brake_pressure rests at {value:.3f} MPa while the car does not brake, in {count} runs alike: close-loop"
-    " takes that for the gauge's zero; lower its offset by {value:.3f} (offset: {offset:.3f} where the map gives none)"
-)
 HIGHEST_REST = (
     "channel brake_pressure rests at {level:.3f} ({low}) to {value:.3f} MPa ({high}) while the car does not brake: the"
     " model brakes with it; set the gauge to zero before every run"
 )
+"""As of the check ``highest_rest``, for a verdict."""
 
 
 def measure_resting_levels(
@@ -77,14 +74,12 @@ def find_brake_rest(levels: Mapping[str, float]) -> float:
 
 
 def describe_rest(levels: Mapping[str, float]) -> str | None:
-    """Return the sentence of a gauge that rests above 0; None if it does not.
+    """Return the sentence of a gauge that rests above 0 in some run; None if it does not.
 
     Parameters
     ----------
     levels : pressure at rest by run [MPa]
     """
-    if rest := find_brake_rest(levels):
-        return COMMON_REST.format(value=rest, count=len(levels), offset=-rest)
     if not levels or max(levels.values()) < DRIFT:
         return None
     low, high = min(levels, key=lambda run: levels[run]), max(levels, key=lambda run: levels[run])
