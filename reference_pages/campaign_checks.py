@@ -18,7 +18,7 @@ SEEN = {
     "recordings": "all recordings",
 }
 """What the checks of each group look at."""
-FIGURE = re.compile(r"(?<!\{)\{(?!\{)[^}]*\}")
+FIGURE = re.compile(r"(?<!\{)\{(?!\{)(\w+):?([^}]*)\}")
 """Place of a figure in a sentence."""
 
 
@@ -32,7 +32,7 @@ def write_check_table() -> str:
             ", ".join(one if isinstance(one, str) else " or ".join(one) for one in check.channels) or "any",
             _write_limits(check),
             next(limit.unit for limit in (check.lowest, check.highest) if limit is not None),
-            FIGURE.sub("...", check.sentence).replace("{{", "{").replace("}}", "}"),
+            _write_sentence(check),
             "; ".join(dict.fromkeys(limit.source for limit in (check.lowest, check.highest) if limit is not None)),
         )
         for group, name, check in _list_checks()
@@ -61,6 +61,17 @@ def _list_checks() -> Iterator[tuple[str, str, CheckEntry]]:
     """Yield group, name and row of each check, in the order in which they are told."""
     for group, checks in read_entry(CheckTableEntry, CAMPAIGN_CHECKS, "table of checks").groups.items():
         yield from ((group, name, check) for name, check in checks.items())
+
+
+def _write_sentence(check: CheckEntry) -> str:
+    """Return the sentence of a check with its limits, and dots for what it measures."""
+    limits = {"lowest": check.lowest, "highest": check.highest}
+
+    def fill(figure: re.Match[str]) -> str:
+        limit = limits.get(figure[1])
+        return "..." if limit is None else format(limit.value, figure[2])
+
+    return FIGURE.sub(fill, check.sentence).replace("{{", "{").replace("}}", "}")
 
 
 def _write_limits(check: CheckEntry) -> str:

@@ -4,9 +4,9 @@ The table of checks is ``catalogs/campaign_checks.yaml``; the functions that mea
 `run_checks` and `session_checks`.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal, Protocol, Self, TypeVar
+from typing import Literal, Self
 
 Fault = Literal["run", "map", "warning"]
 """Of the run's own samples, which is then left out; perhaps of the map, which is refused; or none, which is told."""
@@ -107,17 +107,20 @@ class Told:
     sentence: str
 
 
-class Seen(Protocol):
-    """What checks look at."""
+class Channelled:
+    """What checks look at, with its channels; of none as it stands here."""
+
+    @property
+    def names(self) -> Collection[str]:
+        """Return the names of its channels."""
+        return ()
 
     def having(self, channels: Channels) -> Self | None:
-        """Return the part of it that has some channels; None where there is none."""
+        """Return itself, or its part, with one channel of each group; None where it has not."""
+        return self if all(set(group) & {*self.names} for group in channels) else None
 
 
-View = TypeVar("View", bound=Seen)
-
-
-def apply_checks(checks: Sequence[Check], view: View) -> list[Told]:
+def apply_checks(checks: Sequence[Check], view: Channelled) -> list[Told]:
     """Return what the checks tell of a signal, a run or a session.
 
     Of the figures of one check and channel that break its limits the worst is told, with the places of all.

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tasks.campaign.campaign import MASKED_SPEED
 from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME
-from tasks.campaign.checks import Channels
+from tasks.campaign.checks import Channelled, Channels
 from tasks.campaign.signals import ChannelRule, Signal
 
 STAND_IN = "brake_stand_in"
@@ -20,19 +20,6 @@ BRAKES = (*BRAKE_SIGNALS, STAND_IN)
 """Channels that say when the driver brakes, the best first."""
 SMOOTHING = 0.2
 """Width of the mean over which two channels are compared [s]."""
-
-
-class Channelled:
-    """What has channels, or none."""
-
-    @property
-    def names(self) -> Collection[str]:
-        """Return the names of its channels."""
-        return ()
-
-    def having(self, channels: Channels) -> Self | None:
-        """Return itself if it has one channel of each group; else None."""
-        return self if all(set(group) & {*self.names} for group in channels) else None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -172,7 +159,7 @@ class MeasuredRun(Channelled):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Session:
+class Session(Channelled):
     """All runs of a campaign, at one interval."""
 
     runs: Sequence[MeasuredRun]

@@ -104,6 +104,20 @@ def test_a_run_with_a_problem_gives_no_columns() -> None:
     assert broken.problems and not broken.columns
 
 
+@pytest.mark.parametrize("delay", [0.05, -0.12])
+def test_the_delay_of_one_channel_shifts_it_and_no_other(delay: float) -> None:
+    t = np.arange(400) / 100
+    signals = {"x": Signal(time=t, values=np.sin(t)), "late": Signal(time=t, values=np.sin(t - delay))}
+    rules = [
+        ChannelRule(channel="yaw_rate", sources=("x",), unit="deg/s"),
+        ChannelRule(channel="roll_rate", sources=("late",), unit="deg/s", delay=delay),
+    ]
+    found = assemble_run(signals, rules, 1.0, 3.0, 100.0, TABLE)
+    truth = np.sin(found.start + 0.01 * np.arange(len(found.columns["yaw_rate"])))
+    for values in found.columns.values():
+        np.testing.assert_allclose(values, truth, atol=1e-4)
+
+
 def test_active_samples_up_to_the_gap_apart_are_one_episode() -> None:
     t = np.arange(100) * 0.02
     pressure = np.zeros(100)
