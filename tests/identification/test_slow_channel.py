@@ -4,18 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from catalogs.joint_numbers import load_joint_numbers
+from tasks.identification.joint.fit import fit_jointly
+from tasks.identification.joint.stops import make_stop
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
-from catalogs.joint_numbers import load_joint_numbers
 from tasks.campaign.campaign import CHANNELS, Campaign
 from tasks.identification.decision.forms import differentiate_by_splines
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.discrepancy import RunNoise, set_run_noise
 from tasks.identification.inference.fit import Fit
 from tasks.identification.inference.linearisation import prepare_evidence
-from tasks.identification.joint.fit import fit_jointly
-from tasks.identification.joint.stops import make_stop
 from tasks.vehicle.effects.table import EFFECT_TABLE
 from tests.identification.synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 

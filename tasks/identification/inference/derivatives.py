@@ -87,7 +87,7 @@ def differentiate_run(
     session = [
         compute_quotient(_shift_parameter(base, i, step), step)
         for i, step in zip(
-            SESSION_INDEX, np.minimum(0.5 * np.array(tolerances.session), LARGEST_STEP), strict=True
+            SESSION_INDEX, np.minimum(0.5 * np.array(tolerances.file_numbers), LARGEST_STEP), strict=True
         )
     ]
     nuisance = whiten_channels(np.stack(columns, axis=-1), rho, sigma, model.sampled)

@@ -126,7 +126,9 @@ def prepare_run(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunMo
     samples = find_motion(speed)[1]
     pressed = np.flatnonzero(run.pressure > 0.1)
     lead = min(round(LEAD / run.interval), int(pressed[0]) if pressed.size else samples)
-    lead = min(max(lead, LEAST_LEAD), samples)
+    before = run.speed_before if run.speed_before is not None else np.empty(0)
+    before = before[-round(LEAD / run.interval) :]
+    lead = min(max(lead, LEAST_LEAD - len(before)), samples)
     return RunModel(
         run=replace(run, pressure=zero_pressure_at_rest(run.pressure)),
         vehicle=vehicle,
@@ -135,7 +137,9 @@ def prepare_run(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunMo
             hazard=hazard, snow_depth_mm=state.snow_depth_mm, direction=run.direction, disc_rise=run.disc_rise
         ),
         samples=samples,
-        initial_speed=float(np.polyfit(np.arange(lead), speed[:lead], 1)[1]),
+        initial_speed=float(
+            np.polyfit(np.arange(-len(before), lead), np.concatenate((before, speed[:lead])), 1)[1]
+        ),
     )
 
 

@@ -16,6 +16,10 @@ INTEGRALS = tuple(
 )
 FEWEST_LAGS = 3
 """Lags at which the quiet parts must tell a channel's variogram: it has three unknowns [1]."""
+FEWEST_SAMPLES = 3 * LAGS[FEWEST_LAGS - 1]
+"""Samples of a channel that some run must exceed for that [1]."""
+LEAST_NOISE = np.array([0.03, 0.05, 0.1, 0.1, 0.015, 0.1, 0.1])
+"""Noise of a channel at the least: no model follows a car better, however quiet its sensors [unit of the channel]."""
 QUIET_PRESSURE = 0.1
 """Pressure at which the quiet part of a run ends [MPa]."""
 BEFORE_BRAKE, ON_HAZARD = 0.05, 0.4
@@ -60,7 +64,7 @@ def estimate_channel_noise(campaign: Campaign) -> tuple[NDArray[np.float64], NDA
             misfit = float(np.sum((basis @ (power, slow) - 1.0) ** 2))
             if misfit < best and power > 0 and slow > -0.05 * power:
                 best, rho[j], sigma[j] = misfit, trial, np.sqrt(power)
-    return rho, np.maximum(sigma, np.sqrt(floor))
+    return rho, np.maximum(np.maximum(sigma, np.sqrt(floor)), LEAST_NOISE)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,11 +158,11 @@ def _find_problems(campaign: Campaign, floor: NDArray[np.float64], longest: NDAr
         f"{campaign.name}: channel {CHANNELS[j]} must change; it holds one value in all training runs: record it anew"
         for j in np.flatnonzero(np.isnan(floor))
     ]
-    short = np.flatnonzero(campaign.is_measured & (longest <= 3 * LAGS[-1]))
+    short = np.flatnonzero(campaign.is_measured & (longest <= FEWEST_SAMPLES))
     if short.size:
         names = ", ".join(CHANNELS[j] for j in short)
         problems.append(
-            f"{campaign.name}: sensor noise is read from training runs, so one must hold more than {3 * LAGS[-1]}"
+            f"{campaign.name}: sensor noise is read from training runs, so one must hold more than {FEWEST_SAMPLES}"
             f" samples of each channel; the longest has {longest[short].min()} ({names}): lengthen the runs, or leave"
             " the channel out"
         )

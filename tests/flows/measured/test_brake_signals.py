@@ -6,12 +6,12 @@ from pathlib import Path
 import pandas as pd
 import pytest
 import yaml
+from tasks.identification.joint.calibration import needs_joint_fit
 
 from catalogs.campaigns import read_campaign
 from catalogs.decision_rules import load_decision_rules
 from flows.measured.importing import import_measurements
 from tasks.errors import InputError
-from tasks.identification.joint.calibration import needs_joint_fit
 from tests.campaign.recorded import MAP, braking_columns, log_signal
 
 

@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from catalogs.joint_numbers import load_joint_numbers
+from tasks.identification.joint.verdict import JointOutcome, judge_jointly
 
 from catalogs.decision_rules import load_decision_rules
-from catalogs.joint_numbers import load_joint_numbers
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from flows.measured.closing import tell_search, verdict_json
@@ -22,7 +23,6 @@ from flows.measured.verdict_report import MISSED, find_next_steps, write_verdict
 from tasks.campaign.campaign import Campaign
 from tasks.campaign.planned_runs import RunPlan
 from tasks.identification.benchmark import make_synthetic_campaign
-from tasks.identification.joint.verdict import JointOutcome, judge_jointly
 from tests.browsers import find_barriers, open_chromium
 
 VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
