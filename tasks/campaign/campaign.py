@@ -53,7 +53,7 @@ class Tolerances:
     friction : relative [1]
     acceleration_bias : [m/s^2]
     pitch_offset : [deg]
-    grip : relative, of the grip that all runs share [1]
+    grip : relative, of the grip that all runs share; no file is off there unless an effect says so [1]
     """
 
     session: tuple[float, ...]
@@ -61,7 +61,7 @@ class Tolerances:
     friction: float
     acceleration_bias: float
     pitch_offset: float
-    grip: float = 0.003
+    grip: float = 1e-6
 
     @property
     def file_numbers(self) -> tuple[float, ...]:

@@ -32,7 +32,7 @@ class DecisionRules:
     hardly_known_tolerance : tolerance of the brake's gain from which a vehicle file hardly knows it [1]
     command_tolerance : tolerance of that gain where the brake signal is no pressure [1]
     hardly_known_grip : tolerance of the grip that all runs share, where a file hardly knows its car [1]
-    driven_acceleration : mean drive force before the brake, over the mass, from which a car is driven [m s-2]
+    driven_acceleration : drive force before the brake, over the mass, from which a car is driven [m s-2]
     brake_onset_share : share of a run's largest pressure from which the driver brakes [1]
     closed_throttle : share of the throttle up to which it is closed [1]
     saturation_ratio : peak deceleration over that of the model's tyres above which they grip better than it says [1]

@@ -8,15 +8,15 @@ import pytest
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
-from tasks.campaign.campaign import CHANNELS, FILE_NUMBERS
+from tasks.campaign.campaign import CHANNELS, FILE_NUMBERS, SESSION
 from tasks.identification.decision.candidates import CLASSES, can_show, list_columns, tell_limit
 from tasks.identification.inference.forward import prepare_run
 from tests.identification.synthetic import SURFACE, TOLERANCES, VEHICLE, plain_run
 
 RULES = load_decision_rules()
 EFFECTS = load_effects()
-OWN = tuple(e for e in EFFECTS if e.parameters[0].name not in FILE_NUMBERS)
-RETUNED = [e for e in EFFECTS if e.parameters[0].name in FILE_NUMBERS]
+OWN = tuple(e for e in EFFECTS if e.parameters[0].name not in SESSION)
+RETUNED = [e for e in EFFECTS if e.parameters[0].name in SESSION]
 COLUMNS = list_columns(OWN, RETUNED, np.array(TOLERANCES.file_numbers), RULES)
 
 
@@ -39,8 +39,8 @@ def test_what_is_not_named_stays_within_a_tenth_of_what_matters_or_the_tolerance
     lag, gain = named["brake_lag"], named["retuned_pressure_gain"]
     matters = next(e.matters for e in OWN if e.name == "brake_lag")
     assert (lag.slab, COLUMNS.spike[lag.base]) == (RULES.slab_width * matters, RULES.spike_width * matters)
-    assert COLUMNS.spike[gain.base] == TOLERANCES.file_numbers[FILE_NUMBERS.index("pressure_gain")]
-    assert COLUMNS.base[gain.base] == COLUMNS.count - len(FILE_NUMBERS) + FILE_NUMBERS.index("pressure_gain")
+    assert COLUMNS.spike[gain.base] == TOLERANCES.session[SESSION.index("pressure_gain")]
+    assert COLUMNS.base[gain.base] == COLUMNS.count - len(FILE_NUMBERS) + SESSION.index("pressure_gain")
     assert all(COLUMNS.base[c.base] == c.columns[0] for c in named.values() if c.base >= 0)
 
 
@@ -87,5 +87,5 @@ def test_the_friction_of_a_weather_is_told_by_a_run_of_it_that_reaches_the_limit
     run = plain_run(25.0, peak, seconds=2.5)
     rain = {"weather": weather, "precipitation_mm_h": 8.0 if weather == "rain" else 0.0}
     model = prepare_run(replace(run, **rain), VEHICLE, SURFACE)
-    assert tell_limit(wet, [model], RULES.joint) is shown
-    assert tell_limit(lag, [model], RULES.joint)
+    assert tell_limit(wet, [model], 0.0, RULES) is shown
+    assert tell_limit(lag, [model], 0.0, RULES)

@@ -7,7 +7,7 @@ import pytest
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
-from tasks.campaign.campaign import FILE_NUMBERS
+from tasks.campaign.campaign import SESSION
 from tasks.errors import InputError
 from tasks.identification.decision.candidates import Candidate, list_columns
 from tasks.identification.decision.forms import (
@@ -127,7 +127,7 @@ def test_a_free_parameter_takes_its_session_nuisance_over() -> None:
         evidence.train, (make_library_hypothesis(LIBRARY["retuned_pressure_gain"]),), evidence.session_sigma,
         iterations=8,
     )  # fmt: skip
-    assert abs(fitted.session[FILE_NUMBERS.index("pressure_gain")]) < 1e-12
+    assert abs(fitted.session[SESSION.index("pressure_gain")]) < 1e-12
     assert fitted.values[0] == pytest.approx(0.1, abs=0.01)
 
 

@@ -13,7 +13,7 @@ from math import log, nan
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.campaign import FILE_NUMBERS
+from tasks.campaign.campaign import FILE_NUMBERS, SESSION
 from tasks.identification.decision.forms import FORM_BOUND, FORM_MATTERS, KEYS, KNOTS, PORT_STEP
 from tasks.identification.inference.derivatives import list_second_values
 from tasks.identification.inference.forward import RunModel
@@ -165,7 +165,7 @@ def list_columns(
             ways.append((effect, nan, j, place))
         ways += [(effect, value, len(effects) + i, place) for i, (at, value) in enumerate(seconds) if at == j]
     for effect in retuned:
-        place = FILE_NUMBERS.index(effect.parameters[0].name)
+        place = SESSION.index(effect.parameters[0].name)
         ways.append((effect, nan, session + place, len(numbers) + place))
     shares = {
         c: len({e.name for e, *_ in ways if e.effect_class == c}) for c in ("effect", "retune", "sensor")

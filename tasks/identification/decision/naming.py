@@ -7,7 +7,7 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.campaign import FILE_NUMBERS
+from tasks.campaign.campaign import FILE_NUMBERS, SESSION
 from tasks.identification.decision.answer import NamedEffect, Parameter, make_estimate
 from tasks.identification.decision.candidates import Candidate
 from tasks.identification.decision.forms import KNOTS, find_scanned_ranges, make_form_hypotheses
@@ -127,11 +127,11 @@ def _list_parameters(
         return _list_form_parameters(member, value, error, fitted)
     first = member.effect.parameters[0]
     values, errors = np.array([value[0]]), np.array([error[0]])
-    if fitted is not None and first.name not in FILE_NUMBERS:
+    if fitted is not None and first.name not in SESSION:
         values, errors = _find_part(member.name, fitted)
         errors = np.concatenate((error, errors[1:]))
-    if fitted is not None and first.name in FILE_NUMBERS:
-        values = np.array([fitted.session[FILE_NUMBERS.index(first.name)]])
+    if fitted is not None and first.name in SESSION:
+        values = np.array([fitted.session[SESSION.index(first.name)]])
     rows = member.effect.parameters[: len(values)]
     return member.name, tuple(
         _make_parameter(row.name, v, e, row.lower, row.upper, row.unit)

@@ -30,8 +30,6 @@ SAME_VARIABLE = {"speed": "wheel_speed", "wheel_speed": "speed"}
 """Variables that differ by the slip of the tyres alone."""
 FEWEST = 3
 """Runs that must inform a direction for their scatter to say something [1]."""
-UNSEEN_SPREAD = 0.0
-"""Standard deviation from run to run of an amplitude, where fewer runs were driven: as its signature is known [1]."""
 TOLD = 0.5
 """Square of the smallest size that matters, over its variance by one run, from which the run tells a number [1]."""
 INFORMED = 1e-6
@@ -141,9 +139,6 @@ def weigh_explanation(
             size = np.einsum("i,rij,j->r", along, information, along)
             spreads[i] = float(np.sqrt(estimate_spread(size, left @ along)))
             directions.append(along * spreads[i])
-        if len(score) < FEWEST:
-            # nobody knows the spread of each: what is named differs as a whole
-            directions = [np.sum(directions, axis=0)]
         total, right = _admit_spread(information, score, np.array(directions).T)
         mean, factor, evidence = _integrate(total, right, prior)
         kept = np.arange(len(nobody.columns))
@@ -159,7 +154,7 @@ def weigh_explanation(
     return Explanation(
         members=tuple(members), log_odds=gain_with_spread + sum(m.log_prior for m in members), gain=gain, values=values,
         errors=np.sqrt(np.einsum("ij,ij->j", inverse, inverse))[at], spreads=tuple(spreads),
-        session=(mean + prior.centre)[len(nobody.columns) - len(FILE_NUMBERS) : len(nobody.columns)], everything=everything,
+        session=(mean + prior.centre)[: len(nobody.columns)][-len(FILE_NUMBERS) :], everything=everything,
     )  # fmt: skip
 
 
@@ -307,8 +302,6 @@ def estimate_spread(size: NDArray[np.float64], pull: NDArray[np.float64]) -> flo
     pull : float64 [R] its score, so that pull / size is its own estimate
     """
     informed = size > INFORMED * max(float(size.max()), 1e-300)
-    if len(size) < FEWEST:
-        return UNSEEN_SPREAD**2
     if np.count_nonzero(informed) < FEWEST:
         return 0.0
     weight, own = size[informed], pull[informed] / size[informed]

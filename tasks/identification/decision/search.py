@@ -6,7 +6,7 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.campaign import FILE_NUMBERS, Campaign
+from tasks.campaign.campaign import FILE_NUMBERS, SESSION, Campaign
 from tasks.identification.decision.candidates import (
     Candidate,
     Columns,
@@ -44,7 +44,7 @@ from tasks.identification.inference.linearisation import (
     prepare_evidence,
     rescale_disturbances,
 )
-from tasks.identification.inference.start import GAIN, estimate_session
+from tasks.identification.inference.start import GAIN, GRIP, estimate_session, is_grip_free
 from tasks.identification.rules import DecisionRules
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import Effect
@@ -118,11 +118,12 @@ def find_explanations(
         effect
         for effect in library
         if can_show(effect, vehicle, campaign.channels)
+        and not (effect.parameters[0].name == GRIP and is_grip_free(campaign))
         and tell_limit(effect, models, gain, rules)
         and tell_curve(effect, models)
     ]
-    retuned = [effect for effect in shown if effect.parameters[0].name in FILE_NUMBERS]
-    numbers = tuple(effect for effect in shown if effect.parameters[0].name not in FILE_NUMBERS)
+    retuned = [effect for effect in shown if effect.parameters[0].name in SESSION]
+    numbers = tuple(effect for effect in shown if effect.parameters[0].name not in SESSION)
     evidence, null = prepare_evidence(campaign, vehicle, surface, numbers, rules)
     place = _settle_scales(
         _Place(evidence=evidence, fitted=null, splines=differentiate_by_splines(evidence, null))
@@ -243,7 +244,7 @@ def _is_fitted(explanation: Explanation, fitted: Fit) -> bool:
 
 
 def _session_begins(member: Candidate, fitted: Fit) -> float:
-    retuned = member.effect is not None and member.effect.parameters[0].name in FILE_NUMBERS
+    retuned = member.effect is not None and member.effect.parameters[0].name in SESSION
     return -1.0 if retuned else np.inf
 
 
@@ -265,7 +266,7 @@ def make_hypotheses(
         if member.effect is None:
             grid = np.linspace(*ranges[member.variable], KNOTS)
             parts.append(make_spline_hypothesis(member.port, member.variable, grid, values))
-        elif member.effect.parameters[0].name not in FILE_NUMBERS:
+        elif member.effect.parameters[0].name not in SESSION:
             second = member.second
             if not np.isfinite(second) and fitted is not None:
                 second = _find_second(member.name, fitted)
@@ -293,8 +294,8 @@ def widen_session(explanation: Explanation, sigma: NDArray[np.float64]) -> NDArr
     """
     wide = sigma.copy()
     for member in explanation.members:
-        if member.effect is not None and member.effect.parameters[0].name in FILE_NUMBERS:
-            wide[FILE_NUMBERS.index(member.effect.parameters[0].name)] = member.slab
+        if member.effect is not None and member.effect.parameters[0].name in SESSION:
+            wide[SESSION.index(member.effect.parameters[0].name)] = member.slab
     return wide
 
 

@@ -1,7 +1,7 @@
 """What drove the car before the brake, where no engine torque was logged: that part of a run is left out.
 
-With a throttle in the log a run begins where it closes. Without one a driver who holds his speed until he brakes is told
-by that speed. Taken for coasting, it hides a resistance, or makes it fit the stop alone.
+With a throttle in the log a run begins where it closes. Without one a driver who holds his speed until he brakes is
+told by that speed. Taken for coasting, it hides a resistance, or makes it fit the stop alone.
 """
 
 from collections.abc import Callable, Sequence
@@ -21,6 +21,8 @@ from tasks.vehicle.parameters import Vehicle
 LIFT = 0.2
 """Time in which a driver lifts the throttle, centred on the brake where no throttle was measured [s]."""
 SPEED = CHANNELS.index("speed")
+FEWEST_SAMPLES, SURE = 5, 4.0
+"""Samples before the brake whose slope says something, and its standard errors, for noise that remembers [1]."""
 
 
 def find_brake_onset(model: RunModel, share: float) -> int:
@@ -39,7 +41,9 @@ def find_brake_onset(model: RunModel, share: float) -> int:
 def measure_drive(
     models: Sequence[RunModel], theta: NDArray[np.float64], slots: tuple[Slot, ...], share: float
 ) -> float:
-    """Return the acceleration before the brake that a model leaves open, over all runs on a flat road [m/s2].
+    """Return the acceleration before the brake beyond a model's, root mean square over all runs on a flat road [m/s2].
+
+    One that is not surely positive counts as none: what a model lacks slows the car down.
 
     Parameters
     ----------
@@ -48,16 +52,20 @@ def measure_drive(
     slots : forms
     share : of a run's largest pressure from which its driver brakes [1]
     """
-    moment = spread = 0.0
+    drives, spreads = [], []
     for model in models:
         onset = find_brake_onset(model, share)
-        if onset in (0, model.samples) or model.run.hazard_length > 0.0:
+        if onset < FEWEST_SAMPLES or onset == model.samples or model.run.hazard_length > 0.0:
             continue
         before = replace(model, samples=onset)
         residual = before.measured[:, SPEED] - predict_channels(before, theta, slots=slots)[:, SPEED]
         time = (np.arange(onset) - 0.5 * (onset - 1)) * model.run.interval
-        moment, spread = moment + float(time @ residual), spread + float(time @ time)
-    return moment / spread if spread > 0.0 else 0.0
+        spread = float(time @ time)
+        drive = float(time @ residual) / spread
+        error = float(np.std(residual - drive * time)) / np.sqrt(spread)
+        drives.append(drive if drive > SURE * error else 0.0)
+        spreads.append(spread)
+    return float(np.sqrt(np.average(np.square(drives), weights=spreads))) if drives else 0.0
 
 
 def leave_out_driving(
@@ -108,7 +116,7 @@ def begin_at_brake(
 
 
 def _keep_parts(runs: Sequence[Run], find_part: Callable[[Run], tuple[int, int]]) -> tuple[Run, ...]:
-    """Return runs on flat roads cut to a part of them; one that is too short then, or crosses a feature, stays whole."""
+    """Return runs cut to a part of them; one that is too short then, or crosses a road feature, stays whole."""
     kept = []
     for run in runs:
         first, end = find_part(run) if run.hazard_length == 0.0 else (0, len(run.pressure))

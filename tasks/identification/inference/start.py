@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.campaign import CHANNELS, FILE_NUMBERS, Campaign
+from tasks.campaign.campaign import CHANNELS, FILE_NUMBERS, Campaign, Tolerances
 from tasks.campaign.channels import BRAKE_SIGNALS
 from tasks.identification.inference.driver import find_brake_onset
 from tasks.identification.inference.forward import RunModel, prepare_run
@@ -18,6 +18,8 @@ from tasks.vehicle.parameters import Vehicle
 
 GAIN = FILE_NUMBERS.index("pressure_gain")
 """Place of the brake's gain among the numbers of the session."""
+GRIP = FILE_NUMBERS[-1]
+"""Name of the grip that all runs share."""
 FEWEST_SAMPLES = 5
 """Samples under brake from which a run says something of the gain [1]."""
 
@@ -45,6 +47,16 @@ def widen_tolerances(
         if any(saturates_tyres(m, rules) or reaches_limit(m, weakest, rules) for m in models):
             known = replace(known, grip=rules.hardly_known_grip)
     return replace(campaign, tolerances=known)
+
+
+def is_grip_free(campaign: Campaign) -> bool:
+    """Return whether the grip of all runs is one of the numbers that a file hardly knows.
+
+    Parameters
+    ----------
+    campaign : measured runs with their tolerances
+    """
+    return campaign.tolerances.grip > Tolerances.grip
 
 
 def estimate_session(

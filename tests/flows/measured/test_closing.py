@@ -253,7 +253,7 @@ def test_a_call_that_ends_before_it_has_a_result_has_read_nothing(
         raise MemoryError
 
     monkeypatch.setenv("MUSYNC_LEDGER", str(tmp_path / "ledger.jsonl"))
-    monkeypatch.setattr(closing, "judge_campaign", give_up)
+    monkeypatch.setattr(closing, "judge_runs", give_up)
     with pytest.raises(MemoryError):
         close_loop(str(lagging), out=str(tmp_path / "out"))
     assert not (tmp_path / "ledger.jsonl").exists()
