@@ -54,7 +54,7 @@ docs docs-serve: $(READY)
 	$(BIN)/python -m mkdocs $(if $(filter docs,$@),build --strict,serve)
 
 study: $(READY)
-	$(BIN)/musync sensitivity --out datasets/study
+	$(BIN)/musync lab sensitivity --out datasets/study
 
 study-schedule: $(READY)
 	$(BIN)/python -m benchmarks.scheduled_runs
@@ -103,10 +103,10 @@ study-learning: $(READY)
 	$(BIN)/python -m benchmarks.learn_friction
 
 freeze: $(READY)
-	$(BIN)/musync freeze
+	$(BIN)/musync lab freeze
 
 bench: $(READY)
-	$(BIN)/musync bench --out datasets/bench
+	$(BIN)/musync lab bench --out datasets/bench
 
 clean:
 	rm -rf .venv .musync build *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache

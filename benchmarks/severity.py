@@ -12,8 +12,8 @@ import numpy as np
 from catalogs.grids import load_grid
 from flows.cli import run_to_end
 from flows.making.catalogue import load_catalogue
-from flows.making.clip import frame_rows, render_frames, rig_of
 from flows.making.driving import simulate_drive
+from flows.making.pictures import frame_rows, render_frames, rig_of
 from flows.making.plan import freeze_grid
 from flows.store.layout import write_atomically
 from tasks.conventions import ROAD_CLASSES

@@ -18,9 +18,12 @@ from tasks.errors import InputError
 
 SUBCOMMANDS = {
     "scene": "Build a scene from recordings or from other tools.",
-    "vehicle": "Describe a car of your own, and check what its file says.",
+    "vehicle": "Describe a car of your own, check what its file says, and calibrate it.",
+    "lab": "Judges, audits and studies beyond daily work: one heading each.",
 }
 """Help of the words that stand before the names of several commands."""
+GROUPS = "Groups"
+"""Heading of `musync --help` below which these words stand."""
 AS_JSON = Option(name="json", kind=bool, help="Print the whole result as JSON.", default=False)
 AS_FLOW = Option(
     name="prefect", kind=bool, help="Run as a Prefect flow; implied by PREFECT_API_URL.", default=False
@@ -41,11 +44,9 @@ def build_parser() -> typer.Typer:
         word, _, name = command.name.rpartition(" ")
         if word and word not in words:
             words[word] = typer.Typer(no_args_is_help=True, help=SUBCOMMANDS[word])
-            app.add_typer(words[word], name=word, rich_help_panel=command.group)
+            app.add_typer(words[word], name=word, rich_help_panel=GROUPS)
         parent = words.get(word, app)
-        parent.command(name, help=command.sentence, rich_help_panel=command.group if not word else None)(
-            _make_callback(command)
-        )
+        parent.command(name, help=command.sentence, rich_help_panel=command.group)(_make_callback(command))
     return app
 
 

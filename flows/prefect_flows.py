@@ -21,8 +21,7 @@ from prefect.runtime import flow_run  # noqa: E402
 
 from flows.commands.command import pass_always  # noqa: E402
 from flows.registry import COMMANDS, flow_name, import_function  # noqa: E402
-from flows.running.prefect_progress import RunProgress  # noqa: E402
-from flows.running.progress import watch_progress  # noqa: E402
+from flows.running.prefect_progress import show_progress  # noqa: E402
 
 
 def make_flow(function: Callable[..., Any], name: str, passed: Callable[[Any], bool] | None = None) -> Any:
@@ -37,7 +36,7 @@ def make_flow(function: Callable[..., Any], name: str, passed: Callable[[Any], b
 
     @wraps(function)
     def run(*args: Any, **kwargs: Any) -> Any:
-        with watch_progress(RunProgress()):
+        with show_progress():
             result = function(*args, **kwargs)
         if passed is not None:
             get_run_logger().info("verdict: %s", "passed" if passed(result) else "the check failed")

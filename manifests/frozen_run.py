@@ -58,7 +58,7 @@ def read_frozen(name_or_path: str | Path) -> FrozenRun:
     if found != FROZEN_FORMAT:
         raise InputError(
             f"{path}: a frozen run must be of format {FROZEN_FORMAT}; it is {found!r}"
-            " (the manifest.json of a dataset is no frozen run: musync freeze makes one of its grid)"
+            " (the manifest.json of a dataset is no frozen run: musync lab freeze makes one of its grid)"
         )
     if seal_of(frozen) != frozen.get("seal"):
         raise InputError(f"{path}: its seal does not match its content: it was changed after it was frozen")

@@ -22,7 +22,7 @@ def write_schema_page() -> str:
     page = (
         "# Schema of a dataset\n\nEvery column of every view and every array of the frames: made from"
         " `tasks/conventions.py` and `flows/store/arrays.py`, from which the Parquet and Zarr files take their metadata"
-        " too. `musync schema` prints the same. [Architecture](../explanation/architecture.md#dataset) lists the files,"
+        " too. `musync lab schema` prints the same. [Architecture](../explanation/architecture.md#dataset) lists the files,"
         " [Query a dataset](../how-to/query-a-dataset.md) says how to read them. A unit of 1 is dimensionless; NaN in"
         ' Parquet, and NULL in a view, mean "not represented".\n'
     )

@@ -88,7 +88,7 @@ def check_unit(car: Path, folder: Path, run: Rollout) -> None:
 def check_dataset(data: Path, *, older: bool) -> None:
     """A dataset is audited by hashes and by laws, queried and exported; an older one lacks the new column."""
     run_command("audit", data, "--share", 1, "--runner", "threads", "--workers", 1)
-    assert "verified: True" in run_command("audit-physics", data)
+    assert "verified: True" in run_command("lab", "audit-physics", data)
     answer = run_command("sql", data, "select count(suspension_travel_f) = 0 as lacks from ticks")
     assert ("True" if older else "False") in answer
     run_command("export", data, "--to", "csv", "--out", f"{data}-csv")

@@ -24,10 +24,10 @@ LARGEST_DRIVER_MIB = 500
 AGGREGATE = "SELECT weather, avg(longitudinal_acceleration), max(braking_slip_f) FROM ticks GROUP BY weather"
 OF_CLIPS = "SELECT weather, avg(peak_pitch), count(*) FROM clips GROUP BY weather"
 COMMANDS = {
-    "describe": ("describe", "--json"),
-    "verify": ("verify", "--json"),
-    "sql over clips": ("sql", OF_CLIPS),
-    "sql over ticks": ("sql", AGGREGATE),
+    "describe": (["lab", "describe"], "--json"),
+    "verify": (["verify"], "--json"),
+    "sql over clips": (["sql"], OF_CLIPS),
+    "sql over ticks": (["sql"], AGGREGATE),
 }
 
 
@@ -56,8 +56,8 @@ def measure_size(clips: int, place: Path) -> list[dict[str, Any]]:
     grid.write_text(yaml.safe_dump(grid_of(clips), sort_keys=False))
     _, printed = measure_process([sys.executable, "-m", "benchmarks.scale.make", str(grid), str(folder)])
     rows = [{"clips": clips} | json.loads(line) for line in printed.splitlines()]
-    for name, (command, *rest) in COMMANDS.items():
-        figures, _ = measure_process([sys.executable, "-m", "flows.cli", command, str(folder), *rest])
+    for name, (words, *rest) in COMMANDS.items():
+        figures, _ = measure_process([sys.executable, "-m", "flows.cli", *words, str(folder), *rest])
         rows.append({"clips": clips, "stage": name} | figures)
     return rows
 

@@ -13,7 +13,7 @@ import flows.making.clip
 import flows.making.driving
 import flows.making.generate
 from flows.making.catalogue import Catalogue
-from flows.making.clip import nothing_to_judge
+from flows.making.gate import nothing_to_judge
 from flows.making.plan import Plan, make_plan
 
 GRID = """\

@@ -14,7 +14,7 @@ from tasks.surface.weather import DRY
 
 FILE = Path(__file__).with_name("closing.yaml")
 ERROR_RATES = Path(__file__).with_name("closing_error_rates.json")
-"""Counts of `musync close-loop-benchmark`, without the campaigns one by one."""
+"""Counts of `musync lab close-loop-benchmark`, without the campaigns one by one."""
 
 Positive = Annotated[float, Field(strict=True, gt=0)]
 

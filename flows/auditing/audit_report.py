@@ -61,9 +61,9 @@ def list_remedies(result: Mapping[str, Any]) -> list[str]:
     is_forged = result["contradictions"] or result["mismatches"]
     remedies = {
         "remove each file that nobody recorded, or move it out of the folder": "not recorded" in damage,
-        "musync repair makes damaged and missing files again": bool(damage - {"not recorded"}),
+        "musync lab repair makes damaged and missing files again": bool(damage - {"not recorded"}),
         "trust no file or record named here: take the dataset from its maker again, and a signature with it, or make it"
-        " again with musync generate and compare the two with musync diff": bool(is_forged),
+        " again with musync generate and compare the two with musync lab diff": bool(is_forged),
     }
     return [sentence for sentence, is_due in remedies.items() if is_due]
 

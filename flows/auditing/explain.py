@@ -85,7 +85,7 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
     if empty:
         raise InputError(
             f"{folder}: every tick must have every number; frame {frame} or 0 of clip {planned.label} has none in"
-            f" {', '.join(dict.fromkeys(empty))}: musync repair makes the table again"
+            f" {', '.join(dict.fromkeys(empty))}: musync lab repair makes the table again"
         )
     vehicle = load_vehicle(layout.inputs / "vehicle.yaml", layout.inputs / "weather")
     mode = plan.settings.vehicle_mode

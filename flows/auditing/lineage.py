@@ -80,7 +80,7 @@ def trace_lineage(dataset: str, clip: str, *, out: str | None = None) -> dict[st
     layout = open_for_reading(dataset, want_inputs)
     manifest = read_manifest(layout)
     plan = Plan.of(manifest, layout.manifest)
-    refuse_traced(plan.inputs, dataset, "lineage")
+    refuse_traced(plan.inputs, dataset, "lab lineage")
     planned = find_planned_clip(plan, clip, dataset)
     kept = read_kept(layout, manifest["inputs"])
     asked = Asked(

@@ -67,7 +67,7 @@ COMMANDS = (
         passed=VERIFIED,
     ),
     Command(
-        name="sign",
+        name="lab sign",
         group=GROUP,
         sentence="Sign a dataset's manifest, and with it every file that it records, with a private key.",
         function="flows.auditing.signing:sign_dataset",
@@ -75,7 +75,7 @@ COMMANDS = (
         is_flow=False,
     ),
     Command(
-        name="repair",
+        name="lab repair",
         group=GROUP,
         sentence="Make again the files of a dataset that are damaged or missing, to the recorded bytes.",
         function="flows.auditing.repair:repair_dataset",
@@ -83,7 +83,7 @@ COMMANDS = (
         passed=require_key("repaired"),
     ),
     Command(
-        name="gc",
+        name="lab gc",
         group=GROUP,
         sentence="Remove the files that killed runs left in a dataset and beside it; finished clips stay.",
         function="flows.auditing.verify:collect_garbage",
@@ -95,7 +95,7 @@ COMMANDS = (
         ),
     ),
     Command(
-        name="audit-physics",
+        name="lab audit-physics",
         group=GROUP,
         sentence="Compute every telemetry column and pose again; name law, tick, size and column of each break.",
         function="flows.judging.physics:audit_physics",
@@ -104,7 +104,7 @@ COMMANDS = (
         passed=VERIFIED,
     ),
     Command(
-        name="diff",
+        name="lab diff",
         group=GROUP,
         sentence="Compare two datasets: which clips differ, by how much, and which inputs can be the cause.",
         function="flows.auditing.dataset_diff:compare_datasets",
@@ -130,7 +130,7 @@ COMMANDS = (
         output="sentences",
     ),
     Command(
-        name="lineage",
+        name="lab lineage",
         group=GROUP,
         sentence="List the catalogue lines, works and measured runs that the numbers of a clip rest on, by column.",
         function="flows.auditing.lineage:trace_lineage",
@@ -143,7 +143,7 @@ COMMANDS = (
         output="sentences",
     ),
     Command(
-        name="replay-audit",
+        name="lab replay-audit",
         group=GROUP,
         sentence="Prove that visual seeds change the weather in the picture and nothing in the motion.",
         function="flows.making.replay:replay_audit",

@@ -116,7 +116,7 @@ COMMANDS = (
         passed=lambda result: not result.get("telemetry_differs"),
     ),
     Command(
-        name="freeze",
+        name="lab freeze",
         group=GROUP,
         sentence="Freeze a run for generate --manifest: scenarios, seeds, parameters and the hash of each clip's"
         " telemetry.",
@@ -195,7 +195,7 @@ COMMANDS = (
         options=(GRID, VEHICLE, PICTURES),
     ),
     Command(
-        name="describe",
+        name="lab describe",
         group=GROUP,
         sentence="Summarise a dataset: clips, weathers, road features, verdicts.",
         function="flows.reading.describe:describe_dataset",
@@ -234,7 +234,7 @@ COMMANDS = (
         brief=select_answer,
     ),
     Command(
-        name="schema",
+        name="lab schema",
         group=GROUP,
         sentence="List every column of every view: unit, paper symbol, CF standard name and meaning.",
         function="flows.reading.query:list_columns",
@@ -244,7 +244,7 @@ COMMANDS = (
         json_with="grid",
     ),
     Command(
-        name="preview",
+        name="lab preview",
         group=GROUP,
         sentence="Make an MP4 film of each clip, with speed, slip, pitch, load and brake pressure below the picture.",
         function="flows.reading.previews:make_films",
@@ -270,7 +270,7 @@ COMMANDS = (
         ),
     ),
     Command(
-        name="sheets",
+        name="lab sheets",
         group=GROUP,
         sentence="Draw one place in every weather, and each road feature before, at and after the wheels touch it.",
         function="flows.reading.sheets:draw_sheets",

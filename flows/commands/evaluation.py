@@ -49,7 +49,7 @@ def show_table(result: dict[str, Any]) -> dict[str, Any]:
 
 COMMANDS = (
     Command(
-        name="evaluate",
+        name="lab evaluate",
         group=GROUP,
         sentence="Judge a dataset from its pixels: poses, motion, road edits and weather, beside the paper's figures.",
         function="flows.judging.evaluation:evaluate_dataset",
@@ -100,7 +100,7 @@ COMMANDS = (
         brief=shorten_evaluation,
     ),
     Command(
-        name="controls",
+        name="lab controls",
         group=GROUP,
         sentence="Falsify a dataset's claims and motions in fourteen ways, and say which metric detects which fault.",
         function="flows.judging.controls:run_controls",
@@ -109,7 +109,7 @@ COMMANDS = (
         passed=require_key("all_detected"),
     ),
     Command(
-        name="judge",
+        name="lab judge",
         group=GROUP,
         sentence="Judge the motion of any video against the telemetry claimed for it, from pixels and intrinsics"
         " alone.",
@@ -133,7 +133,7 @@ COMMANDS = (
         passed=require_key("passed"),
     ),
     Command(
-        name="judge-set",
+        name="lab judge-set",
         group=GROUP,
         sentence="Judge the clips of video editors by a protocol: a table of models, the paper's figures beside them.",
         function="flows.judging.video_sets.judge_set:judge_video_set",
@@ -167,7 +167,7 @@ COMMANDS = (
         brief=show_table,
     ),
     Command(
-        name="retention",
+        name="lab retention",
         group=GROUP,
         sentence="Measure how much of a road event's pitch a video editor kept (the paper's source-motion retention).",
         function="flows.judging.foreign:measure_retention",

@@ -55,7 +55,7 @@ COMMANDS = (
         passed=lambda result: not result.get("faulty"),
     ),
     Command(
-        name="brake-protocol",
+        name="lab brake-protocol",
         group=GROUP,
         sentence="Select braking events by the paper's rules and predict each drive from the others (Appendix C.5).",
         function="flows.measured.protocol:brake_protocol",
@@ -75,7 +75,7 @@ COMMANDS = (
         brief=shorten_brake_protocol,
     ),
     Command(
-        name="stop-study",
+        name="lab stop-study",
         group=GROUP,
         sentence="Calibrate on one stop of a car, predict another, and add what the model lacks step by step.",
         function="flows.measured.stop_study:stop_study",
@@ -94,7 +94,7 @@ COMMANDS = (
         brief=shorten_stop_study,
     ),
     Command(
-        name="bump-study",
+        name="lab bump-study",
         group=GROUP,
         sentence="Find the road features in a recording's pitch rate, and fit the car that drove over them.",
         function="flows.measured.bump_study:bump_study",
@@ -113,7 +113,7 @@ COMMANDS = (
         brief=shorten_bump_study,
     ),
     Command(
-        name="synthetic-drives",
+        name="lab synthetic-drives",
         group=GROUP,
         sentence="Write drives as a car's bus logs them, with known truth, to try the brake protocol on.",
         function="flows.measured.bus_drives:synthetic_drives",
@@ -125,7 +125,7 @@ COMMANDS = (
         ),
     ),
     Command(
-        name="agreement",
+        name="vehicle agreement",
         group=GROUP,
         sentence="Compare the vehicle model with reference traces, as the paper's Appendix A.2 does.",
         function="flows.studies.vehicle_model:measure_agreement",
@@ -133,7 +133,7 @@ COMMANDS = (
         brief=shorten_agreement,
     ),
     Command(
-        name="calibrate",
+        name="vehicle calibrate",
         group=GROUP,
         sentence="Calibrate a vehicle in stages on reference traces, freeze it, and say how well each number is known.",
         function="flows.measured.calibration:calibrate_on_traces",
@@ -175,7 +175,7 @@ COMMANDS = (
         one_thread=True,
     ),
     Command(
-        name="close-loop-benchmark",
+        name="lab close-loop-benchmark",
         group=GROUP,
         sentence="Count how often close-loop is right on campaigns whose truth is known.",
         function="flows.measured.closing_benchmark:close_loop_benchmark",

@@ -60,7 +60,7 @@ COMMANDS = (
         passed=require_key("road_found"),
     ),
     Command(
-        name="render",
+        name="scene render",
         group=GROUP,
         sentence="Render one frame of a scene at a world-to-camera pose.",
         function="flows.making.scenes:render_pose",

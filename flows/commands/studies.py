@@ -13,7 +13,7 @@ MODE = define_option(
 
 COMMANDS = (
     Command(
-        name="sensitivity",
+        name="lab sensitivity",
         group=GROUP,
         sentence="Reproduce the paper's bounded surface-parameter study (Appendix E) beside its printed figures.",
         function="flows.studies.vehicle_model:run_sensitivity",
@@ -22,7 +22,7 @@ COMMANDS = (
         passed=lambda result: all(row["agrees"] for row in result["beside_print"]),
     ),
     Command(
-        name="ablation",
+        name="lab ablation",
         group=GROUP,
         sentence="Cut one coupling at a time (the paper's Section 4.4): stops over the weather, pitch at a hump.",
         function="flows.studies.ablation:run_ablation",
@@ -40,7 +40,7 @@ COMMANDS = (
         brief=select_keys("pitch", "reference"),
     ),
     Command(
-        name="bench",
+        name="lab bench",
         group=GROUP,
         sentence="Measure speed and memory, beside another implementation in the same run.",
         function="flows.studies.vehicle_model:run_benchmarks",

@@ -23,7 +23,7 @@ from catalogs.scenes.gaussian_files import write_gaussians
 from flows.exporting.dataset import ExportedClip, ExportedDataset
 from flows.making.catalogue import catalogue_of
 from flows.making.driving import hazard_of
-from flows.making.edited_scene import edit_scene
+from flows.making.pictures import edit_scene
 from flows.store.layout import write_json
 from tasks.render.camera import Camera
 from tasks.render.contact_sheet import encode_png

@@ -86,7 +86,7 @@ def run_controls(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     results = Outputs(out, "controls", "controls.json", "controls.svg")
     layout = open_for_reading(dataset)
     root, manifest = layout.root, read_manifest(layout)
-    refuse_traced(read_plan(root).inputs, dataset, "controls")
+    refuse_traced(read_plan(root).inputs, dataset, "lab controls")
     require_frames(manifest, dataset)
     refuse_changed_content(layout, manifest, manifest["clips"])
     refuse_changed_scene(manifest["scene"])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from flows.judging.physics import clip_columns
 from flows.judging.trajectories import read_trajectory
 from flows.making.catalogue import catalogue_of
-from flows.making.clip import prepare_for_checks
+from flows.making.gate import prepare_for_checks
 from flows.making.plan import read_plan
 from flows.reading.film import through_film
 from flows.store.frames import read_clip

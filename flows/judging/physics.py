@@ -71,7 +71,7 @@ def audit_physics(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     results = Outputs(out, "audit-physics", "physics.json")
     root = open_for_reading(dataset, want_telemetry).root
     plan = Plan.of(read_plan_record(Layout(root)), Layout(root).plan)
-    refuse_traced(plan.inputs, dataset, "audit-physics")
+    refuse_traced(plan.inputs, dataset, "lab audit-physics")
     constants = read_constants(root)
     clips = clip_facts(root)
     driven, route = drive_facts(root, plan), find_route(plan.scene)
@@ -122,7 +122,7 @@ def clip_facts(root: Path) -> list[dict[str, Any]]:
     if [row["clip_id"] for row in rows] != [clip["clip_id"] for clip in manifest["clips"]]:
         raise InputError(
             f"{path}: must have a row of each of the manifest's {len(manifest['clips'])} clips, in order; its"
-            f" {len(rows)} rows are others: musync repair makes the table again"
+            f" {len(rows)} rows are others: musync lab repair makes the table again"
         )
     return rows
 

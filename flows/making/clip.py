@@ -1,34 +1,31 @@
-"""One clip from its scenario to its committed receipt: the work that is fanned out.
+"""One clip from its scenario to its committed receipt, in five steps: surface, rollout, frames, check, commit.
 
-A clip is made whole by one worker. Its frames and tables are written first and its receipt last, by rename:
-where the receipt exists, the clip is complete. Making a clip twice writes the same bytes.
+This is the work that is fanned out. A clip is made whole by one worker. Its frames and tables are written first and its
+receipt last, by rename: where the receipt exists, the clip is complete. Making a clip twice writes the same bytes.
 """
 
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from catalogs.grids.form import TICK_RATE_HZ
-from catalogs.scenario import Scenario
 from catalogs.studies.ablation import cut_coupling
 from flows.making.catalogue import Catalogue, catalogue_of
 from flows.making.driving import (
     collect_surface_figures,
-    hazard_of,
     peak_lateral_demand,
     ranges_of,
     simulate_drive,
     surface_of,
-    weather_of,
 )
-from flows.making.edited_scene import edit_scene
+from flows.making.gate import judge_motion, nothing_to_judge
+from flows.making.pictures import frame_rows, render_frames, rig_of
 from flows.making.places import remember_place
-from flows.making.plan import Plan, frame_ticks, read_plan
+from flows.making.plan import ClipPlan, Plan, read_plan
 from flows.making.traced import replay_drive, unknown_ranges
 from flows.running.processors import measure_peak_memory
 from flows.store.address import find_local, send_files
@@ -37,56 +34,168 @@ from flows.store.layout import STAGED_TABLES, Layout, write_json
 from flows.store.telemetry import content_hash, labelled_table, write_parquet
 from manifests.canonical import sha256_of_file
 from tasks.errors import InputError
-from tasks.eval.body_agreement import BodyClaim, pose_body
-from tasks.eval.motion_agreement import PoseVerdict, judge_pose
-from tasks.eval.poses.checks import GATE_CHECK, POSE_CHECKS, CheckedClip, JudgeCamera, prepare_clip
-from tasks.eval.poses.undistort import undistort_frames
-from tasks.render.camera import PIXEL_CENTRE, RigAt, body_poses, continuous_rig
-from tasks.render.clip import RigMotion, render_clip
-from tasks.render.rasterise.backend import select_backend
-from tasks.render.weather.layers import ClipConditions
-from tasks.surface.anchors import adjacent_anchors
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.peaks import compute_peaks
 from tasks.vehicle.rollout import Rollout, compute_lift_times
 
+Columns = Mapping[str, NDArray[Any]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClipWork:
+    """A clip of a plan, with the dataset's frozen catalogue entries.
+
+    Parameters
+    ----------
+    clip, plan : which, of which dataset
+    catalogue : what the dataset was planned with
+    """
+
+    clip: ClipPlan
+    plan: Plan
+    catalogue: Catalogue
+
 
 def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
-    """Make and commit clip ``index`` of a dataset whose scene lies at ``scene``; returns its receipt."""
-    started = time.process_time(), time.perf_counter()
-    cv2.setNumThreads(1)  # one thread a clip: more within a frame cost more than they give
+    """Make and commit a clip of a dataset.
+
+    Parameters
+    ----------
+    layout : of the dataset
+    index : of the clip [1]
+    scene : folder of the dataset's scene on this machine
+
+    Returns
+    -------
+    The clip's receipt, and beside it under ``cost`` what it took
+    """
+    cost = Cost()
     layout = find_local(layout)
+    plan, catalogue = open_plan(layout, scene)
+    work = ClipWork(clip=plan.clips[index], plan=plan, catalogue=catalogue)
+
+    surface = map_surface(work)
+    cost.end_step("surface")
+    ride, ranges = roll_out(work)
+    cost.end_step("rollout")
+    frames, buffers = draw_frames(work, surface, ride)
+    cost.end_step("frames")
+    checked, verdict = check_motion(work, surface, frames, buffers)
+    cost.end_step("check")
+    receipt = commit_clip(layout, work, surface, ride, ranges, frames | checked, buffers, verdict)
+    cost.end_step("commit")
+    return receipt | {"cost": cost.as_json()}
+
+
+def warm_up(layout: Layout, scene: str) -> None:
+    """Compile and load all that the clips of a dataset need: two frames of each weather, and nothing is written."""
+    plan, catalogue = open_plan(find_local(layout), scene)
+    short = replace(plan, settings=plan.settings.model_copy(update={"frames": 2, "duration_s": None}))
+    for clip in {clip.scenario.weather: clip for clip in reversed(plan.clips)}.values():
+        work = ClipWork(clip=clip, plan=short, catalogue=catalogue)
+        surface = map_surface(work)
+        frames, buffers = draw_frames(work, surface, _move_car(work))
+        check_motion(work, surface, frames, buffers)
+
+
+def open_plan(layout: Layout, scene: str) -> tuple[Plan, Catalogue]:
+    """Read a dataset's frozen plan and catalogue entries, both kept for the next clip.
+
+    Parameters
+    ----------
+    layout : of the dataset, on this machine
+    scene : folder of its scene on this machine
+    """
+    cv2.setNumThreads(1)  # one thread a clip: more within a frame cost more than they give
     plan = read_plan(layout.root)
     remember_place(plan.scene["sha256"], scene)
-    clip = plan.clips[index]
-    catalogue = catalogue_of(layout.root)
+    return plan, catalogue_of(layout.root)
 
-    state, ride = move_car(clip.scenario, plan, catalogue)
-    facts = collect_surface_figures(state, ride)
-    driven = cut_coupling(clip.scenario, plan.settings.variant, catalogue.families)
-    ranges = unknown_ranges() if catalogue.traces is not None else ranges_of(
-        driven, catalogue.vehicle, catalogue.surface, catalogue.study,
-        plan.settings.vehicle_mode, plan.duration_s, catalogue.steady, catalogue.grade,
+
+def map_surface(work: ClipWork) -> SurfaceState:
+    """Step 1: the weather makes the road surface that is seen and, unless a variant cuts that, driven on."""
+    return surface_of(work.clip.scenario, work.catalogue.surface)
+
+
+def roll_out(work: ClipWork) -> tuple[Rollout, dict[str, float]]:
+    """Step 2: the motion, and the range of each label under the bounds of the surface parameters."""
+    catalogue, plan = work.catalogue, work.plan
+    if catalogue.traces is not None:
+        return _move_car(work), unknown_ranges()
+    return _move_car(work), ranges_of(
+        cut_coupling(work.clip.scenario, plan.settings.variant, catalogue.families), catalogue.vehicle,
+        catalogue.surface, catalogue.study, plan.settings.vehicle_mode, plan.duration_s, catalogue.steady,
+        catalogue.grade,
     )  # fmt: skip
-    frames = frame_rows(ride, plan, catalogue)
-    buffers: dict[str, NDArray[Any]] = {}
-    if plan.settings.pictures:
-        rig_at = rig_of(ride, frames, catalogue)
-        buffers = render_frames(clip.scenario, state, frames, plan, catalogue, int(clip.seed), rig_at)
-        frames |= judge_motion(buffers, frames, state.film_depth_mm, catalogue)
-    else:
-        frames |= nothing_to_judge(len(frames["frame"]))
-    verdict = frames.pop("verdict")
 
+
+def _move_car(work: ClipWork) -> Rollout:
+    """The motion of the vehicle, of a variant of it, or of the dataset's trace."""
+    scenario, catalogue, plan = work.clip.scenario, work.catalogue, work.plan
+    if catalogue.traces is not None:
+        return replay_drive(scenario, catalogue.surface, catalogue.traces, plan.duration_s)
+    _, ride = simulate_drive(
+        cut_coupling(scenario, plan.settings.variant, catalogue.families), catalogue.vehicle,
+        catalogue.surface, plan.settings.vehicle_mode, plan.duration_s, catalogue.steady, catalogue.grade,
+    )  # fmt: skip
+    return ride
+
+
+def draw_frames(
+    work: ClipWork, surface: SurfaceState, ride: Rollout
+) -> tuple[dict[str, NDArray[Any]], dict[str, NDArray[Any]]]:
+    """Step 3: the rows of the frames' table, and the finished frames with depth and class; no frames where none are
+    asked for.
+    """
+    frames = frame_rows(ride, work.plan, work.catalogue)
+    if not work.plan.settings.pictures:
+        return frames, {}
+    rig_at = rig_of(ride, frames, work.catalogue)
+    seed = int(work.clip.seed)
+    return frames, render_frames(work.clip.scenario, surface, frames, work.plan, work.catalogue, seed, rig_at)
+
+
+def check_motion(
+    work: ClipWork, surface: SurfaceState, frames: Columns, buffers: Columns
+) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+    """Step 4: the motion that the frames show, as columns of their table, and the verdict of the gate on it."""
+    found = (
+        judge_motion(buffers, frames, surface.film_depth_mm, work.catalogue)
+        if buffers
+        else nothing_to_judge(len(frames["frame"]))
+    )
+    verdict = found.pop("verdict")
+    return found, verdict
+
+
+def commit_clip(
+    layout: Layout,
+    work: ClipWork,
+    surface: SurfaceState,
+    ride: Rollout,
+    ranges: Mapping[str, float],
+    frames: Columns,
+    buffers: Columns,
+    verdict: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Step 5: write frames, tables and at last the receipt, which is returned.
+
+    Raises
+    ------
+    InputError
+        If another run has finished the dataset meanwhile.
+    """
+    clip = work.clip
     if layout.manifest.is_file():
         # the driver died, another run took over, and has ended: there is nothing to commit any more
         raise InputError(f"{layout}: the dataset is finished; clip {clip.label} was made by another run")
+    facts = collect_surface_figures(surface, ride)
     identity = {"clip_id": clip.clip_id, "label": clip.label, "weather": clip.scenario.weather}
-    if plan.settings.pictures:
-        write_clip(layout.frames, index, buffers)
+    if buffers:
+        write_clip(layout.frames, clip.index, buffers)
     write_parquet(labelled_table(ride.columns, identity), layout.staged(clip.clip_id, "ticks"))
     write_parquet(labelled_table(frames, identity | facts), layout.staged(clip.clip_id, "frames"))
-    shards = {name: layout.frame_shard(name, index) for name in buffers}
+    shards = {name: layout.frame_shard(name, clip.index) for name in buffers}
     receipt = {
         **clip.as_json(),
         "artifacts": {layout.relative(path): sha256_of_file(path) for path in shards.values()},
@@ -96,24 +205,19 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
             "stop_time": ride.stop_time,
             "stopping_distance": ride.stopping_distance,
             **collect_motion_figures(ride.columns),
-            "lateral_demand": peak_lateral_demand(ride, catalogue.scene.route),
+            "lateral_demand": peak_lateral_demand(ride, work.catalogue.scene.route),
             "static_pitch": ride.static_pitch,
             "calibration_extrapolated": ride.calibration_extrapolated,
         } | ranges),
-        "verdict": verdict,
+        "verdict": _json_numbers(verdict),
     }  # fmt: skip
     write_json(layout.receipt(clip.clip_id), receipt)
     tables = [layout.staged(clip.clip_id, table) for table in STAGED_TABLES]
     send_files(layout, [*shards.values(), *tables], last=layout.receipt(clip.clip_id))
-    cost = {
-        "cpu_s": time.process_time() - started[0],
-        "wall_s": time.perf_counter() - started[1],
-        "peak_memory_mib": measure_peak_memory(),
-    }
-    return receipt | {"cost": cost}
+    return receipt
 
 
-def collect_motion_figures(columns: Mapping[str, NDArray[Any]]) -> dict[str, float]:
+def collect_motion_figures(columns: Columns) -> dict[str, float]:
     """Return the figures of a clip that follow from the columns of its ticks alone.
 
     Parameters
@@ -127,157 +231,31 @@ def collect_motion_figures(columns: Mapping[str, NDArray[Any]]) -> dict[str, flo
     }
 
 
-def warm_up(layout: Layout, scene: str) -> None:
-    """Compile and load all that the clips of a dataset need: two frames of each weather, and nothing is written."""
-    root = find_local(layout).root
-    plan = read_plan(root)
-    remember_place(plan.scene["sha256"], scene)
-    catalogue = catalogue_of(root)
-    short = replace(plan, settings=plan.settings.model_copy(update={"frames": 2, "duration_s": None}))
-    for clip in {clip.scenario.weather: clip for clip in reversed(plan.clips)}.values():
-        state, ride = move_car(clip.scenario, short, catalogue)
-        frames = frame_rows(ride, short, catalogue)
-        if plan.settings.pictures:
-            rig_at = rig_of(ride, frames, catalogue)
-            buffers = render_frames(clip.scenario, state, frames, short, catalogue, int(clip.seed), rig_at)
-            judge_motion(buffers, frames, state.film_depth_mm, catalogue)
+@dataclass(kw_only=True)
+class Cost:
+    """What a clip takes, step by step, from the moment it is made.
 
+    Parameters
+    ----------
+    began : processor time and clock of this process [s]
+    steps : processor time of each step that has ended [s]
+    """
 
-def move_car(scenario: Scenario, plan: Plan, catalogue: Catalogue) -> tuple[SurfaceState, Rollout]:
-    """Return the surface that is seen, and the motion: of the vehicle, its variant, or the dataset's trace."""
-    if catalogue.traces is not None:
-        return replay_drive(scenario, catalogue.surface, catalogue.traces, plan.duration_s)
-    _, ride = simulate_drive(
-        cut_coupling(scenario, plan.settings.variant, catalogue.families), catalogue.vehicle,
-        catalogue.surface, plan.settings.vehicle_mode, plan.duration_s, catalogue.steady, catalogue.grade,
-    )  # fmt: skip
-    return surface_of(scenario, catalogue.surface), ride
+    began: tuple[float, float] = field(default_factory=lambda: (time.process_time(), time.perf_counter()))
+    steps: dict[str, float] = field(default_factory=dict)
 
+    def end_step(self, name: str) -> None:
+        """Keep what was spent since the last step as this one's."""
+        self.steps[name] = time.process_time() - self.began[0] - sum(self.steps.values())
 
-def frame_rows(ride: Rollout, plan: Plan, catalogue: Catalogue) -> dict[str, NDArray[Any]]:
-    """The tick that each frame shows, and the rig pose at it."""
-    frame = np.arange(plan.settings.frames)
-    tick = frame_ticks(plan.settings.frames, plan.settings.frame_rate_hz)
-    rows = {"frame": frame, "tick": tick} | {name: column[tick] for name, column in ride.columns.items()}
-    vehicle = catalogue.vehicle
-    poses = body_poses(
-        catalogue.scene.route, rows["station"], rows["heave"], rows["pitch"],
-        cg_behind_front_axle=vehicle.cg_to_front_axle, cg_height=vehicle.cg_height,
-    )  # fmt: skip
-    return rows | {"T_world_rig": poses.reshape(len(frame), 16)}
-
-
-def rig_of(ride: Rollout, frames: Mapping[str, NDArray[Any]], catalogue: Catalogue) -> RigAt:
-    """Rig poses about every frame, for a camera that moves while it sees one."""
-    vehicle, tick_s = catalogue.vehicle, 1 / TICK_RATE_HZ
-    time_s = np.arange(len(ride.columns["station"]), dtype=np.float64) * tick_s
-    return continuous_rig(
-        catalogue.scene.route, time_s,
-        ride.columns["station"], ride.columns["heave"], ride.columns["pitch"], frames["tick"] * tick_s,
-        cg_behind_front_axle=vehicle.cg_to_front_axle, cg_height=vehicle.cg_height,
-    )  # fmt: skip
-
-
-def render_frames(
-    scenario: Scenario,
-    state: SurfaceState,
-    frames: Mapping[str, NDArray[Any]],
-    plan: Plan,
-    catalogue: Catalogue,
-    seed: int,
-    rig_at: RigAt,
-) -> dict[str, NDArray[Any]]:
-    """Render the clip's finished frames, depth and class."""
-    gaussians, relief = edit_scene(
-        catalogue.scene,
-        hazard_of(scenario),
-        catalogue.marking,
-        catalogue.weather_parameters.sky.asphalt_albedo,
-    )
-    return render_clip(
-        replace(catalogue.scene, gaussians=gaussians),
-        catalogue.camera,
-        RigMotion(
-            T_world_rig=frames["T_world_rig"].reshape(-1, 4, 4),
-            frame_rate_hz=plan.settings.frame_rate_hz,
-            rig_at=rig_at,
-        ),
-        ClipConditions(
-            state=state,
-            pavement=catalogue.surface,
-            parameters=catalogue.weather_parameters,
-            seed=seed,
-            anchors=_anchors_of(scenario, plan, catalogue),
-            refracts=plan.settings.composition == "paper",
-        ),
-        select_backend(plan.backend),
-        relief=relief,
-        labels=plan.settings.labels,
-        composition=plan.settings.composition,
-    )
-
-
-def _anchors_of(scenario: Scenario, plan: Plan, catalogue: Catalogue) -> tuple[SurfaceState, ...]:
-    """Return the anchors about the clip's rate that the paper's composition blends."""
-    look = catalogue.weather_parameters.find_look(scenario.weather)
-    if plan.settings.composition != "paper" or look is None or look.anchors_mm_h is None:
-        return ()
-    return adjacent_anchors(weather_of(scenario), look.anchors_mm_h, catalogue.surface)
-
-
-def judge_motion(
-    buffers: Mapping[str, NDArray[Any]],
-    frames: Mapping[str, NDArray[Any]],
-    film_depth_mm: float,
-    catalogue: Catalogue,
-) -> dict[str, Any]:
-    """Motion that the gate's pose check recovers from the finished frames, compared with the telemetry."""
-    camera = catalogue.camera
-    shown = {name: buffers[name] for name in ("rgb", "depth", "class")}
-    pinhole = undistort_frames(shown, camera.K - PIXEL_CENTRE, camera.distortion)
-    recovered = POSE_CHECKS[GATE_CHECK](prepare_for_checks(pinhole, frames, film_depth_mm, catalogue))
-    body = pose_body(
-        frames["heave"], frames["pitch"], catalogue.vehicle.cg_to_front_axle, catalogue.vehicle.cg_height
-    )
-    claim = BodyClaim(T_world_rig=catalogue.scene.route.pose(frames["station"]) @ body, heave=frames["heave"])
-    verdict = judge_pose(recovered, frames["pitch"], frames["station"], catalogue.gates, claim)
-    return {
-        "recovered_pitch": recovered.pitch,
-        "recovered_progress": recovered.progress,
-        "verdict": _json_numbers(asdict(verdict) | {"reasons": list(verdict.reasons)}),
-    }
-
-
-def prepare_for_checks(
-    pinhole: Mapping[str, NDArray[Any]],
-    frames: Mapping[str, NDArray[Any]],
-    film_depth_mm: float,
-    catalogue: Catalogue,
-) -> CheckedClip:
-    """Return a clip's undistorted ``rgb``, ``depth`` and ``class`` as every pose check takes them."""
-    camera = catalogue.camera
-    return prepare_clip(
-        pinhole,
-        JudgeCamera(
-            K=camera.K - PIXEL_CENTRE,
-            T_rig_camera=camera.T_rig_camera,
-            distortion=camera.distortion,
-            line_delay_s=camera.line_delay_s,
-        ),
-        frame_interval_s=float(frames["t_ns"][1] - frames["t_ns"][0]) * 1e-9,
-        film_depth_mm=film_depth_mm,
-        route_rotations=catalogue.scene.route.pose(frames["station"])[:, :3, :3],
-    )
-
-
-def nothing_to_judge(frames: int) -> dict[str, Any]:
-    """Return the result of `judge_motion` where there is no picture: every value is not represented."""
-    verdict = {figure.name: None for figure in fields(PoseVerdict)}
-    return {
-        "recovered_pitch": np.full(frames, np.nan),
-        "recovered_progress": np.full(frames, np.nan),
-        "verdict": verdict | {"reasons": ["no frames were made"]},
-    }
+    def as_json(self) -> dict[str, Any]:
+        """The whole, and each step."""
+        return {
+            "cpu_s": time.process_time() - self.began[0],
+            "wall_s": time.perf_counter() - self.began[1],
+            "peak_memory_mib": measure_peak_memory(),
+            "steps": self.steps,
+        }
 
 
 def _json_numbers(values: Mapping[str, Any]) -> dict[str, Any]:

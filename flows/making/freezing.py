@@ -222,8 +222,8 @@ def reproduce_run(
         raise InputError([
             *(f"manifest {manifest}: {problem}" for problem in problems[:SHOWN_DIFFERENCES]),
             *([f"manifest {manifest}: and {rest} more differences"] if rest > 0 else []),
-            f"manifest {manifest}: what to do: musync generate GRID makes a dataset with what is here; musync freeze"
-            f" freezes it anew; source {frozen['made_with']['code']['source_sha256'][:12]} of version"
+            f"manifest {manifest}: what to do: musync generate GRID makes a dataset with what is here; musync lab"
+            f" freeze freezes it anew; source {frozen['made_with']['code']['source_sha256'][:12]} of version"
             f" {frozen['made_with']['code']['version']} makes it as it was",
         ])  # fmt: skip
     report = generate_dataset(

@@ -14,7 +14,7 @@ from flows.making.clip import make_clip, warm_up
 from flows.making.input_changes import frozen_inputs, restore_inputs
 from flows.making.places import find_scene
 from flows.making.plan import Plan, hold_plan, make_plan, plan_differences, read_plan
-from flows.making.run_report import RunCost, RunReport
+from flows.making.run_report import RunCost, RunReport, list_step_times
 from flows.making.seal import seal_dataset
 from flows.running.failures import ClipsFailed, disk_full_sentence
 from flows.running.orchestration import run_as_stage
@@ -261,8 +261,9 @@ def fan_out(layout: Layout, plan: Plan, indices: list[int], executor: Executor) 
         for (_, index, _), future in run_unordered(executor, make_clip, jobs):
             label, error = plan.clips[index].label, future.exception()
             if error is None:
-                cost, committed = cost.with_clip(future.result()["cost"]), committed + 1
-                advance(label)
+                receipt = future.result()
+                cost, committed = cost.with_clip(receipt["cost"]), committed + 1
+                advance(label, facts=list_step_times(receipt))
             elif (told := disk_full_sentence(error)) is not None:
                 raise InputError(f"{layout}: {committed} of {len(indices)} clips are committed; {told}")
             else:

@@ -111,8 +111,8 @@ def read_kept(layout: Layout, recorded: Mapping[str, str]) -> dict[str, bytes]:
     """
     kept = frozen_inputs(layout, recorded)
     problems = [
-        f"{layout}/inputs/{name}: must be as recorded; it is {'changed' if name in kept else 'missing'}: musync repair"
-        " makes it again"
+        f"{layout}/inputs/{name}: must be as recorded; it is {'changed' if name in kept else 'missing'}: musync lab"
+        " repair makes it again"
         for name, digest in recorded.items()
         if name not in kept or sha256_of([kept[name]]) != digest
     ]

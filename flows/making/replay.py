@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from catalogs.grids import load_grid
 from catalogs.studies.ablation import cut_coupling
 from flows.making.catalogue import Catalogue, load_catalogue
-from flows.making.clip import frame_rows, render_frames, rig_of
 from flows.making.driving import collect_surface_figures, simulate_drive, surface_of
+from flows.making.pictures import frame_rows, render_frames, rig_of
 from flows.making.plan import ClipPlan, Plan, freeze_grid
 from flows.running.progress import progress_bar
 from flows.store.frames import buffer_hash

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from flows.store.layout import Layout
 
@@ -48,3 +49,15 @@ class RunReport:
     made: int
     quarantined: dict[str, list[str]]
     cost: RunCost
+
+
+def list_step_times(made: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a table of a run's clips shows of one: the check's outcome, and the processor time of each step.
+
+    Parameters
+    ----------
+    made : a clip's receipt with its ``cost``, as of `flows.making.clip.make_clip`
+    """
+    return {"check": {True: "passed", False: "failed", None: "not judged"}[made["verdict"]["passed"]]} | {
+        f"{step} [CPU-s]": round(spent, 3) for step, spent in made["cost"]["steps"].items()
+    }

@@ -14,7 +14,7 @@ from flows.making.driving import weather_of
 from manifests.manifest import TRACES, is_traced
 from tasks.errors import InputError
 from tasks.studies.label_ranges import PERCENTILES
-from tasks.surface.state import SurfaceParameters, SurfaceState
+from tasks.surface.state import SurfaceParameters
 from tasks.surface.weather import surface_state
 from tasks.vehicle.replayed_trace import BEFORE_START, ENDS_STANDING, replay_trace
 from tasks.vehicle.rollout import Rollout
@@ -63,8 +63,8 @@ def read_trace_inputs(grid: Grid, folder: Path) -> tuple[dict[str, bytes], list[
 
 def replay_drive(
     scenario: Scenario, surface: SurfaceParameters, reference: Reference, duration_s: float
-) -> tuple[SurfaceState, Rollout]:
-    """Return the surface of a scenario and the motion of the reference case that has its conditions.
+) -> Rollout:
+    """Return the motion of the reference case that has the conditions of a scenario.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def replay_drive(
     state = surface_state(weather_of(scenario), surface)
     found = find_case([case for case, _ in reference], scenario, state.friction)
     columns = next(columns for case, columns in reference if case.case == found.case)
-    return state, replay_trace(
+    return replay_trace(
         columns,
         duration_s=duration_s,
         surface_friction=state.friction,

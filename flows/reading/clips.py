@@ -83,7 +83,7 @@ class Clip:
         except (ValueError, RuntimeError, OSError) as error:
             raise InputError(
                 f"{self.dataset.place}/frames.zarr/rgb: clip {self.label} must be readable; {shorten(error)}:"
-                " musync repair makes it again"
+                " musync lab repair makes it again"
             ) from None
         return picture
 

@@ -43,7 +43,7 @@ def open_frames_store(layout: Layout, manifest: Mapping[str, Any]) -> Any:
 
 def _refuse_missing(layout: Layout, manifest: Mapping[str, Any]) -> None:
     missing = [
-        f"{layout}/{path}: missing, with pictures of clip {clip['label']}: musync repair makes it again"
+        f"{layout}/{path}: missing, with pictures of clip {clip['label']}: musync lab repair makes it again"
         for clip in manifest["clips"]
         for path in clip["artifacts"]
         if not (layout.root / path).is_file()

@@ -31,7 +31,7 @@ _NO_COLUMN = re.compile(
     r'|does not have a column (?:named|with name) "(?P<of_table>[^"\n]+)"',
     re.IGNORECASE,
 )
-_LISTED = f"views are {', '.join(VIEWS)}; musync schema lists their columns"
+_LISTED = f"views are {', '.join(VIEWS)}; musync lab schema lists their columns"
 _CANDIDATES = re.compile(r'"([^"\n]+)"')
 _Result = TypeVar("_Result")
 
@@ -195,12 +195,12 @@ def _suggest_columns(query: str, name: str, text: str) -> InputError:
         f"query {shorten(query)}: {' and '.join(read)}: column",
         [name],
         list(dict.fromkeys(known)),
-        "musync schema",
+        "musync lab schema",
     )
     having = [view for view, channels in VIEWS.items() if name.casefold() in {c.name for c in channels}]
     elsewhere = f"; {' and '.join(having)} have this column" if having else ""
     return InputError(
-        f"{error.problems[0]}{elsewhere}\nviews are {', '.join(VIEWS)}; musync schema lists their columns"
+        f"{error.problems[0]}{elsewhere}\nviews are {', '.join(VIEWS)}; musync lab schema lists their columns"
     )
 
 

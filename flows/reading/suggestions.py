@@ -25,7 +25,7 @@ def suggest_names(what: str, wrong: Sequence[object], known: Sequence[str], list
 
 
 def suggest_clips(
-    place: object, wrong: Sequence[object], labels: Sequence[str], lister: str = "musync describe"
+    place: object, wrong: Sequence[object], labels: Sequence[str], lister: str = "musync lab describe"
 ) -> InputError:
     """Return the error for clips that a dataset does not have, one sentence each.
 

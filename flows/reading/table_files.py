@@ -56,7 +56,7 @@ def table_files(layout: Layout, manifest: Mapping[str, Any]) -> dict[str, dict[s
             continue
         tables[named["table"]][recorded.removeprefix("telemetry/")] = layout.root / recorded
     problems += [
-        f"{layout}: the files of {table} are missing: musync repair makes them again"
+        f"{layout}: the files of {table} are missing: musync lab repair makes them again"
         for table, files in tables.items()
         if not files or not all(path.is_file() for path in files.values())
     ]

@@ -76,7 +76,7 @@ class ClipWindows(Dataset[dict[str, Any]]):
             return read_frames(self.frames, name, self._shape(name), clip, span)
         except (ValueError, RuntimeError, OSError) as error:
             raise InputError(
-                f"{self.frames / name}: clip {clip}: cannot be read; {shorten(error)}: musync repair makes it again"
+                f"{self.frames / name}: clip {clip}: cannot be read; {shorten(error)}: musync lab repair makes it again"
             ) from None
 
     def _shape(self, name: str) -> tuple[int, ...]:
@@ -209,7 +209,7 @@ def _find_column_problems(file: Path, columns: Sequence[str]) -> list[str]:
         schema = pq.read_schema(file)
     except (pa.ArrowException, OSError) as error:
         return [
-            f"{file}: must be a Parquet file as muSync writes it; {shorten(error)}: musync repair makes it again"
+            f"{file}: must be a Parquet file as muSync writes it; {shorten(error)}: musync lab repair makes it again"
         ]
     names = [field.name for field in schema if str(field.type) in _NUMERIC]
     return [
@@ -238,7 +238,7 @@ def _clip_values(file: Path, columns: Sequence[str], frames: int) -> dict[str, n
             raise TypeError(f"column {odd[0].name!r} is of type {odd[0].type}")
     except (pa.ArrowException, KeyError, ValueError, TypeError, OSError) as error:
         raise InputError(
-            f"{file}: must be a Parquet file as muSync writes it; {shorten(error)}: musync repair makes it again"
+            f"{file}: must be a Parquet file as muSync writes it; {shorten(error)}: musync lab repair makes it again"
         ) from None
     named = ids[::frames]
     if [name for name in named for _ in range(frames)] != ids or len(set(named)) != len(named):

@@ -1,32 +1,55 @@
 """Progress for people: a bar with the time left on a terminal, one line a clip elsewhere; and for watchers."""
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import Protocol
+from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
-    Progress,
     TextColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
+from rich.progress import Progress as Bar
 
 from flows.running.terminal import escape_controls, open_console, print_lines
 
-Watcher = Callable[[str, int, int, str, bool], None]
-"""Called with the title, the pieces done and all pieces [1], the name of the last one, empty at the beginning, and
-whether that one failed."""
+
+@dataclass(frozen=True, kw_only=True)
+class Progress:
+    """How far a kind of work is, told at its beginning and after every piece.
+
+    Parameters
+    ----------
+    title : of the kind of work
+    done, total : pieces done, and all pieces [1]
+    name : of the last piece; empty at the beginning
+    failed : whether that one failed
+    facts : of that one, for a table of the pieces
+    """
+
+    title: str
+    done: int
+    total: int
+    name: str = ""
+    failed: bool = False
+    facts: Mapping[str, Any] = field(default_factory=dict)
+
+
+Watcher = Callable[[Progress], None]
 _WATCHERS: ContextVar[tuple[Watcher, ...]] = ContextVar("watchers", default=())
 
 
 class Advance(Protocol):
     """Tells of a finished piece of work."""
 
-    def __call__(self, name: str, *, failed: bool = False) -> None: ...
+    def __call__(
+        self, name: str, *, failed: bool = False, facts: Mapping[str, Any] | None = None
+    ) -> None: ...
 
 
 @contextmanager
@@ -44,19 +67,19 @@ def progress_bar(title: str, total: int) -> Iterator[Advance]:
     """Yield a function to call with the name of each finished piece of work."""
     done, watchers = 0, _WATCHERS.get()
 
-    def tell(name: str, failed: bool) -> None:
+    def tell(progress: Progress) -> None:
         for watcher in watchers:
-            watcher(title, done, total, name, failed)
+            watcher(progress)
 
     with _shown_bar(title, total) as show:
 
-        def advance(name: str, *, failed: bool = False) -> None:
+        def advance(name: str, *, failed: bool = False, facts: Mapping[str, Any] | None = None) -> None:
             nonlocal done
             done += 1
             show(describe_piece(name, failed))
-            tell(name, failed)
+            tell(Progress(title=title, done=done, total=total, name=name, failed=failed, facts=facts or {}))
 
-        tell("", False)
+        tell(Progress(title=title, done=done, total=total))
         yield advance
 
 
@@ -81,6 +104,6 @@ def _shown_bar(title: str, total: int) -> Iterator[Callable[[str], None]]:
         TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TextColumn("elapsed"),
         TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn(), TextColumn("{task.fields[last]}", markup=False),
     )  # fmt: skip
-    with Progress(*columns, console=open_console(error=True)) as bar:
+    with Bar(*columns, console=open_console(error=True)) as bar:
         task = bar.add_task(title, total=total, last="")
         yield lambda name: bar.update(task, advance=1, last=escape_controls(name))

@@ -27,8 +27,7 @@ from prefect.runtime import deployment, flow_run
 from prefect.tasks import exponential_backoff
 
 from catalogs.grids import load_grid
-from flows.running.prefect_progress import RunProgress
-from flows.running.progress import watch_progress
+from flows.running.prefect_progress import show_progress
 from flows.running.runner import RunnerName, end_with_parent
 from flows.scheduled.failure_report import is_told_of, report_failure, report_run
 from flows.scheduled.lateness import watch_lateness
@@ -111,7 +110,7 @@ def _make_dataset_at(
 
     try:
         with (
-            watch_progress(RunProgress()),
+            show_progress(),
             watch_lateness(at, _next_time(), lambda sentence: tell("late", {"why": sentence})),
         ):
             result = make_dataset(grid, root, at=at, **execution)

@@ -15,7 +15,7 @@ from pathlib import Path, PurePosixPath
 from pydantic import TypeAdapter
 
 from catalogs.documents import parse_json
-from flows.running.progress import watch_progress
+from flows.running.progress import Progress, watch_progress
 from flows.scheduled.metrics import format_metrics
 from flows.store.objects import Objects, is_address
 from flows.store.outputs import Outputs
@@ -98,12 +98,13 @@ class RecordPlace:
                 self._objects.write(self._name, content)
             self._files.write(self._metrics, format_metrics(asdict(record)))
 
-    def note_progress(self, title: str, done: int, total: int, name: str, failed: bool) -> None:
+    def note_progress(self, progress: Progress) -> None:
         """Take a finished clip into the record: a watcher for `flows.running.progress.watch_progress`."""
-        if title != CLIPS:
+        if progress.title != CLIPS:
             return
-        if failed:
-            self._record.failed.append(name)
+        if progress.failed:
+            self._record.failed.append(progress.name)
+        done, total = progress.done, progress.total
         self._record.to_make, self._record.made = total, done - len(self._record.failed)
         if done in (0, total) or time.monotonic() - self._written >= EVERY_S:
             self.write()

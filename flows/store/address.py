@@ -105,7 +105,7 @@ def open_for_reading(address: str | Path, wanted: Wanted = want_everything) -> L
         ]
         rest = [f"and {len(problems) - SHOWN} more"] if len(problems) > SHOWN else []
         raise InputError(
-            [f"{layout}/{problem}: musync repair makes it again" for problem in problems[:SHOWN]] + rest
+            [f"{layout}/{problem}: musync lab repair makes it again" for problem in problems[:SHOWN]] + rest
         )
     objects.fetch(["manifest.json"], layout.root)
     return layout

@@ -102,7 +102,7 @@ def check_array(read: ReadMetadata, name: str, place: object) -> tuple[int, ...]
     where = f"{place}/{name}/{METADATA}"
     content = read(f"{name}/{METADATA}")
     if content is None:
-        raise InputError(f"{where}: missing: musync repair makes it again")
+        raise InputError(f"{where}: missing: musync lab repair makes it again")
     metadata = parse_json(content, where, "array's metadata")
     array = arrays_of(labels=True)[name]
     if not isinstance(metadata, dict):
@@ -119,7 +119,7 @@ def check_array(read: ReadMetadata, name: str, place: object) -> tuple[int, ...]
 def _find_group_problems(read: ReadMetadata, members: Collection[str], place: object) -> list[str]:
     where, content = f"{place}/{METADATA}", read(METADATA)
     if content is None:
-        return [f"{where}: missing: musync repair makes it again"]
+        return [f"{where}: missing: musync lab repair makes it again"]
     try:
         metadata = parse_json(content, where, "group's metadata")
     except InputError as error:
@@ -133,7 +133,7 @@ def _find_group_problems(read: ReadMetadata, members: Collection[str], place: ob
     ):
         return [
             f"{where}: its copies of the arrays' metadata must be equal to these and hold nothing else; they differ:"
-            " musync repair makes it again"
+            " musync lab repair makes it again"
         ]
     return []
 

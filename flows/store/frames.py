@@ -145,7 +145,7 @@ def read_clip(path: Path, index: int, name: str, frames: Sequence[int] | None = 
         return np.concatenate([read_frames(path, name, shape, index, slice(f, f + 1)) for f in frames])
     except (ValueError, RuntimeError, OSError) as error:
         raise InputError(
-            f"{path}/{name}: clip {index} must be readable; {shorten(error)}: musync repair makes it again"
+            f"{path}/{name}: clip {index} must be readable; {shorten(error)}: musync lab repair makes it again"
         ) from None
 
 

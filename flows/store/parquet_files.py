@@ -14,7 +14,7 @@ CLIPS_PER_FILE = 100
 MOST_COLUMNS, LONGEST_NAME = 500, 200
 """Columns of a table that is read, and characters of a column's name [1]. muSync writes a tenth of the columns; DuckDB
 takes minutes for some thousands."""
-SEALED = "musync repair makes it again"
+SEALED = "musync lab repair makes it again"
 STAGED = "remove it, and the same musync generate command makes its clip again"
 CHECKED: Mapping[str, Any] = {"page_checksum_verification": True}
 """How pyarrow is to read Parquet: each page is held against the checksum that it was written with."""

@@ -35,6 +35,6 @@ class RecordedObjects(WrapperStore[ObjectStore[Any]]):
         found = await super().get(key, *arguments, **options)
         if found is None and key in self.recorded:
             raise InputError(
-                f"{self.address}/{key}: missing, with pictures of a clip: musync repair makes it again"
+                f"{self.address}/{key}: missing, with pictures of a clip: musync lab repair makes it again"
             )
         return found

@@ -98,7 +98,7 @@ def refuse_changed_files(layout: Layout, recorded: Mapping[str, str]) -> None:
         raise InputError(
             cap_problems(
                 [
-                    f"{layout}/{name}: must be as recorded; it is {how}: musync repair makes it again"
+                    f"{layout}/{name}: must be as recorded; it is {how}: musync lab repair makes it again"
                     for name, how in changed.items()
                 ]
             )

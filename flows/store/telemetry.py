@@ -220,7 +220,7 @@ def refuse_columns(
         "holds no row of clip": [clip_id] if clip_id is not None and not table.num_rows else [],
     }
     problems = [
-        f"{path}: {fault} {', '.join(names[:SHOWN_COLUMNS])}: musync repair makes the table again"
+        f"{path}: {fault} {', '.join(names[:SHOWN_COLUMNS])}: musync lab repair makes the table again"
         for fault, names in faults.items()
         if names
     ]
@@ -264,7 +264,7 @@ def read_columns(
     table = read_table(path, clip_id, [name for name in wanted if name in ESSENTIAL], most=most)
     if exact and len(table) != most:
         raise InputError(
-            f"{path}: must hold {most} rows of clip {clip_id}; it holds {len(table)}: musync repair makes the table"
+            f"{path}: must hold {most} rows of clip {clip_id}; it holds {len(table)}: musync lab repair makes the table"
             " again"
         )
     return take_columns(table, wanted)

@@ -168,8 +168,8 @@ def test_rows_and_files_of_clips_that_nobody_planned(copy):
     told = audited(copy, 0.0)["contradictions"]
     assert told == [
         f"manifest.json: {name} is recorded, and a file of no clip of the plan",
-        "telemetry/ticks/family=dry/part-0000.parquet: must have at most 2,002 rows; it has 2,005: musync repair makes"
-        " it again",
+        "telemetry/ticks/family=dry/part-0000.parquet: must have at most 2,002 rows; it has 2,005: musync lab repair"
+        " makes it again",
     ]
 
 

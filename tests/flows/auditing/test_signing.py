@@ -107,7 +107,11 @@ def test_the_commands_exit_codes_tell_a_failed_check_from_a_wrong_input(copy, ke
         return CliRunner().invoke(app, [*words]).exit_code
 
     data = str(copy.root)
-    assert code("sign", data, "--key", keys["owner"]) == code("verify", data, "--key", keys["owner.pub"]) == 0
+    assert (
+        code("lab", "sign", data, "--key", keys["owner"])
+        == code("verify", data, "--key", keys["owner.pub"])
+        == 0
+    )
     assert code("verify", data, "--key", keys["other.pub"]) == 1
 
 

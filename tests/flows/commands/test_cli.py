@@ -89,17 +89,17 @@ def test_a_folder_with_other_files_is_left_alone(musync, tmp_path):
 
 def test_describe_gives_a_row_a_clip_with_units_that_a_terminal_can_hold(musync, toy_dataset, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
-    shown = musync("describe", str(toy_dataset.root)).out.splitlines()
-    whole = json.loads(musync("describe", str(toy_dataset.root), "--json").out)["clips"]
+    shown = musync("lab", "describe", str(toy_dataset.root)).out.splitlines()
+    whole = json.loads(musync("lab", "describe", str(toy_dataset.root), "--json").out)["clips"]
     assert any("stop_m" in line and "peak_pitch_deg" in line for line in shown)
     for clip in whole:
         (line,) = [line for line in shown if clip["label"] in line]
         assert f"{degrees(clip['peak_pitch']):.5g}" in line
 
 
-@pytest.mark.parametrize("command", ["audit", "describe"])
+@pytest.mark.parametrize("command", ["audit", "lab describe"])
 def test_a_folder_that_is_no_dataset_is_refused(musync, tmp_path, command):
-    done = musync(command, str(tmp_path))
+    done = musync(*command.split(), str(tmp_path))
     assert done.code == 2
     assert "must be a finished dataset; it has no manifest.json: name another folder" in done.err
 

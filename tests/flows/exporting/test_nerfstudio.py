@@ -9,7 +9,7 @@ import pytest
 from catalogs.scenes.gaussian_files import read_gaussians
 from flows.making.catalogue import catalogue_of
 from flows.making.driving import hazard_of
-from flows.making.edited_scene import edit_scene
+from flows.making.pictures import edit_scene
 from flows.making.plan import read_plan
 from tests.flows.exporting.conftest import BRAKING, HUMP
 

@@ -201,7 +201,7 @@ def test_the_command_fails_and_names_what_could_not_be_tried(
     monkeypatch.setattr(judging_controls, "judge_clip", lambda view, facts: made[facts["clip_id"]])
     monkeypatch.setattr(judging_controls, "run_as_stage", lambda work: work)
     monkeypatch.setattr(judging_controls, "require_frames", lambda manifest, place: None)
-    arguments = ["controls", str(dataset), "--out", str(tmp_path / "out")]
+    arguments = ["lab", "controls", str(dataset), "--out", str(tmp_path / "out")]
     assert CliRunner().invoke(app, arguments).exit_code == 0
     monkeypatch.setattr(judging_controls, "LEAST_PITCH", 9.0)
     monkeypatch.setattr(judging_controls, "LEAST_WAY", 900.0)

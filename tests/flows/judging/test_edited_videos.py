@@ -1,4 +1,4 @@
-"""`musync judge-set` on videos: editors that move no car land where Appendix A.5 puts a car on a dry road."""
+"""`musync lab judge-set` on videos: editors that move no car land where Appendix A.5 puts a car on a dry road."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""`musync evaluate` end to end on a toy dataset: every figure is a number with its note, or says why not."""
+"""`musync lab evaluate` end to end on a toy dataset: every figure is a number with its note, or says why not."""
 
 import json
 import shutil

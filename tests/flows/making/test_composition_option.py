@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from catalogs.grids import load_grid
-from flows.making import clip, replay
+from flows.making import pictures, replay
 from flows.making.plan import freeze_grid
 from tasks.errors import InputError
 from tasks.render.clip import render_clip
@@ -41,6 +41,6 @@ def test_films_refract_in_the_papers_composition_alone(tmp_path, monkeypatch, co
         asked.append(conditions.refracts)
         return render_clip(scene, camera, motion, conditions, *args, **options)
 
-    monkeypatch.setattr(clip, "render_clip", render)
+    monkeypatch.setattr(pictures, "render_clip", render)
     replay.replay_audit(str(grid), seeds=2)
     assert set(asked) == {refracts}

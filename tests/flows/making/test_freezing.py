@@ -56,7 +56,7 @@ def test_a_frozen_run_that_ships_is_not_stale(name):
     if frozen["grid"] != frozen_settings(now.settings):
         stale.append(f"catalogs/grids/{name}.yaml is no longer the grid that was frozen")
     assert not stale, (
-        f"{name}: if this is meant, run `musync freeze {name}` and commit it: {'; '.join(stale[:5])}"
+        f"{name}: if this is meant, run `musync lab freeze {name}` and commit it: {'; '.join(stale[:5])}"
     )
 
 
@@ -105,7 +105,7 @@ def test_another_parameter_is_refused_with_its_value_and_what_to_do_and_nothing_
         reproduce_run(written(small, tmp_path), str(tmp_path / "data"))
     first, last = caught.value.problems[0], caught.value.problems[-1]
     assert "vehicle.yaml.cg_height.value is 0.6 in the manifest and 0.55 here" in first
-    assert "what to do" in last and "musync freeze" in last
+    assert "what to do" in last and "musync lab freeze" in last
     assert not (tmp_path / "data").exists()
 
 

@@ -9,8 +9,8 @@ import pytest
 from catalogs.entries import entry_names
 from catalogs.grids import load_grid
 from flows.making import replay
-from flows.making.clip import render_frames
 from flows.making.driving import simulate_drive
+from flows.making.pictures import render_frames
 from tasks.errors import InputError
 from tasks.render.sensor import Sensor
 from tests.toy_street import write_toy_grid

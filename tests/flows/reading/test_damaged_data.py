@@ -44,7 +44,7 @@ def test_a_clip_whose_pictures_are_missing_is_no_black_clip(dataset_copy, reader
     READ_PICTURES[reader](dataset_copy.root)
     shutil.rmtree(dataset_copy.root.with_name("out"), ignore_errors=True)
     dataset_copy.frame_shard("rgb", 0).unlink()
-    with pytest.raises(InputError, match=r"missing.* musync repair makes it again"):
+    with pytest.raises(InputError, match=r"missing.* musync lab repair makes it again"):
         READ_PICTURES[reader](dataset_copy.root)
 
 
@@ -111,7 +111,7 @@ def test_a_clip_that_lost_rows_is_not_read_as_a_shorter_one(dataset_copy):
     whole = sum(label == "dry/flat" for label in rows["label"].to_pylist())
     pq.write_table(rows.slice(3), path)
     with pytest.raises(
-        InputError, match=f"must hold {whole} rows of clip .*; it holds {whole - 3}: musync repair"
+        InputError, match=f"must hold {whole} rows of clip .*; it holds {whole - 3}: musync lab repair"
     ):
         explain_frame(str(dataset_copy.root), "dry/flat", 3)
 
@@ -145,5 +145,7 @@ def test_a_speed_or_a_picture_that_was_edited_by_hand_is_not_shown(dataset_copy,
     with pytest.raises(InputError) as told:
         show(str(dataset_copy.root))
     for edited in (path, shard):
-        line = f"{edited.relative_to(dataset_copy.root)}: must be as recorded; it is changed: musync repair"
+        line = (
+            f"{edited.relative_to(dataset_copy.root)}: must be as recorded; it is changed: musync lab repair"
+        )
         assert line in str(told.value)

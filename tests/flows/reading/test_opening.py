@@ -180,7 +180,7 @@ def test_a_column_that_is_asked_for_twice_is_told(data):
 def test_a_missing_table_is_told_with_what_to_do(toy_dataset, tmp_path):
     shutil.copytree(toy_dataset.root, tmp_path / "copy")
     (tmp_path / "copy" / "telemetry" / "pairs.parquet").unlink()
-    with pytest.raises(InputError, match="files of pairs are missing: musync repair"):
+    with pytest.raises(InputError, match="files of pairs are missing: musync lab repair"):
         query_dataset(str(tmp_path / "copy"), "SELECT 1")
 
 

@@ -49,7 +49,7 @@ def test_labels_that_differ_have_films_of_their_own_with_names_that_stay_in_the_
 
 def test_a_film_of_one_s_own_is_not_overwritten(toy_dataset, tmp_path):
     (tmp_path / "dry_flat.mp4").write_text("mine")
-    with pytest.raises(InputError, match=r"dry_flat\.mp4 is not a file that musync preview wrote"):
+    with pytest.raises(InputError, match=r"dry_flat\.mp4 is not a file that musync lab preview wrote"):
         make_films(str(toy_dataset.root), str(tmp_path))
     assert [path.name for path in tmp_path.iterdir()] == ["dry_flat.mp4"]
 

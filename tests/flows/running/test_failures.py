@@ -31,7 +31,7 @@ def end_of(monkeypatch, capsys, error: BaseException) -> tuple[int, str]:
         raise error
 
     monkeypatch.setattr("flows.reading.describe.describe_dataset", describe)
-    code = run_command(monkeypatch, "describe", "data")
+    code = run_command(monkeypatch, "lab", "describe", "data")
     printed = capsys.readouterr()
     assert "Traceback" not in printed.err and printed.out == ""
     return code, printed.err
@@ -107,7 +107,7 @@ def test_a_defect_ends_in_one_sentence_code_3_and_a_file_with_the_traceback(
     (file,) = (cache / "failures").iterdir()
     assert f"lies in {file}" in told
     assert "Traceback (most recent call last)" in file.read_text()
-    assert "['describe', 'data']" in file.read_text()
+    assert "['lab', 'describe', 'data']" in file.read_text()
     assert stat.S_IMODE(file.stat().st_mode) == 0o600
 
 
@@ -175,7 +175,7 @@ def test_without_a_home_the_cache_has_to_be_named_and_the_command_says_so(tmp_pa
 
 
 def test_a_wrong_option_is_code_2(monkeypatch, capsys):
-    assert run_command(monkeypatch, "describe", "--no-such-option") == 2
+    assert run_command(monkeypatch, "lab", "describe", "--no-such-option") == 2
 
 
 def piped(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
@@ -190,7 +190,7 @@ def piped(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
 
 def test_in_a_process_of_its_own_what_is_wrong_is_told_by_us_alone_a_sentence_each(tmp_path):
     (tmp_path / "no.mp4").write_bytes(b"\0\0\0\x18ftypmp42")
-    words = ["judge", "no.mp4", "--claim", "no.parquet", "--camera", "no.yaml"]
+    words = ["lab", "judge", "no.mp4", "--claim", "no.parquet", "--camera", "no.yaml"]
     done = subprocess.run(
         [sys.executable, "-m", "flows.cli", *words], capture_output=True, text=True, cwd=tmp_path,
         env=dict(os.environ) | {"PYTHONPATH": str(SOURCE_ROOT)}, timeout=60,
@@ -200,4 +200,4 @@ def test_in_a_process_of_its_own_what_is_wrong_is_told_by_us_alone_a_sentence_ea
 
 
 def test_a_reader_that_leaves_is_no_failure(tmp_path):
-    assert piped("schema", cwd=tmp_path).stderr == "0\n"
+    assert piped("lab", "schema", cwd=tmp_path).stderr == "0\n"

@@ -208,6 +208,16 @@ def test_verdicts_contact_sheet_and_a_link_to_the_dataset_are_artifacts(schedule
     )
 
 
+def test_the_fan_out_is_a_table_of_clips_with_the_time_of_each_step(scheduled):
+    kind, rows = scheduled["artifacts"]["musync-clips"]
+    table = json.loads(rows)
+    steps = [f"{step} [CPU-s]" for step in ("surface", "rollout", "frames", "check", "commit")]
+    assert kind == "table" and len({row["name"] for row in table}) == len(table) == 4
+    for row in table:
+        assert list(row) == ["name", "outcome", "check", *steps] and row["outcome"] == "done"
+        assert all(row[step] >= 0 for step in steps) and row["frames [CPU-s]"] > 0
+
+
 def test_a_run_has_rows_in_the_log_a_progress_and_a_name_that_says_what_it_is(runs, scheduled):
     stages = [
         f"stage {name} {word}"

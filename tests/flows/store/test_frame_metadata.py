@@ -152,5 +152,5 @@ def test_a_damaged_picture_is_told_with_what_to_do(copy):
     path.write_bytes(content)
     windows = musync.open(copy.root).torch(window=11, columns=[], quarantined=True)
     assert windows[0]["rgb"].shape == (11, 64, 96, 3)
-    with pytest.raises(InputError, match=r"clip 1: cannot be read.*musync repair"):
+    with pytest.raises(InputError, match=r"clip 1: cannot be read.*musync lab repair"):
         windows[1]

@@ -127,7 +127,7 @@ def test_one_flipped_bit_is_named_and_repaired_and_no_reader_gets_it(stored, mac
     objects.write(name, whole[:999] + bytes([whole[999] ^ 4]) + whole[1000:])
     found = verify_dataset(stored)
     assert [(row["path"], row["damage"]) for row in found["damaged"]] == [(name, "changed")]
-    with pytest.raises(InputError, match=r"part-0000.parquet: not the recorded bytes: musync repair"):
+    with pytest.raises(InputError, match=r"part-0000.parquet: not the recorded bytes: musync lab repair"):
         query_dataset(stored, "SELECT count(*) FROM ticks")
     assert repair_dataset(stored, runner="threads", workers=1)["restored"] == [name]
     assert objects.read(name) == whole and verify_dataset(stored)["verified"]

@@ -146,7 +146,10 @@ def with_nan(values):
 def test_bad_traces_are_one_sentence_and_exit_code_2(vehicle, make_traces, harm, sentence, tmp_path):
     folder = make_traces(vehicle, "paper", ("wet",))
     harm(folder)
-    for command in (["calibrate", str(folder), "--out", str(tmp_path / "out")], ["agreement", str(folder)]):
+    for command in (
+        ["vehicle", "calibrate", str(folder), "--out", str(tmp_path / "out")],
+        ["vehicle", "agreement", str(folder)],
+    ):
         result = CliRunner().invoke(app, command)
         assert isinstance(result.exception, InputError)
         assert any(sentence in problem for problem in result.exception.problems)

@@ -1,0 +1,127 @@
+"""The frames of a clip: where the rig is at each, and what its camera sees there."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catalogs.grids.form import TICK_RATE_HZ
+from catalogs.scenario import Scenario
+from flows.making.catalogue import Catalogue
+from flows.making.driving import hazard_of, weather_of
+from flows.making.plan import Plan, frame_ticks
+from tasks.render.camera import RigAt, body_poses, continuous_rig
+from tasks.render.clip import RigMotion, render_clip
+from tasks.render.kerb_face import extend_kerbs
+from tasks.render.rasterise.backend import select_backend
+from tasks.render.road_edit import RoadRelief, apply_road_profile
+from tasks.render.road_paint import HazardMarking, paint_feature
+from tasks.render.road_refinement import refine_road
+from tasks.render.weather.layers import ClipConditions
+from tasks.scene.gaussians import Gaussians
+from tasks.scene.scene import Scene
+from tasks.surface.anchors import adjacent_anchors
+from tasks.surface.road_profile import RoadHazard, road_elevation, road_slope
+from tasks.surface.state import SurfaceState
+from tasks.vehicle.rollout import Rollout
+
+
+def frame_rows(ride: Rollout, plan: Plan, catalogue: Catalogue) -> dict[str, NDArray[Any]]:
+    """The tick that each frame shows, and the rig pose at it."""
+    frame = np.arange(plan.settings.frames)
+    tick = frame_ticks(plan.settings.frames, plan.settings.frame_rate_hz)
+    rows = {"frame": frame, "tick": tick} | {name: column[tick] for name, column in ride.columns.items()}
+    vehicle = catalogue.vehicle
+    poses = body_poses(
+        catalogue.scene.route, rows["station"], rows["heave"], rows["pitch"],
+        cg_behind_front_axle=vehicle.cg_to_front_axle, cg_height=vehicle.cg_height,
+    )  # fmt: skip
+    return rows | {"T_world_rig": poses.reshape(len(frame), 16)}
+
+
+def rig_of(ride: Rollout, frames: Mapping[str, NDArray[Any]], catalogue: Catalogue) -> RigAt:
+    """Rig poses about every frame, for a camera that moves while it sees one."""
+    vehicle, tick_s = catalogue.vehicle, 1 / TICK_RATE_HZ
+    time_s = np.arange(len(ride.columns["station"]), dtype=np.float64) * tick_s
+    return continuous_rig(
+        catalogue.scene.route, time_s,
+        ride.columns["station"], ride.columns["heave"], ride.columns["pitch"], frames["tick"] * tick_s,
+        cg_behind_front_axle=vehicle.cg_to_front_axle, cg_height=vehicle.cg_height,
+    )  # fmt: skip
+
+
+def render_frames(
+    scenario: Scenario,
+    state: SurfaceState,
+    frames: Mapping[str, NDArray[Any]],
+    plan: Plan,
+    catalogue: Catalogue,
+    seed: int,
+    rig_at: RigAt,
+) -> dict[str, NDArray[Any]]:
+    """Render the clip's finished frames, depth and class."""
+    gaussians, relief = edit_scene(
+        catalogue.scene,
+        hazard_of(scenario),
+        catalogue.marking,
+        catalogue.weather_parameters.sky.asphalt_albedo,
+    )
+    return render_clip(
+        replace(catalogue.scene, gaussians=gaussians),
+        catalogue.camera,
+        RigMotion(
+            T_world_rig=frames["T_world_rig"].reshape(-1, 4, 4),
+            frame_rate_hz=plan.settings.frame_rate_hz,
+            rig_at=rig_at,
+        ),
+        ClipConditions(
+            state=state,
+            pavement=catalogue.surface,
+            parameters=catalogue.weather_parameters,
+            seed=seed,
+            anchors=_anchors_of(scenario, plan, catalogue),
+            refracts=plan.settings.composition == "paper",
+        ),
+        select_backend(plan.backend),
+        relief=relief,
+        labels=plan.settings.labels,
+        composition=plan.settings.composition,
+    )
+
+
+def edit_scene(
+    scene: Scene, hazard: RoadHazard, marking: HazardMarking | None, asphalt_albedo: float
+) -> tuple[Gaussians, RoadRelief | None]:
+    """Return the Gaussians with a road feature, and the feature as the renderer takes it; None on a flat road.
+
+    Parameters
+    ----------
+    scene : without the feature
+    hazard : road feature; height 0 leaves the scene as it is
+    marking : painted on a hump; None leaves it plain
+    asphalt_albedo : share of the light that the pavement sends back [1]
+    """
+    if hazard.height_m == 0:
+        return scene.gaussians, None
+    relief = RoadRelief(
+        route=scene.route,
+        elevation=lambda station: road_elevation(station, hazard),
+        slope=lambda station: road_slope(station, hazard),
+        near=hazard.center_m - hazard.length_m / 2,
+        far=hazard.center_m + hazard.length_m / 2,
+    )
+    carriageway = scene.carriageway_left, scene.carriageway_right
+    gaussians = refine_road(scene.gaussians, relief)
+    if marking is not None and hazard.height_m > 0:
+        gaussians = paint_feature(gaussians, relief, marking, *carriageway, asphalt_albedo)
+    return extend_kerbs(apply_road_profile(gaussians, relief, *carriageway)[0], relief), relief
+
+
+def _anchors_of(scenario: Scenario, plan: Plan, catalogue: Catalogue) -> tuple[SurfaceState, ...]:
+    """Return the anchors about the clip's rate that the paper's composition blends."""
+    look = catalogue.weather_parameters.find_look(scenario.weather)
+    if plan.settings.composition != "paper" or look is None or look.anchors_mm_h is None:
+        return ()
+    return adjacent_anchors(weather_of(scenario), look.anchors_mm_h, catalogue.surface)
