@@ -1,4 +1,4 @@
-"""Numbers behind the figures of a verdict: residuals, deceleration by pressure, splines, numbers that are alike."""
+"""Numbers behind the figures of a verdict: residuals, deceleration by pressure, splines."""
 
 import re
 from collections.abc import Sequence
@@ -14,9 +14,7 @@ from tasks.identification.decision.forms import KNOTS, find_scanned_ranges
 from tasks.identification.decision.odds import Explanation, weigh_explanation
 from tasks.identification.decision.verdict import Outcome
 from tasks.identification.inference.quantiles import NORMAL_QUANTILE
-from tasks.identification.joint.fit import JointFit
-from tasks.identification.joint.numbers import SMOOTHED
-from tasks.identification.joint.words import find_separating_run
+from tasks.identification.inference.tyre_limit import SMOOTHED
 from tasks.vehicle.effects.ports import PORT_UNITS, VARIABLE_UNITS, format_unit
 
 BINS = 14
@@ -25,8 +23,6 @@ FEWEST_SAMPLES = 5
 """Samples from which a part of the range has a median and a band."""
 STANDING = 1.0
 """Speed below which a deceleration says nothing of the brake [m/s]."""
-ALIKE = 0.9
-"""Correlation from which two numbers stand in for each other [1]."""
 DIGITS = 5
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 LEAST_GAIN = 0.1
@@ -134,29 +130,6 @@ def _make_band(explanation: Explanation, form: Candidate) -> dict[str, list[floa
     places = explanation.find_places(form)
     values, reach = explanation.values[places], NORMAL_QUANTILE * explanation.errors[places]
     return {"values": _plain(values), "low": _plain(values - reach), "high": _plain(values + reach)}
-
-
-def find_alike_numbers(fitted: JointFit) -> list[dict[str, Any]]:
-    """Return pairs of fitted numbers that stand in for each other, the most alike first, with what tells them apart.
-
-    Parameters
-    ----------
-    fitted : the fit
-    """
-    inverse = np.linalg.inv(fitted.information)
-    sigma = np.sqrt(np.diag(inverse))
-    correlation = inverse / np.outer(sigma, sigma)
-    pairs = [
-        {
-            "names": (a.name, b.name),
-            "correlation": float(correlation[i, j]),
-            "separate": find_separating_run((a, b)),
-        }
-        for i, a in enumerate(fitted.numbers)
-        for j, b in enumerate(fitted.numbers[:i])
-        if abs(correlation[i, j]) > ALIKE
-    ]
-    return sorted(pairs, key=lambda pair: -abs(pair["correlation"]))
 
 
 def format_plain_unit(unit: str) -> str:

@@ -11,7 +11,6 @@ from flows.measured.closing_error_rates import tell_error_rates
 from flows.measured.friction_pulls import find_pulled_runs
 from flows.measured.residuals import predict_runs
 from flows.measured.verdict_figures import (
-    find_alike_numbers,
     format_plain_unit,
     make_brake_curve,
     make_residual_figures,
@@ -20,8 +19,6 @@ from flows.measured.verdict_figures import (
 from flows.pages import DATASET_PAGE, make_policy, read_plotly
 from tasks.campaign.campaign import Campaign
 from tasks.identification.decision.verdict import Outcome
-from tasks.identification.joint.verdict import JointOutcome
-from tasks.identification.joint.words import find_separating_run
 from tasks.vehicle.effects.library import Effect
 
 PAGE = Path(__file__).parent / "verdict_page"
@@ -38,7 +35,7 @@ MISSED = "what is missing cannot be named"
 """Meaning of NOTHING where the runs disagree with the model by more than their noise."""
 
 
-def write_verdict_page(outcome: Outcome | JointOutcome, result: Mapping[str, Any], campaign: Campaign) -> str:
+def write_verdict_page(outcome: Outcome, result: Mapping[str, Any], campaign: Campaign) -> str:
     """Return the page.
 
     Scripts run by their hashes alone: one that got in with a name of the campaign would not, and nothing is fetched.
@@ -55,24 +52,15 @@ def write_verdict_page(outcome: Outcome | JointOutcome, result: Mapping[str, Any
     style = "\n".join(sheet.read_text() for sheet in (DATASET_PAGE / "report.css", PAGE / "page.css"))
     train, held_out = predict_runs(outcome)
     figures = {"runs": make_residual_figures(held_out), "curve": make_brake_curve(train)}
-    told: dict[str, Any] = {"separate": [None] * len(result["rivals"])}
-    template = "joint_fit.html"
-    if isinstance(outcome, JointOutcome):
-        told = {"separate": _find_separations(outcome), "alike": find_alike_numbers(outcome.fitted)}
-    else:
-        template = "explanations.html"
-        figures |= make_spline_figures(outcome) | {"correlation": result["residual_input_correlation"]}
-        told |= {
-            "tried": outcome.verdict.tried,
-            "detectable": [
-                (e.name, e.parameters[0], result["minimum_detectable"].get(e.name))
-                for e in _list_effects(outcome)
-            ],
-            "error_rates": tell_error_rates([effect["name"] for effect in result["effects"]]),
-        }
-    return pages.get_template(template).render(
+    figures |= make_spline_figures(outcome) | {"correlation": result["residual_input_correlation"]}
+    detectable = [
+        (e.name, e.parameters[0], result["minimum_detectable"].get(e.name)) for e in _list_effects(outcome)
+    ]
+    return pages.get_template("verdict.html").render(
         campaign=campaign, result=result, meaning=_tell_meaning(result), steps=find_next_steps(result, campaign),
-        figures=figures, style=style, scripts=scripts, policy=make_policy(scripts=scripts), **told,
+        figures=figures, style=style, scripts=scripts, policy=make_policy(scripts=scripts),
+        tried=outcome.verdict.tried, detectable=detectable,
+        error_rates=tell_error_rates([effect["name"] for effect in result["effects"]]),
     )  # fmt: skip
 
 
@@ -126,16 +114,6 @@ def find_next_steps(result: Mapping[str, Any], campaign: Campaign) -> list[tuple
 def _tell_meaning(result: Mapping[str, Any]) -> str:
     missed = result["verdict"] == "NOTHING" and result["disagreement"]
     return MISSED if missed else MEANING[result["verdict"]]
-
-
-def _find_separations(outcome: JointOutcome) -> list[str | None]:
-    """Return the run that tells each rival from what is named, in the order of the rivals."""
-    fits = (outcome.fitted, *(substitute.fitted for substitute in outcome.substitutes))
-    numbers = {n.effect.name: n for fitted in fits for n in fitted.numbers}
-    return [
-        find_separating_run([numbers[name] for name in (of, rival.name) if name in numbers])
-        for of, rival in outcome.verdict.rivals
-    ]
 
 
 def _list_effects(outcome: Outcome) -> list[Effect]:

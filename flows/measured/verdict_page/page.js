@@ -7,8 +7,8 @@ const PANEL_PX = 150;
 const PRESSURE_PX = 84;
 const HEAD_PX = 20;
 const MARGIN = { l: 52, r: 12, t: 4, b: 40 };
-const DASHES = { frozen: "dot", retuned: "dash", after: "solid" };
-const NAMES = { frozen: "frozen", retuned: "re-tuned", after: "after" };
+const DASHES = { frozen: "dot", after: "solid" };
+const NAMES = { frozen: "frozen", after: "after" };
 const KEYS = { "+": "in", "=": "in", "-": "out", "_": "out", ArrowLeft: "left", ArrowRight: "right", 0: "whole", Home: "whole" };
 const CONFIG = { responsive: true, displaylogo: false, displayModeBar: false, doubleClick: "reset", scrollZoom: false };
 const touched = matchMedia("(pointer: coarse)");
@@ -22,7 +22,7 @@ function colours() {
   const of = (name) => style.getPropertyValue(name).trim();
   return {
     ink: of("--ink"), soft: of("--soft"), line: of("--line"), card: of("--card"),
-    frozen: of("--none"), retuned: of("--b"), after: of("--a"), measured: of("--ink"),
+    frozen: of("--none"), after: of("--a"), measured: of("--ink"),
   };
 }
 

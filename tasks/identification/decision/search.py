@@ -6,8 +6,15 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.campaign import SESSION, Campaign
-from tasks.identification.decision.candidates import Candidate, Columns, can_show, list_columns, tell_limit
+from tasks.campaign.campaign import FILE_NUMBERS, SESSION, Campaign
+from tasks.identification.decision.candidates import (
+    Candidate,
+    Columns,
+    can_show,
+    list_columns,
+    tell_curve,
+    tell_limit,
+)
 from tasks.identification.decision.forms import (
     KNOTS,
     RIDGE,
@@ -17,6 +24,7 @@ from tasks.identification.decision.forms import (
     rewhiten_splines,
 )
 from tasks.identification.decision.odds import (
+    FEWEST,
     Explanation,
     RunGrams,
     compare_explanations,
@@ -36,6 +44,7 @@ from tasks.identification.inference.linearisation import (
     prepare_evidence,
     rescale_disturbances,
 )
+from tasks.identification.inference.start import GAIN, GRIP, estimate_session, is_grip_free
 from tasks.identification.rules import DecisionRules
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import Effect
@@ -104,10 +113,14 @@ def find_explanations(
     rules : of the decision
     """
     models = [prepare_run(run, vehicle, surface) for run in campaign.train]
+    gain = float(estimate_session(campaign, models, rules)[GAIN])
     shown = [
         effect
         for effect in library
-        if can_show(effect, vehicle, campaign.channels) and tell_limit(effect, models, rules.joint)
+        if can_show(effect, vehicle, campaign.channels)
+        and not (effect.parameters[0].name == GRIP and is_grip_free(campaign))
+        and tell_limit(effect, models, gain, rules)
+        and tell_curve(effect, models)
     ]
     retuned = [effect for effect in shown if effect.parameters[0].name in SESSION]
     numbers = tuple(effect for effect in shown if effect.parameters[0].name not in SESSION)
@@ -121,7 +134,8 @@ def find_explanations(
     first = _refine_first(search_explanations(grams, most=1, width=1, spread=False, forms=False), place, null)
     if first is not None:
         place = _move_to(first, place, null, settle=True)
-    for forms in (False, True):
+    # the shape of a form is not told by a run or two
+    for forms in (False, True) if len(models) >= FEWEST else (False,):
         place, grams, found = _settle_explanation(place, null, columns, rules, forms=forms)
     return Finding(
         evidence=place.evidence, null=null, fitted=place.fitted, grams=grams, explanations=tuple(found)
@@ -215,7 +229,7 @@ def _find_centre(fitted: Fit, columns: Columns) -> NDArray[np.float64]:
             own = [c.columns[0] for c in columns.candidates if part.names[0] == _name_number(c)][:1]
             centre[own] = fitted.values[at]
         at += len(part.names)
-    centre[-len(SESSION) :] = fitted.session
+    centre[-len(FILE_NUMBERS) :] = fitted.session
     return centre
 
 
@@ -271,12 +285,12 @@ def _find_second(name: str, fitted: Fit) -> float:
 
 
 def widen_session(explanation: Explanation, sigma: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the session's prior sigmas, with the slab where an explanation names one of its numbers, float64 [7].
+    """Return the session's prior sigmas, with the slab where an explanation names one of its numbers, float64 [8].
 
     Parameters
     ----------
     explanation : its members
-    sigma : float64 [7] tolerances
+    sigma : float64 [8] tolerances
     """
     wide = sigma.copy()
     for member in explanation.members:

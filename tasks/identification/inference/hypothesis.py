@@ -101,7 +101,7 @@ def compose_parameters(
     ----------
     parts : hypotheses, in the order of the parameters
     values : float64 [K] their parameters [their units]
-    session : float64 [7] session nuisances
+    session : float64 [8] session nuisances
     """
     theta = np.zeros(len(EFFECT_TABLE))
     theta[list(SESSION_INDEX)] += session

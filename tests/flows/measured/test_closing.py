@@ -146,7 +146,8 @@ def test_runs_that_grip_less_than_the_mapping_says_are_told_beside_the_verdict(
         told["reasons"][0] == "because"
         and "(3.0% each): run-2 by -3.8 and run-3 by +2.6;" in told["reasons"][1]
     )
-    assert tell_friction_pulls({"verdict": kind}, 0.03) == {"verdict": kind}
+    gripping = {"verdict": kind, "friction_pulls_sigma": {"run-1": 2.4}}
+    assert tell_friction_pulls(gripping, 0.03) == gripping
 
 
 def test_a_lag_leaves_a_residual_that_goes_with_the_pressure_until_it_is_named(closed: Path) -> None:
@@ -253,7 +254,7 @@ def test_a_call_that_ends_before_it_has_a_result_has_read_nothing(
         raise MemoryError
 
     monkeypatch.setenv("MUSYNC_LEDGER", str(tmp_path / "ledger.jsonl"))
-    monkeypatch.setattr(closing, "judge_campaign", give_up)
+    monkeypatch.setattr(closing, "judge_runs", give_up)
     with pytest.raises(MemoryError):
         close_loop(str(lagging), out=str(tmp_path / "out"))
     assert not (tmp_path / "ledger.jsonl").exists()
