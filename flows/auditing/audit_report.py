@@ -159,7 +159,7 @@ def write_audit_page(result: Mapping[str, Any]) -> str:
             Section(title="To check this report", parts=_list_commands(result)),
         ],
         above=result["not_checked"],
-        lead=f"Audit of {result['grid']}, {result['ended_utc']}",
+        lead=[f"Audit of {result['grid']}, {result['ended_utc']}"],
         tone="good" if result["verified"] else "bad",
     )
 

@@ -96,10 +96,10 @@ def render_page(
                 Table(title=name, rows=_list_figures(rows, name), note=describe_metric(name)) for name in names
             ]),
         ],
-        lead=f"{len(clips)} clips; pictures: {codec}. Smoothing acts on the estimate alone, so even a perfect pose"
+        lead=[f"{len(clips)} clips; pictures: {codec}. Smoothing acts on the estimate alone, so even a perfect pose"
         " scores its floor: read no figure without it. Window 0 is none. The paper's figures come from VGGT on other"
         " videos, and those of e_weather and e_geometry are against CarSim, which only the rows that end in"
-        " _reference ask too.",
+        " _reference ask too."],
     )  # fmt: skip
 
 

@@ -119,9 +119,9 @@ def _write_page(result: dict[str, Any], figures: list[Figure]) -> str:
             Section(title="Rules, and how many events break each",
                     parts=[Table(rows=result["attrition"])]),
         ],
-        lead=f"The paper's Appendix C.5: of {result['candidates']} candidate events in {result['drives']} drives"
+        lead=[f"The paper's Appendix C.5: of {result['candidates']} candidate events in {result['drives']} drives"
         f" {result['retained']} keep all rules. Each drive is predicted from a calibration on the others."
-        f" {result.get('note', '')}",
+        f" {result.get('note', '')}"],
     )  # fmt: skip
 
 

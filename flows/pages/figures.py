@@ -71,7 +71,10 @@ class Panel:
         """Return the range of the vertical axis; None where it follows from the lines."""
         if self.least is None:
             return None
-        values = np.concatenate([np.asarray(line.y, float) for line in self.lines] or [np.zeros(1)])
+        shown = (
+            values for line in self.lines for values in (line.y, line.low, line.high) if values is not None
+        )
+        values = np.concatenate([np.asarray(each, float) for each in shown])
         known = values[np.isfinite(values)]
         return min(1.1 * known.min(initial=0.0), -self.least), max(1.1 * known.max(initial=0.0), self.least)
 
@@ -123,30 +126,32 @@ def read_colours() -> dict[str, str]:
 
 
 def as_plotly(figure: Figure, digits: int | None = DIGITS) -> dict[str, Any]:
-    """Return a figure's ``data`` and ``layout`` for Plotly, and how its panels stand.
-
-    Names are text in it, although Plotly reads markup. Colours are variables of the style sheet, ``var(--a)``.
+    """Return a figure's ``data`` and ``layout`` for Plotly, in the light colours; names are text, not markup.
 
     Parameters
     ----------
     figure : to draw
     digits : to which numbers are rounded, as JSON can hold them; None leaves arrays as they are
     """
-    data: list[dict[str, Any]] = []
-    layout: dict[str, Any] = {"annotations": [], "shapes": []}
     first, stacked = figure.key, figure.linked and figure.columns == 1
+    data: list[dict[str, Any]] = []
+    columns = min(figure.columns, len(figure.panels))
+    rows = -(-len(figure.panels) // columns)
+    gap = (STACKED_GAP_PX if stacked else GAP_PX) / figure.panel_px
+    layout: dict[str, Any] = {
+        "annotations": [], "shapes": [], "height": rows * figure.panel_px, "hovermode": "x unified",
+        "grid": {"rows": rows, "columns": columns, "pattern": "independent", "ygap": gap},
+    }  # fmt: skip
     for k, panel in enumerate(figure.panels):
         place = "" if k == 0 else str(k + 1)
         axes = {"xaxis": f"x{place}", "yaxis": f"y{place}"}
         for line in panel.lines:
             *band, drawn = _draw_line(line, digits)
             data += [*(edge | axes for edge in band), drawn | axes | {"showlegend": line in first}]
-        axis: dict[str, Any] = {"title": {"text": _as_text(panel.x)}}
-        if figure.linked and k:
-            axis["matches"] = "x"
-        if stacked and k + 1 < len(figure.panels):
-            axis |= {"title": {"text": ""}, "showticklabels": False}
-        layout[f"xaxis{place}"] = axis
+        is_last = k + 1 == len(figure.panels)
+        layout[f"xaxis{place}"] = {"title": {"text": "" if stacked and not is_last else _as_text(panel.x)}}
+        layout[f"xaxis{place}"] |= {"matches": "x"} if figure.linked and k else {}
+        layout[f"xaxis{place}"] |= {"showticklabels": False} if stacked and not is_last else {}
         layout[f"yaxis{place}"] = {"title": {"text": _as_text(panel.y)}}
         if (found := panel.find_range()) is not None:
             layout[f"yaxis{place}"]["range"] = found
@@ -156,64 +161,26 @@ def as_plotly(figure: Figure, digits: int | None = DIGITS) -> dict[str, Any]:
         })  # fmt: skip
         layout["shapes"] += [
             {"type": "rect", "xref": f"x{place}", "yref": f"y{place} domain", "x0": start, "x1": end, "y0": 0, "y1": 1,
-             "fillcolor": "var(--soft)", "opacity": 0.15, "line": {"width": 0}, "layer": "below"}
+             "fillcolor": read_colours()["soft-band"], "line": {"width": 0}, "layer": "below"}
             for start, end in panel.shaded
         ]  # fmt: skip
-    shape = {
-        "panels": len(figure.panels), "columns": figure.columns, "panel_px": figure.panel_px,
-        "gap_px": STACKED_GAP_PX if stacked else GAP_PX,
-    }  # fmt: skip
-    return {"data": data, "layout": layout} | shape
-
-
-def as_notebook(figure: Figure) -> Any:
-    """Return a figure as ``plotly.graph_objects.Figure``, in the light colours and in full precision.
-
-    Parameters
-    ----------
-    figure : of one column
-    """
-    # its import takes half a second, which other questions need not pay
-    import plotly.graph_objects as go
-
-    drawn, rows = as_plotly(figure, digits=None), len(figure.panels)
-    shown = go.Figure(_paint({"data": drawn["data"], "layout": drawn["layout"]}))
-    grid = {"rows": rows, "columns": 1, "pattern": "independent", "ygap": drawn["gap_px"] / drawn["panel_px"]}
-    shown.update_layout(
-        grid=grid, height=rows * figure.panel_px, title_text=_as_text(figure.caption), hovermode="x unified"
-    )
-    return shown
-
-
-def _paint(value: Any) -> Any:
-    """Return a part of a figure with each variable of the style sheet replaced by its light colour."""
-    if isinstance(value, list):
-        return [_paint(item) for item in value]
-    if not isinstance(value, dict):
-        return value
-    return {
-        key: read_colours()[item[6:-1]] if key.endswith("color") else _paint(item)
-        for key, item in value.items()
-    }
+    return {"data": data, "layout": layout}
 
 
 def _draw_line(line: Line, digits: int | None) -> list[dict[str, Any]]:
-    colour = f"var(--{line.colour})"
+    """Return the edges of a line's band, and the line."""
+    colour, filled = (read_colours()[name] for name in (line.colour, f"{line.colour}-band"))
     x, y, low, high = (_plain(values, digits) for values in (line.x, line.y, line.low, line.high))
     base = {"type": "scatter", "x": x, "legendgroup": line.name}
-    edge = base | {
-        "mode": "lines",
-        "line": {"width": 0, "color": colour},
-        "hoverinfo": "skip",
-        "showlegend": False,
-    }
-    filled = edge | {"y": high, "fill": "tonexty", "fillcolor": f"var(--{line.colour}-band)"}
+    edge = base | {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip", "showlegend": False}
     drawn = base | {
         "mode": {None: "markers", False: "lines", True: "lines+markers"}[line.marked], "name": _as_text(line.name),
         "y": y, "hovertemplate": "%{y:.3g}", "line": {"color": colour, "width": 1.6, "dash": line.dash},
         "marker": {"size": 5, "color": colour},
     }  # fmt: skip
-    return [drawn] if low is None else [edge | {"y": low}, filled, drawn]
+    if low is None:
+        return [drawn]
+    return [edge | {"y": low}, edge | {"y": high, "fill": "tonexty", "fillcolor": filled}, drawn]
 
 
 def _as_text(text: str) -> str:

@@ -10,41 +10,42 @@ const dark = matchMedia("(prefers-color-scheme: dark)");
 const touched = matchMedia("(pointer: coarse)");
 const hidden = new Set();
 
-/** A value of a figure, each colour "var(--name)" in it that of the style sheet. */
-function paint(value) {
-  const style = getComputedStyle(document.documentElement);
-  return JSON.parse(JSON.stringify(value), (key, text) => {
-    const name = key.endsWith("color") && /^var\((--[\w-]+)\)$/.exec(text);
-    return name ? style.getPropertyValue(name[1]).trim() : text;
-  });
-}
+/** The style sheet's colour of a name. */
+const colourOf = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+/** Names of the style sheet's colours by their light value, in which figures come. */
+const NAMES = Object.fromEntries(
+  [...document.styleSheets[0].cssRules[0].style].map((name) => [document.styleSheets[0].cssRules[0].style.getPropertyValue(name).trim(), name]));
+
+/** A part of a figure in the colours of the page. */
+const paint = (value) => JSON.parse(JSON.stringify(value), (key, shown) =>
+  (key.endsWith("color") && (NAMES[shown] || shown.startsWith("--")) ? colourOf(NAMES[shown] ?? shown) : shown));
 
 const STYLE = {
-  margin: { l: 56, r: 12, t: 26, b: 40 }, showlegend: false, hovermode: "x unified",
-  paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { family: "system-ui, sans-serif", size: 11, color: "var(--soft)" },
-  hoverlabel: { bgcolor: "var(--card)", bordercolor: "var(--line)", font: { color: "var(--ink)" } },
+  margin: { l: 56, r: 12, t: 26, b: 40 }, showlegend: false,
+  paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { family: "system-ui, sans-serif", size: 11, color: "--soft" },
+  hoverlabel: { bgcolor: "--card", bordercolor: "--line", font: { color: "--ink" } },
   template: { layout: {
-    annotationdefaults: { font: { size: 12, color: "var(--ink)" } },
-    xaxis: { gridcolor: "var(--line)", zeroline: false, title: { standoff: 5 }, hoverformat: ".2f" },
-    yaxis: { gridcolor: "var(--line)", zerolinecolor: "var(--soft)", zerolinewidth: 1, nticks: 6, fixedrange: true, title: { standoff: 5 } },
+    annotationdefaults: { font: { size: 12, color: "--ink" } },
+    xaxis: { gridcolor: "--line", zeroline: false, title: { standoff: 5 }, hoverformat: ".2f" },
+    yaxis: { gridcolor: "--line", zerolinecolor: "--soft", zerolinewidth: 1, nticks: 6, fixedrange: true, title: { standoff: 5 } },
   } },
 };
 
-const across = (plot) => Math.max(1, Math.min(plot.drawn.columns, Math.floor(plot.clientWidth / LEAST_PX)));
+const across = (plot) => Math.max(1, Math.min(plot.drawn.layout.grid.columns, Math.floor(plot.clientWidth / LEAST_PX)));
 const axesOf = (plot) => Object.keys(plot.drawn.layout).filter((name) => name.startsWith("xaxis"));
 
 /** Draw plot.drawn, a figure of the page writer, with plot.own layout and plot.config; again, it keeps what is zoomed to. */
 function draw(plot) {
-  const { data, layout, panels, panel_px, gap_px } = plot.drawn;
-  const columns = across(plot), rows = Math.ceil(panels / columns);
-  const grid = {
-    rows, columns, pattern: "independent", ygap: gap_px / panel_px, xgap: (GAP_PX * columns) / plot.clientWidth,
-  };
-  const ranges = plot.whole ? Object.fromEntries(axesOf(plot).map((name) => [name, { ...layout[name], range: [...plot.layout[name].range] }])) : {};
+  const { data, layout } = plot.drawn;
+  const columns = across(plot), rows = Math.ceil(axesOf(plot).length / columns);
+  const grid = { ...layout.grid, rows, columns, xgap: (GAP_PX * columns) / plot.clientWidth };
+  const height = (layout.height / layout.grid.rows) * rows + STYLE.margin.b;
+  const ranges = plot.whole ? Object.fromEntries(axesOf(plot).map((name) => [name, { ...layout[name], range: [...plot._fullLayout[name].range] }])) : {};
   Plotly.react(plot,
     data.map(({ x, y, ...look }) => ({ ...paint(look), x, y, visible: !hidden.has(look.legendgroup) })),
     // a finger scrolls the page; it zooms by the buttons
-    paint({ ...STYLE, dragmode: touched.matches ? false : "zoom", ...layout, ...ranges, grid, height: rows * panel_px + STYLE.margin.b, ...plot.own }),
+    paint({ ...STYLE, dragmode: touched.matches ? false : "zoom", ...layout, ...ranges, grid, height, ...plot.own }),
     { ...CONFIG, ...plot.config });
   plot.across = columns;
   plot.whole ??= Object.fromEntries(axesOf(plot).map((name) => [name, plot._fullLayout[name].range.map(Number)]));
@@ -53,7 +54,7 @@ function draw(plot) {
 /** Zoom or move along the horizontal axes, never beyond the whole. */
 function act(plot, what) {
   const ranges = axesOf(plot).map((name) => {
-    const [from, to] = plot.layout[name].range.map(Number);
+    const [from, to] = plot._fullLayout[name].range.map(Number);
     const [first, last] = plot.whole[name];
     const factor = { in: 0.5, out: 2 }[what] ?? 1;
     const width = what === "whole" ? last - first : Math.min((to - from) * factor, last - first);

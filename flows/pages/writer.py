@@ -111,7 +111,13 @@ class Section:
 
 
 def write_page(
-    title: str, heading: str, sections: Sequence[Section], *, lead: str = "", above: str = "", tone: str = ""
+    title: str,
+    heading: str,
+    sections: Sequence[Section],
+    *,
+    lead: Sequence[str] = (),
+    above: str = "",
+    tone: str = "",
 ) -> str:
     """Return a page in one file.
 
@@ -123,7 +129,8 @@ def write_page(
     title : of the window
     heading : what the page is about or says
     sections : those without parts are left out
-    lead, above : sentences below and above the heading
+    lead : paragraphs below the heading
+    above : sentence above it
     tone : ``good`` or ``bad`` for a heading that is a verdict
     """
     has_figures = any(isinstance(part, Figure) for section in sections for part in section.parts)

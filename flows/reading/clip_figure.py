@@ -1,10 +1,11 @@
 """A clip's speed, slip, wheel load and pitch over time as a figure to look at in a notebook."""
 
+from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flows.pages.figures import Figure, Line, Panel, as_notebook
+from flows.pages.figures import Figure, Line, Panel, as_plotly
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,6 +32,8 @@ def draw_clip(label: str, ticks: "pd.DataFrame") -> "go.Figure":
     label : of the clip
     ticks : its `COLUMNS`, a row a tick
     """
+    import plotly.graph_objects as go  # it takes half a second, which other questions need not pay
+
     seconds = ticks["t_ns"].to_numpy() * 1e-9
     braking = seconds[np.flatnonzero(ticks["brake_pressure_mpa"].to_numpy() > 0)]
     panels = [
@@ -44,4 +47,5 @@ def draw_clip(label: str, ticks: "pd.DataFrame") -> "go.Figure":
         )
         for title, factor, lines in _PANELS
     ]
-    return as_notebook(Figure(caption=label, panels=panels, linked=True, panel_px=180))
+    drawn = as_plotly(Figure(caption=label, panels=panels, linked=True, panel_px=180), digits=None)
+    return go.Figure(**drawn).update_layout(title_text=escape(label, quote=False))

@@ -109,7 +109,7 @@ def make_report(dataset: str, *, out: str | None = None, clips: list[str] | None
 def _write_index(manifest: Mapping[str, Any], scripts: Sequence[str]) -> str:
     name = manifest["grid"]["name"]
     return fill_template(
-        "explorer.html", folder=PAGE, title=f"{name} – muSync report", heading=name, lead=_summarise_run(manifest),
+        "explorer.html", folder=PAGE, title=f"{name} – muSync report", heading=name, lead=[_summarise_run(manifest)],
         above="", tone="", policy="", style=STYLE_SHEET.read_text(), scripts=scripts, filters=FILTERS,
         run=_list_manifest_facts(manifest),
     )  # fmt: skip

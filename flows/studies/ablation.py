@@ -92,8 +92,8 @@ def run_ablation(
                 Table(title="Against the reference", rows=[reference]), Table(title=study.pitch.name, rows=pitch),
             ]),
         ],
-        lead=f"The paper's Section 4.4 with {vehicle}, {chosen} mode: one coupling is cut at a time. The reference is"
-        " an independent simulator's pitch, where traces were given.",
+        lead=[f"The paper's Section 4.4 with {vehicle}, {chosen} mode: one coupling is cut at a time. The reference is"
+        " an independent simulator's pitch, where traces were given."],
     )  # fmt: skip
     results.write("ablation.html", page)
     return result

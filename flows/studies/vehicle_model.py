@@ -56,8 +56,10 @@ def run_sensitivity(*, out: str | None = None) -> dict[str, Any]:
             Section(title="Bands", parts=[figure]),
             Section(title="Beside the printed figures", parts=[Table(rows=result["beside_print"])]),
         ],
-        lead="The paper's Appendix E: the numbers of the surface mapping are drawn within their bounds, and every draw"
-        " is driven to the stop. Printed figures agree if they are met to their last digit.",
+        lead=[
+            "The paper's Appendix E: the numbers of the surface mapping are drawn within their bounds, and every draw"
+            " is driven to the stop. Printed figures agree if they are met to their last digit."
+        ],
     )
     results.write("sensitivity.html", page)
     return result
@@ -169,9 +171,9 @@ def _write_agreement_page(result: Mapping[str, Any], figures: Sequence[Figure]) 
             ]),
             Section(title="Trajectories", parts=figures),
         ],
-        lead=f"Vehicle {result['vehicle']}, {result['mode']} mode, by the paper's Appendix A.2: on the reference's own"
+        lead=[f"Vehicle {result['vehicle']}, {result['mode']} mode, by the paper's Appendix A.2: on the reference's own"
         " time stamps, with the static pitch, without shift or fit. The paper's reference is CarSim; another one"
-        " answers the same question of other data, so figures beside each other are no ranking.",
+        " answers the same question of other data, so figures beside each other are no ranking."],
     )  # fmt: skip
 
 

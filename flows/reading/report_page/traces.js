@@ -91,7 +91,7 @@ class Traces {
       const x = columns.get("t_ns").map((t) => t / 1e9);
       return REPORT.panels.map(({ column, factor }, k) => ({
         type: "scatter", mode: "lines", xaxis: axis("x", k), yaxis: axis("y", k), x, y: columns.get(column).map((v) => v * factor),
-        line: { color: `var(--${"ab"[side]})`, width: 1.4 },
+        line: { color: ["--a", "--b"][side], width: 1.4 },
       }));
     }).reverse();
     this.plot.drawn = { ...REPORT.figure, data };
