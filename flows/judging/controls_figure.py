@@ -3,10 +3,10 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from flows.pages.figures import Figure, Line, Panel, pick_style
+from flows.pages.figures import Figure, Line, Panel, Style, pick_style
 
 COLUMNS = 4
-CHANCE = Line(name="chance", x=[0.0, 1.0], y=[0.0, 1.0], colour="soft", dash="dot")
+CHANCE = Line(name="chance", x=[0.0, 1.0], y=[0.0, 1.0], style=Style("soft", "dot"))
 
 
 def draw_roc(rows: Sequence[Mapping[str, Any]], meanings: Mapping[str, str]) -> Figure:
@@ -29,7 +29,7 @@ def draw_roc(rows: Sequence[Mapping[str, Any]], meanings: Mapping[str, str]) -> 
         lines = [
             Line(
                 name=row["metric"], x=row["roc"]["false_alarms"], y=row["roc"]["detections"],
-                **pick_style(metrics.index(row["metric"])),
+                style=pick_style(metrics.index(row["metric"])),
             )
             for row in best
         ]  # fmt: skip

@@ -6,7 +6,7 @@ import numpy as np
 
 from flows.judging.judged_clip import JudgedClip, Row
 from flows.judging.motion_curves import MotionPanel, draw_motion
-from flows.pages.figures import Figure, Line, Panel, pick_style
+from flows.pages.figures import Figure, Line, Panel, Style, pick_style
 from flows.pages.writer import Picture, Section, Table, encode_picture, write_page
 
 SHOWN_CLIPS = 12
@@ -146,7 +146,7 @@ def _draw_pitch(clips: Sequence[JudgedClip]) -> Figure:
         claimed = np.rad2deg(clip.frames["pitch"] - clip.frames["pitch"][0])
         lines = [Line(name="claimed", x=clip.times, y=claimed)]
         for place, (method, motion) in enumerate(clip.motions.items()):
-            lines.append(Line(name=method, x=clip.times, y=np.rad2deg(motion.pitch), **pick_style(place)))
+            lines.append(Line(name=method, x=clip.times, y=np.rad2deg(motion.pitch), style=pick_style(place)))
         panels.append(Panel(title=clip.facts["label"], y="pitch [deg]", lines=lines, least=LEAST_SWING_DEG))
     caption = f"Claimed and recovered pitch; the first {SHOWN_CLIPS} clips at most."
     return Figure(caption=caption, panels=panels, columns=3)
@@ -164,9 +164,9 @@ def _draw_geometry(rows: Sequence[Row]) -> list[Figure]:
                 np.mean([r["value"] for r in mine if (r["window"], r["method"]) == (w, method)])
                 for w in windows
             ]
-            lines.append(Line(name=method, x=windows, y=means, marked=True, **pick_style(place)))
+            lines.append(Line(name=method, x=windows, y=means, marked=True, style=pick_style(place)))
         floors = [np.mean([r["floor"] for r in mine if r["window"] == w]) for w in windows]
-        lines.append(Line(name="perfect pose", x=windows, y=floors, dash="dash"))
+        lines.append(Line(name="perfect pose", x=windows, y=floors, style=Style("ink", "dash")))
         if mine:
             panels.append(
                 Panel(title=name, x="smoothing window [frames]", y="error over response", lines=lines)

@@ -1,7 +1,7 @@
 """The paper's figure of recovered motion: change of progress in weather, pitch over a road feature, by visual seed."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,9 +82,11 @@ def _draw_panel(panel: MotionPanel, meant: str, names: Sequence[str]) -> Panel:
     lines = [Line(name=meant, x=panel.times, y=panel.meant)]
     for name, values in panel.recovered.items():
         mean = values.mean(axis=0)
-        spread = values.std(axis=0, ddof=1) if len(values) > 1 else None
-        band = {} if spread is None else {"low": mean - spread, "high": mean + spread}
-        lines.append(Line(name=name, x=panel.times, y=mean, **band, **pick_style(names.index(name))))
+        line = Line(name=name, x=panel.times, y=mean, style=pick_style(names.index(name)))
+        if len(values) > 1:
+            spread = values.std(axis=0, ddof=1)
+            line = replace(line, low=mean - spread, high=mean + spread)
+        lines.append(line)
     return Panel(
         title=panel.title,
         y=panel.quantity,

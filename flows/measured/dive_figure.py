@@ -6,14 +6,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flows.pages.figures import Figure, Line, Panel
+from flows.pages.figures import Figure, Line, Panel, Style
 
-STYLES = {
-    "dive_deg": {"name": "measured", "dash": "dash"},
-    "predicted_dive_deg": {"name": "predicted", "colour": "a"},
+CURVES = {
+    "dive_deg": ("measured", Style("ink", "dash")),
+    "predicted_dive_deg": ("predicted", Style("a")),
 }
-
-
 TIME = "time from the event's start [s]"
 
 
@@ -27,15 +25,17 @@ def draw_dives(folds: Sequence[Mapping[str, Any]]) -> Figure:
     panels = []
     for fold in folds:
         ratio, curves = fold["peak_ratio"], fold["mean_trajectory"]
-        told = "" if ratio is None else f"peak ratio {ratio:.2f}, "
+        height = "" if ratio is None else f"peak ratio {ratio:.2f}, "
         panels.append(
             Panel(
-                title=f"{fold['drive']}: {told}{fold['events']} events",
+                title=f"{fold['drive']}: {height}{fold['events']} events",
                 x=TIME,
                 y="dive over its own peak",
                 lines=[
-                    Line(x=curves["time_s"], y=_divide_by_peak(np.array(curves[name])), **style)
-                    for name, style in STYLES.items()
+                    Line(
+                        name=told, x=curves["time_s"], y=_divide_by_peak(np.array(curves[name])), style=style
+                    )
+                    for name, (told, style) in CURVES.items()
                 ],
             )
         )
@@ -50,10 +50,11 @@ def _draw_mean(folds: Sequence[Mapping[str, Any]]) -> Panel:
     """Draw the mean over drives in degrees, with one standard deviation, where all drives have values."""
     time = np.array(min((fold["mean_trajectory"]["time_s"] for fold in folds), key=len))
     lines = []
-    for name, style in STYLES.items():
+    for name, (told, style) in CURVES.items():
         curves = np.stack([np.array(fold["mean_trajectory"][name])[: len(time)] for fold in folds])
         middle, spread = curves.mean(axis=0), curves.std(axis=0)
-        lines.append(Line(x=time, y=middle, low=middle - spread, high=middle + spread, **style))
+        band = Line(name=told, x=time, y=middle, low=middle - spread, high=middle + spread, style=style)
+        lines.append(band)
     return Panel(title="mean of drives ±1 std. deviation", x=TIME, y="dive [deg]", lines=lines)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flows.measured.residuals import RunPrediction
-from flows.pages.figures import Figure, Line, Panel
+from flows.pages.figures import Figure, Line, Panel, Style
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
 from tasks.identification.decision.candidates import Candidate
 from tasks.identification.decision.forms import KNOTS, find_scanned_ranges
@@ -27,7 +27,7 @@ STANDING = 1.0
 POINTS = 1000
 """Points of a curve that a figure of a run can show."""
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-STYLES = {"frozen": {"colour": "b", "dash": "dot"}, "after": {"colour": "a"}}
+STYLES = {"frozen": Style("b", "dot"), "after": Style("a")}
 """Of the vehicle file's model, and of the one with what was found."""
 
 
@@ -54,13 +54,13 @@ def draw_run(run: RunPrediction, noise: Mapping[str, Any], left: Mapping[str, An
         )
         panels.append(Panel(y=_label(name, unit), lines=[
             Line(name="noise, 95 %", x=time, y=np.full(len(time), np.nan), low=after - reach, high=after + reach,
-                 colour="soft"),
-            *(Line(name=model, x=time, y=values, **STYLES[model]) for model, values in predicted.items()),
+                 style=Style("soft")),
+            *(Line(name=model, x=time, y=values, style=STYLES[model]) for model, values in predicted.items()),
             Line(name="measured", x=time, y=measured),
         ]))  # fmt: skip
         panels.append(Panel(y="measured less model", lines=[
             _draw_limits("noise, 95 %", time[[0, -1]], reach),
-            *(Line(name=model, x=time, y=measured - values, **STYLES[model]) for model, values in predicted.items()),
+            *(Line(name=model, x=time, y=measured - y, style=STYLES[model]) for model, y in predicted.items()),
         ]))  # fmt: skip
     panels.append(Panel(y="brake pressure [MPa]", lines=[Line(name="", x=time, y=run.model.pressure[thin])]))
     return Figure(
@@ -85,8 +85,8 @@ def draw_brake_curve(runs: Sequence[RunPrediction]) -> Figure:
     x = curve["pressure_mpa"]
     lines = [
         Line(name="measured", x=x, y=curve["measured"], low=curve["low"], high=curve["high"], marked=True),
-        Line(name="frozen", x=x, y=curve["frozen"], marked=True, **STYLES["frozen"]),
-        Line(name="after", x=x, y=curve["fitted"], marked=True, **STYLES["after"]),
+        Line(name="frozen", x=x, y=curve["frozen"], marked=True, style=STYLES["frozen"]),
+        Line(name="after", x=x, y=curve["fitted"], marked=True, style=STYLES["after"]),
     ]
     at = (
         f": at {x[-1]:.3g} MPa measured {curve['measured'][-1]:.3g}, frozen {curve['frozen'][-1]:.3g}, after"
@@ -193,7 +193,7 @@ def draw_correlation(correlation: Mapping[str, Mapping[str, Any]]) -> Figure:
         ends = [c["lag_s"][0], c["lag_s"][-1]]
         panels.append(Panel(title=_as_words(channel), x="residual after pressure [s]", y="correlation", lines=[
             _draw_limits("independent, 95 %", ends, c["band"]),
-            *(Line(name=model, x=c["lag_s"], y=c[model], **style) for model, style in STYLES.items()),
+            *(Line(name=model, x=c["lag_s"], y=c[model], style=style) for model, style in STYLES.items()),
         ]))  # fmt: skip
         most = ", ".join(f"{max(map(abs, c[model])):.3g} {model}" for model in STYLES)
         said.append(f"{_as_words(channel)} at most {most}, band {c['band']:.3g}")
@@ -207,14 +207,14 @@ def draw_correlation(correlation: Mapping[str, Mapping[str, Any]]) -> Figure:
 
 def _draw_limits(name: str, ends: Sequence[float] | NDArray[np.float64], reach: float) -> Line:
     """Return a band about 0."""
-    return Line(name=name, x=ends, y=[None] * 2, low=[-reach] * 2, high=[reach] * 2, colour="soft")
+    return Line(name=name, x=ends, y=[None] * 2, low=[-reach] * 2, high=[reach] * 2, style=Style("soft"))
 
 
 def _draw_band(name: str, x: NDArray[np.float64], explanation: Explanation, form: Candidate) -> Line:
     places = explanation.find_places(form)
     values, reach = explanation.values[places], NORMAL_QUANTILE * explanation.errors[places]
     return Line(
-        name=name, x=x, y=values, low=values - reach, high=values + reach, marked=True, **STYLES[name]
+        name=name, x=x, y=values, low=values - reach, high=values + reach, marked=True, style=STYLES[name]
     )
 
 

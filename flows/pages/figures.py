@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cache
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,16 @@ GAP_PX, STACKED_GAP_PX = 66, 26
 Values = NDArray[np.floating[Any]] | Sequence[float] | Sequence[float | None]
 
 
+class Style(NamedTuple):
+    """Colour of the style sheet, and dash, of a line."""
+
+    colour: str = "ink"
+    dash: str = "solid"
+
+
+INK = Style()
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Line:
     """A line of a panel.
@@ -32,8 +42,7 @@ class Line:
     name : in the key, and of all lines that are shown and hidden with it
     x, y : [N], NaN or None where there is no value
     low, high : [N] edges of a band about it; None for none
-    colour : of `COLOURS`, or ``ink`` or ``soft``
-    dash : of `DASHES`
+    style : with a colour of `COLOURS`, ``ink`` or ``soft``, and a dash of `DASHES`
     marked : whether each point has a mark; None marks the points and draws no line
     """
 
@@ -42,8 +51,7 @@ class Line:
     y: Values
     low: Values | None = None
     high: Values | None = None
-    colour: str = "ink"
-    dash: str = "solid"
+    style: Style = INK
     marked: bool | None = False
 
 
@@ -107,7 +115,7 @@ class Figure:
         return list({line.name: line for line in reversed(lines)}.values())[::-1]
 
 
-def pick_style(place: int) -> dict[str, str]:
+def pick_style(place: int) -> Style:
     """Return colour and dash of one of many lines.
 
     Parameters
@@ -115,7 +123,7 @@ def pick_style(place: int) -> dict[str, str]:
     place : of the line among those of the figure, from 0
     """
     dash, colour = divmod(place, len(COLOURS))
-    return {"colour": COLOURS[colour], "dash": DASHES[dash % len(DASHES)]}
+    return Style(COLOURS[colour], DASHES[dash % len(DASHES)])
 
 
 @cache
@@ -169,13 +177,13 @@ def as_plotly(figure: Figure, digits: int | None = DIGITS) -> dict[str, Any]:
 
 def _draw_line(line: Line, digits: int | None) -> list[dict[str, Any]]:
     """Return the edges of a line's band, and the line."""
-    colour, filled = (read_colours()[name] for name in (line.colour, f"{line.colour}-band"))
+    colour, filled = (read_colours()[name] for name in (line.style.colour, f"{line.style.colour}-band"))
     x, y, low, high = (_plain(values, digits) for values in (line.x, line.y, line.low, line.high))
     base = {"type": "scatter", "x": x, "legendgroup": line.name}
     edge = base | {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip", "showlegend": False}
     drawn = base | {
         "mode": {None: "markers", False: "lines", True: "lines+markers"}[line.marked], "name": _as_text(line.name),
-        "y": y, "hovertemplate": "%{y:.3g}", "line": {"color": colour, "width": 1.6, "dash": line.dash},
+        "y": y, "hovertemplate": "%{y:.3g}", "line": {"color": colour, "width": 1.6, "dash": line.style.dash},
         "marker": {"size": 5, "color": colour},
     }  # fmt: skip
     if low is None:

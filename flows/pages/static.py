@@ -48,14 +48,14 @@ def _draw_panel(axis: Axes, panel: Panel, colours: dict[str, str]) -> None:
     for start, end in panel.shaded:
         axis.axvspan(start, end, color=colours["soft"], alpha=0.15, lw=0)
     for line in panel.lines:
-        colour = colours[line.colour]
+        colour = colours[line.style.colour]
         x = np.asarray(line.x, float)
         if line.low is not None and line.high is not None:
             low, high = (np.asarray(edge, float) for edge in (line.low, line.high))
             axis.fill_between(x, low, high, color=colour, alpha=0.2, lw=0)
         axis.plot(
             x, np.asarray(line.y, float), color=colour, lw=1.3, label=_as_text(line.name) or "_",
-            ls="" if line.marked is None else DASHES[line.dash],
+            ls="" if line.marked is None else DASHES[line.style.dash],
             marker="" if line.marked is False else ("x" if line.marked is None else "o"), ms=4,
         )  # fmt: skip
     axis.set_title(_as_text(panel.title), fontsize=9, loc="left")

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flows.pages.figures import Figure, Line, Panel, as_plotly
+from flows.pages.figures import Figure, Line, Panel, Style, as_plotly
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -40,7 +40,7 @@ def draw_clip(label: str, ticks: "pd.DataFrame") -> "go.Figure":
         Panel(
             y=title,
             lines=[
-                Line(name=name, x=seconds, y=ticks[column].to_numpy() * factor, colour=colour)
+                Line(name=name, x=seconds, y=ticks[column].to_numpy() * factor, style=Style(colour))
                 for column, name, colour in lines
             ],
             shaded=[(braking[0], braking[-1])] if braking.size else [],

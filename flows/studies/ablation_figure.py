@@ -6,14 +6,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flows.pages.figures import Figure, Line, Panel
+from flows.pages.figures import Figure, Line, Panel, Style
 
 STYLES = {
-    "appearance-only": {"colour": "e"},
-    "vertical-only": {"colour": "c"},
-    "fixed-mu": {"colour": "d"},
-    "full": {"colour": "a"},
-    "reference": {"dash": "dash"},
+    "appearance-only": Style("e"),
+    "vertical-only": Style("c"),
+    "fixed-mu": Style("d"),
+    "full": Style("a"),
+    "reference": Style("ink", "dash"),
 }
 RATE = {"rain": "rain [mm/h]", "snow": "snow, water equivalent [mm/h]"}
 
@@ -40,7 +40,7 @@ def draw_ablation(
     angle = Panel(
         title="braking onto a hump",
         y="pitch, nose down [deg]",
-        lines=[Line(name=name, x=time[shown], y=curve[shown], **STYLES[name]) for name, curve in curves.items()],
+        lines=[Line(name=name, x=time[shown], y=curve[shown], style=STYLES[name]) for name, curve in curves.items()],
         shaded=[(full["brake_onset_s"], end), *([hump] if None not in hump else [])],
     )  # fmt: skip
     return Figure(
@@ -56,5 +56,5 @@ def _draw_stops(kind: str, rows: Sequence[Mapping[str, Any]]) -> Panel:
     for variant in dict.fromkeys(row["variant"] for row in rows):
         mine = [row for row in rows if row["variant"] == variant]
         x, y = ([row[name] for row in mine] for name in ("precipitation_mm_h", "stopping_distance_m"))
-        lines.append(Line(name=variant, x=x, y=y, **STYLES[variant]))
+        lines.append(Line(name=variant, x=x, y=y, style=STYLES[variant]))
     return Panel(title=f"stops in {kind}", x=RATE[kind], y="stopping distance [m]", lines=lines)

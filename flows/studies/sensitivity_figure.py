@@ -3,9 +3,9 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from flows.pages.figures import Figure, Line, Panel
+from flows.pages.figures import Figure, Line, Panel, Style
 
-COLOURS = {"rain": "a", "snow": "d"}
+STYLES = {"rain": Style("a"), "snow": Style("d")}
 RATE = {"rain": "rain [mm/h]", "snow": "snow, water equivalent [mm/h]"}
 QUANTITIES = {"mu": "surface friction", "stop_m": "stopping distance [m]"}
 
@@ -28,10 +28,10 @@ def draw_sensitivity(
             lines = [
                 Line(
                     name=f"{kind}, 5th to 95th percentile", x=curve["rates_mm_h"], y=[None] * len(curve["rates_mm_h"]),
-                    low=curve[f"{quantity}_p05"], high=curve[f"{quantity}_p95"], colour=COLOURS[kind],
+                    low=curve[f"{quantity}_p05"], high=curve[f"{quantity}_p95"], style=STYLES[kind],
                 ),
                 Line(name=f"{kind}, nominal", x=curve["nominal_rates_mm_h"], y=curve[f"nominal_{quantity}"],
-                     colour=COLOURS[kind]),
+                     style=STYLES[kind]),
                 *([Line(name="printed in the paper", x=[rate for rate, _ in points], y=[value for _, value in points],
                         marked=None)] if points else []),
             ]  # fmt: skip
@@ -48,6 +48,6 @@ def _place_print(row: Mapping[str, Any]) -> tuple[str, str, float, float] | None
     place = str(row["figure"]).partition(".")[0]
     where, _, quantity = place.partition("_")
     kind = where.rstrip("0123456789")
-    if kind not in COLOURS:
+    if kind not in STYLES:
         return None
     return kind, quantity, float(where.removeprefix(kind)), float(row["printed"])

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flows.pages.figures import Figure, Line, Panel
+from flows.pages.figures import Figure, Line, Panel, Style
 from tasks.vehicle.rollout import Rollout
 
 Curves = dict[str, NDArray[np.float64]]
@@ -20,7 +20,7 @@ QUANTITIES = {
 """The four quantities of the paper's figure, with their labels."""
 POINTS = 800
 """Points of a curve that a figure of this size can show."""
-COLOURS = ("a", "b")
+STYLES = (Style("a"), Style("b"))
 
 
 def draw_trajectories(
@@ -51,12 +51,11 @@ def draw_trajectories(
     above, below = [], []
     for name, label in QUANTITIES.items():
         curves = [
-            (told, model[name], colour)
-            for colour, (told, model) in zip(COLOURS, models.items(), strict=False)
+            (told, model[name], style) for style, (told, model) in zip(STYLES, models.items(), strict=False)
         ]
-        shown = [Line(name=told, x=time, y=y, colour=colour) for told, y, colour in curves]
-        left = [Line(name=told, x=time, y=y - truth[name], colour=colour) for told, y, colour in curves]
-        reference_line = Line(name="reference", x=time, y=truth[name], dash="dash")
+        shown = [Line(name=told, x=time, y=y, style=style) for told, y, style in curves]
+        left = [Line(name=told, x=time, y=y - truth[name], style=style) for told, y, style in curves]
+        reference_line = Line(name="reference", x=time, y=truth[name], style=Style("ink", "dash"))
         above.append(Panel(y=label, lines=[reference_line, *shown], shaded=[window]))
         below.append(Panel(y="difference", lines=left, shaded=[window]))
     pairs = [[*above[k : k + 2], *below[k : k + 2]] for k in (0, 2)]

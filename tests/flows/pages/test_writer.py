@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from flows.pages.figures import Figure, Line, Panel, as_plotly
+from flows.pages.figures import Figure, Line, Panel, Style, as_plotly
 from flows.pages.writer import Cell, Command, Picture, Section, Table, make_policy, write_page
 from flows.studies.vehicle_model import run_sensitivity
 from tests.browsers import find_barriers, open_chromium
@@ -67,7 +67,7 @@ def assert_text_alone(html: str, hostile: str) -> Elements:
 
 def draw(name: str) -> Figure:
     line = Line(name=name, x=[0.0, 1.0, 2.0], y=[1.0, None, float("nan")], low=[0, 0, 0], high=[2, 2, 2])
-    other = Line(name="other", x=[0.0, 2.0], y=[1.23456789, 0.0], colour="b", dash="dot")
+    other = Line(name="other", x=[0.0, 2.0], y=[1.23456789, 0.0], style=Style("b", "dot"))
     panels = [Panel(title=name, x=name, y=name, lines=[line, other], shaded=[(0.5, 1.0)]) for _ in range(2)]
     return Figure(caption=name, panels=panels, columns=2)
 
