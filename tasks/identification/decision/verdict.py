@@ -148,7 +148,7 @@ def judge_runs(
         reasons=tuple(reasons),
         disagreement=why,
     )
-    verdict = tell_miss(verdict, campaign, rules.foreign_misfit)
+    verdict = tell_miss(verdict, rules.foreign_misfit)
     calibrated = list_calibrated(fitted, named, library, rules.hardly_known_tolerance)
     return Outcome(
         verdict=verdict, finding=finding, opened=tuple(opened), fitted=fitted, calibrated=tuple(calibrated)
