@@ -85,12 +85,11 @@ class Finding:
 
 @dataclass(frozen=True, kw_only=True)
 class _Place:
-    """Where the search stands: the runs about a fit, their derivatives, and whether a move from there was none."""
+    """Where the search stands: the runs about a fit, and their derivatives by the splines."""
 
     evidence: Evidence
     fitted: Fit
     splines: Splines
-    refuted: bool = False
 
 
 def find_explanations(
@@ -156,7 +155,9 @@ def _refine_first(found: list[Explanation], place: _Place, null: Fit) -> Explana
         )
         for e in hopeful
     ]  # fmt: skip
-    costs = [_compute_cost(f, e) for f, e in zip(fits, hopeful, strict=True)]
+    costs = [
+        0.5 * f.objective - sum(m.log_prior for m in e.members) for f, e in zip(fits, hopeful, strict=True)
+    ]
     return hopeful[int(np.argmin(costs))] if hopeful else None
 
 
@@ -170,26 +171,14 @@ def _settle_explanation(
     for turn in range(rules.most_turns):
         grams = gather_grams(place.evidence, place.fitted, place.splines, columns)
         found = search_explanations(grams, most=rules.most_effects, width=rules.beam_width, forms=forms)
-        here = next((e for e in found if _is_fitted(e, place.fitted)), None)
-        if place.refuted and here is not None:
-            # far from a fit without its effect, derivatives about that fit promise what no simulation keeps
-            found = [e for e in found if e.log_odds <= here.log_odds or set(here.names) <= set(e.names)]
         told = keep_members(found[0], tell_members(grams, found[0], rules))
+        here = next((e for e in found if _is_fitted(e, place.fitted)), None)
         if turn == rules.most_turns - 1 or _is_fitted(told, place.fitted):
             break
         if forms and here is not None and not _is_worth_it(found[0], here, grams, rules):
             break
-        moved = _move_to(told, place, null, settle=False)
-        refuted = here is not None and _compute_cost(moved.fitted, told) > _compute_cost(
-            place.fitted, here
-        ) + log(rules.named_odds)
-        place = replace(place, refuted=True) if refuted else moved
+        place = _move_to(told, place, null, settle=False)
     return place, grams, found
-
-
-def _compute_cost(fitted: Fit, explanation: Explanation) -> float:
-    """Return half the misfit of a fit, less the logarithm of the prior odds of what it holds [1]."""
-    return 0.5 * fitted.objective - sum(member.log_prior for member in explanation.members)
 
 
 def _is_worth_it(best: Explanation, here: Explanation, grams: RunGrams, rules: DecisionRules) -> bool:
