@@ -26,6 +26,6 @@ def test_a_number_that_stands_as_a_rival_is_not_told_again_among_the_vehicles_ow
     outcome = SimpleNamespace(verdict=told, calibrated=(gain, grip))
     assert (
         _say_own_numbers(outcome, load_effects())
-        == "the brakes give 51 % above the torque of the vehicle file"
+        == "the brakes give 51 % [0, 100] above the torque of the vehicle file"
     )
     assert _say_own_numbers(SimpleNamespace(verdict=told, calibrated=(grip,)), load_effects()) == ""
