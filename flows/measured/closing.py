@@ -25,8 +25,9 @@ from tasks.campaign.braking_heat import estimate_disc_temperatures
 from tasks.campaign.campaign import CHANNELS, FILE_NUMBERS, SESSION, Campaign
 from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter, Verdict
 from tasks.identification.decision.excitation import find_reached_range
+from tasks.identification.decision.naming import measure_force
 from tasks.identification.decision.verdict import Outcome, judge_runs
-from tasks.identification.decision.words import join_phrases, say_effect, tell_verdict
+from tasks.identification.decision.words import join_phrases, list_unshared, say_effect, tell_verdict
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.table import PARAMETERS
 
@@ -137,13 +138,13 @@ def tell_search(outcome: Outcome) -> dict[str, Any]:
     """
     library, verdict = load_effects(), outcome.verdict
     train, held_out = predict_runs(outcome)
-    rivals = [rival for _, rival in verdict.rivals]
     planned_for = verdict.experiment.between[0] if verdict.experiment else None
     suggested = next((effect for effect in verdict.tried if effect.name == planned_for), None)
-    sentence = tell_verdict(
-        verdict.effects, rivals, library, verdict.error, verdict.manoeuvre_error, suggested,
-        verdict.misses or bool(verdict.disagreement and not verdict.effects), _say_own_numbers(outcome, library),
-    )  # fmt: skip
+    force = 0.0
+    if len(verdict.odds) > 1:
+        apart = [effect.name for effect in list_unshared(verdict.effects, verdict.odds)]
+        force = measure_force(outcome.finding, outcome.fitted, apart)
+    sentence = tell_verdict(verdict, library, suggested, _say_own_numbers(outcome, library), force)
     return {
         "channels": [CHANNELS[c] for c in train[0].channels],
         "sentence": sentence,
@@ -165,18 +166,16 @@ def _number_json(
 
 
 def _say_own_numbers(outcome: Outcome, library: Sequence[Effect]) -> str:
-    """Return what the numbers that the file hardly knew say of the car, else, beside no name, the one pulled most."""
+    """Return what the numbers that the file hardly knew say of the car, else the one pulled most beside no name and no hint."""
     told = {rival.name for _, rival in outcome.verdict.rivals}
     if own := [effect for effect in outcome.calibrated if effect.name not in told]:
         return join_phrases(say_effect(effect, library) for effect in own)
-    if outcome.verdict.effects:
+    if outcome.verdict.effects or outcome.verdict.experiment is not None:
         return ""
     base = outcome.fitted
     place = int(np.argmax(base.pulls[: len(SESSION)]))
-    number = next(
-        e for e in library if e.effect_class == "retune" and e.parameters[0].name == FILE_NUMBERS[place]
-    )
-    return f"most: {number.say({FILE_NUMBERS[place]: float(base.session[place])})}"
+    number = next(e for e in library if e.effect_class == "retune" and e.parameters[0].name == SESSION[place])
+    return f"most: {number.say({SESSION[place]: float(base.session[place])})}"
 
 
 def split_of(campaign: Campaign) -> dict[str, Any]:

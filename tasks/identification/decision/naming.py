@@ -7,7 +7,7 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.campaign import FILE_NUMBERS, SESSION
+from tasks.campaign.campaign import CHANNELS, FILE_NUMBERS, SESSION
 from tasks.identification.decision.answer import NamedEffect, Parameter, make_estimate
 from tasks.identification.decision.candidates import Candidate
 from tasks.identification.decision.forms import KNOTS, find_scanned_ranges, make_form_hypotheses
@@ -15,12 +15,14 @@ from tasks.identification.decision.odds import Explanation, RunGrams, keep_membe
 from tasks.identification.decision.search import Finding, make_hypotheses, widen_session
 from tasks.identification.decision.told import OpenExplanation
 from tasks.identification.inference.fit import Fit, fit_hypotheses
-from tasks.identification.inference.hypothesis import Hypothesis
+from tasks.identification.inference.forward import predict_channels
+from tasks.identification.inference.hypothesis import Hypothesis, compose_parameters
 from tasks.identification.inference.quantiles import NORMAL_QUANTILE
 from tasks.identification.rules import DecisionRules
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.ports import PORT_UNITS
 
+FELT = CHANNELS.index("longitudinal_acceleration")
 STEPS = 8
 """Gauss-Newton steps of a last fit [1]."""
 
@@ -56,6 +58,28 @@ def fit_told(finding: Finding, opened: OpenExplanation) -> Fit:
             )
             trials = [(*parts[:i], shape, *parts[i + 1 :]) for shape in shapes]
     return min((fit(trial) for trial in trials), key=lambda fitted: fitted.objective)
+
+
+def measure_force(finding: Finding, fitted: Fit, names: Sequence[str]) -> float:
+    """Return the mean deceleration that some parts of a fit make over the training runs [m/s2].
+
+    Parameters
+    ----------
+    finding : the runs
+    fitted : the fit
+    names : of its parts
+    """
+    values, at = fitted.values.copy(), 0
+    for part in fitted.parts:
+        values[at : at + len(part.names)] *= part.name not in names
+        at += len(part.names)
+    felt, free = (
+        np.concatenate(
+            [predict_channels(run.model, theta, slots=slots)[:, FELT] for run in finding.evidence.train]
+        )
+        for theta, slots in (fitted.compose(), compose_parameters(fitted.parts, values, fitted.session))
+    )
+    return float(np.mean(free - felt))
 
 
 def name_members(opened: OpenExplanation, grams: RunGrams, fitted: Fit | None) -> list[NamedEffect]:

@@ -85,11 +85,20 @@ class Finding:
 
 @dataclass(frozen=True, kw_only=True)
 class _Place:
-    """Where the search stands: the runs about a fit, and their derivatives by the splines."""
+    """Where the search stands.
+
+    Parameters
+    ----------
+    evidence : the runs about a fit
+    fitted : the fit
+    splines : derivatives by the splines, about ``splined``
+    splined : parts of the fit about which they were taken
+    """
 
     evidence: Evidence
     fitted: Fit
     splines: Splines
+    splined: tuple[Hypothesis, ...] = ()
 
 
 def find_explanations(
@@ -131,9 +140,10 @@ def find_explanations(
     columns = list_columns(numbers, retuned, evidence.session_sigma, rules)
     null = place.fitted
     grams = gather_grams(place.evidence, place.fitted, place.splines, columns)
-    first = _refine_first(search_explanations(grams, most=1, width=1, spread=False, forms=False), place, null)
+    singles = search_explanations(grams, most=1, width=1, spread=False, forms=False)
+    first = _refine_first(singles, place, null, rules)
     if first is not None:
-        place = _move_to(first, place, null, settle=True)
+        place = _settle_scales(_move_to(first, place, null))
     # the shape of a form is not told by a run or two
     for forms in (False, True) if len(models) >= FEWEST else (False,):
         place, grams, found = _settle_explanation(place, null, columns, rules, forms=forms)
@@ -142,7 +152,9 @@ def find_explanations(
     )
 
 
-def _refine_first(found: list[Explanation], place: _Place, null: Fit) -> Explanation | None:
+def _refine_first(
+    found: list[Explanation], place: _Place, null: Fit, rules: DecisionRules
+) -> Explanation | None:
     """Return the single candidate that explains most through the simulation, of those that seem to; None without one.
 
     A linear estimate of a delay, or of what decides when an anti-lock brake acts, is a hint.
@@ -155,10 +167,12 @@ def _refine_first(found: list[Explanation], place: _Place, null: Fit) -> Explana
         )
         for e in hopeful
     ]  # fmt: skip
-    costs = [
-        0.5 * f.objective - sum(m.log_prior for m in e.members) for f, e in zip(fits, hopeful, strict=True)
+    gains = [
+        0.5 * (null.objective - f.objective) + sum(m.log_prior for m in e.members)
+        for f, e in zip(fits, hopeful, strict=True)
     ]
-    return hopeful[int(np.argmin(costs))] if hopeful else None
+    # the odds of what is fitted are less than its gain
+    return hopeful[int(np.argmax(gains))] if max(gains, default=0.0) > log(rules.named_odds) else None
 
 
 def _settle_explanation(
@@ -169,6 +183,9 @@ def _settle_explanation(
     Forms come after the library: what an effect of the library explains is no form.
     """
     for turn in range(rules.most_turns):
+        if forms and place.splined is not place.fitted.parts:
+            splines = differentiate_by_splines(place.evidence, place.fitted)
+            place = replace(place, splines=splines, splined=place.fitted.parts)
         grams = gather_grams(place.evidence, place.fitted, place.splines, columns)
         found = search_explanations(grams, most=rules.most_effects, width=rules.beam_width, forms=forms)
         told = keep_members(found[0], tell_members(grams, found[0], rules))
@@ -177,7 +194,7 @@ def _settle_explanation(
             break
         if forms and here is not None and not _is_worth_it(found[0], here, grams, rules):
             break
-        place = _move_to(told, place, null, settle=False)
+        place = _move_to(told, place, null)
     return place, grams, found
 
 
@@ -299,15 +316,13 @@ def widen_session(explanation: Explanation, sigma: NDArray[np.float64]) -> NDArr
     return wide
 
 
-def _move_to(explanation: Explanation, place: _Place, null: Fit, *, settle: bool) -> _Place:
-    """Return the runs about the fit of an explanation, with the scales of noise and disturbances taken anew."""
+def _move_to(explanation: Explanation, place: _Place, null: Fit) -> _Place:
+    """Return the runs about the fit of an explanation."""
     parts = make_hypotheses(explanation, place.evidence, place.fitted)
     sigma = widen_session(explanation, place.evidence.session_sigma)
     fitted = fit_hypotheses(place.evidence.train, parts, sigma, session=null.session, iterations=STEPS)
     evidence = differentiate_at(place.evidence, fitted)
-    fitted = _refit(evidence, fitted)
-    moved = _Place(evidence=evidence, fitted=fitted, splines=differentiate_by_splines(evidence, fitted))
-    return _settle_scales(moved) if settle else moved
+    return replace(place, evidence=evidence, fitted=_refit(evidence, fitted))
 
 
 def _refit(evidence: Evidence, fitted: Fit) -> Fit:
@@ -327,8 +342,10 @@ def _settle_scales(place: _Place) -> _Place:
 
 def _scale_noise(place: _Place) -> _Place:
     evidence = set_run_noise(place.evidence, estimate_run_noise(place.evidence, place.fitted))
+    if all(run is before for run, before in zip(evidence.train, place.evidence.train, strict=True)):
+        return place
     splines = rewhiten_splines(place.splines, place.evidence, evidence)
-    return _Place(evidence=evidence, fitted=_refit(evidence, place.fitted), splines=splines)
+    return replace(place, evidence=evidence, fitted=_refit(evidence, place.fitted), splines=splines)
 
 
 def _scale_disturbances(place: _Place) -> _Place:
@@ -337,5 +354,7 @@ def _scale_disturbances(place: _Place) -> _Place:
     scales = fit_disturbance(
         here.train, residuals, here.tolerances, here.effects, here.disturbance, place.splines, RIDGE
     )
+    if scales == here.disturbance:
+        return place
     evidence = rescale_disturbances(here, scales)
     return replace(place, evidence=evidence, fitted=_refit(evidence, place.fitted))

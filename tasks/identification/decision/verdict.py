@@ -143,12 +143,12 @@ def judge_runs(
         split_hash=campaign.split_hash,
         theta=theta,
         slots=slots,
-        experiment=None if foreign else _plan(finding, fitted, others, vehicle, surface),
+        experiment=None if foreign else _plan(finding, fitted, opened, vehicle, surface),
         step_sensitive=evidence.step_sensitive,
         reasons=tuple(reasons),
         disagreement=why,
     )
-    verdict = tell_miss(verdict, campaign, rules.foreign_misfit)
+    verdict = tell_miss(verdict, rules.foreign_misfit)
     calibrated = list_calibrated(fitted, named, library, rules.hardly_known_tolerance)
     return Outcome(
         verdict=verdict, finding=finding, opened=tuple(opened), fitted=fitted, calibrated=tuple(calibrated)
@@ -188,17 +188,16 @@ def _list_tried(finding: Finding, first: OpenExplanation) -> list[NamedEffect]:
 def _plan(
     finding: Finding,
     fitted: Fit,
-    others: Sequence[OpenExplanation],
+    opened: Sequence[OpenExplanation],
     vehicle: Vehicle,
     surface: SurfaceParameters,
 ) -> Experiment | None:
     """Return the run that tells the first explanation from its closest rival, or what is suggested from nothing."""
-    if others:
-        names = frozenset(part.name for part in fitted.parts)
-        told = (sorted(names - others[0].names), sorted(others[0].names - names))
-        between = tuple(" and ".join(own) or "nothing" for own in told)
-        pair = (fitted, fit_told(finding, others[0]))
-    elif fitted.parts:
+    if len(opened) > 1:
+        first, other = (explanation.names for explanation in opened[:2])
+        between = tuple(" and ".join(sorted(own)) or "nothing" for own in (first - other, other - first))
+        pair = (fitted, fit_told(finding, opened[1]))
+    elif opened[0].told:
         return None
     else:
         suggested = _find_suggested(finding)

@@ -87,11 +87,6 @@ def make_library_hypothesis(effect: Effect, start: float | None = None, second: 
     )
 
 
-def is_nested(small: Hypothesis, large: Hypothesis) -> bool:
-    """Return whether every parameter of ``small`` is also one of ``large``."""
-    return set(small.names) < set(large.names)
-
-
 def compose_parameters(
     parts: tuple[Hypothesis, ...], values: NDArray[np.float64], session: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], tuple[Slot, ...]]:

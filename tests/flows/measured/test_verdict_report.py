@@ -98,7 +98,7 @@ def test_where_nothing_is_named_the_verdict_says_whether_the_model_misses_the_ru
         tell_search(replace(judged[0], verdict=replace(nothing, disagreement=why)))["sentence"]
         for why in ("", "the runs disagree")
     ]
-    assert sentences[0].startswith("These runs show nothing that the model lacks; its own numbers, fitted to")
+    assert sentences[0].startswith("These runs show nothing that the model lacks. Its own numbers, fitted to")
     assert sentences[1].startswith("The model misses these runs")
     missed = replace(judged[0], verdict=replace(nothing, verdict="NOTHING", disagreement="the runs disagree"))
     page = write_verdict_page(missed, facts(missed), judged[1])
