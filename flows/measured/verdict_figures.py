@@ -52,17 +52,19 @@ def draw_run(run: RunPrediction, noise: Mapping[str, Any], left: Mapping[str, An
         said.append(
             f"{_as_words(name)} {left[name]['frozen']:.3g} → {left[name]['after']:.3g} {unit}".rstrip()
         )
-        panels.append(Panel(y=_label(name, unit), lines=[
+        panels.append(Panel(title=_as_words(name), y=unit, lines=[
             Line(name="noise, 95 %", x=time, y=np.full(len(time), np.nan), low=after - reach, high=after + reach,
                  style=Style("soft")),
             *(Line(name=model, x=time, y=values, style=STYLES[model]) for model, values in predicted.items()),
             Line(name="measured", x=time, y=measured),
         ]))  # fmt: skip
-        panels.append(Panel(y="measured less model", lines=[
+        panels.append(Panel(title=f"{_as_words(name)}, measured less model", y=unit, lines=[
             _draw_limits("noise, 95 %", time[[0, -1]], reach),
             *(Line(name=model, x=time, y=measured - y, style=STYLES[model]) for model, y in predicted.items()),
         ]))  # fmt: skip
-    panels.append(Panel(y="brake pressure [MPa]", lines=[Line(name="", x=time, y=run.model.pressure[thin])]))
+    panels.append(
+        Panel(title="brake pressure", y="MPa", lines=[Line(name="", x=time, y=run.model.pressure[thin])])
+    )
     return Figure(
         caption=f"{run.model.run.name}: error frozen → after: {'; '.join(said)}",
         description=f"Measured, frozen and after over time of {run.model.run.name}, and what each leaves:"

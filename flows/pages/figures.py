@@ -111,8 +111,10 @@ class Figure:
     @property
     def key(self) -> list[Line]:
         """The first line of each name."""
-        lines = [line for panel in self.panels for line in panel.lines if line.name]
-        return list({line.name: line for line in reversed(lines)}.values())[::-1]
+        first: dict[str, Line] = {}
+        for line in (line for panel in self.panels for line in panel.lines if line.name):
+            first.setdefault(line.name, line)
+        return list(first.values())
 
 
 def pick_style(place: int) -> Style:

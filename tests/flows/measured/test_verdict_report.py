@@ -154,7 +154,7 @@ def test_figures_are_of_residuals_and_have_a_text(text: str, judged: tuple[Outco
     outcome, _ = judged
     page = Page(text)
     run, *rest = (json.loads(text) for text in page.scripts[:-2])
-    assert run["layout"]["yaxis"]["title"]["text"] == "speed [m/s]" and len(rest) > 1
+    assert run["layout"]["annotations"][0]["text"] == "speed" and len(rest) > 1
     drawn = {(line["xaxis"], line["legendgroup"]): line["y"] for line in run["data"] if line.get("name")}
     ((predicted,), (model,)) = predict_runs(outcome)[1], outcome.finding.evidence.held_out
     for key in ("frozen", "after"):
