@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from flows.auditing.verify import describe_files, describe_signature
-from flows.pages.writer import Cell, Command, Section, Table, write_page
+from flows.pages.writer import Cell, Command, Part, Section, Table, write_page
 from manifests.explain import ABSENT
 
 
@@ -122,7 +122,7 @@ def write_audit_page(result: Mapping[str, Any]) -> str:
     result : of `flows.auditing.audit.audit_dataset`
     """
     remedies = list_remedies(result)
-    compared = [
+    compared: list[Part] = [
         _list_comparisons(result),
         *(["What to do:", remedies] if remedies else []),
         Table(title="Damaged files", rows=[

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flows.measured.residuals import RunPrediction
-from flows.pages.figures import Figure, Line, Panel, Style
+from flows.pages.figures import Figure, Line, Panel, Style, Values
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
 from tasks.identification.decision.candidates import Candidate
 from tasks.identification.decision.forms import KNOTS, find_scanned_ranges
@@ -207,7 +207,7 @@ def draw_correlation(correlation: Mapping[str, Mapping[str, Any]]) -> Figure:
     )
 
 
-def _draw_limits(name: str, ends: Sequence[float] | NDArray[np.float64], reach: float) -> Line:
+def _draw_limits(name: str, ends: Values, reach: float) -> Line:
     """Return a band about 0."""
     return Line(name=name, x=ends, y=[None] * 2, low=[-reach] * 2, high=[reach] * 2, style=Style("soft"))
 
