@@ -27,16 +27,14 @@ def write_field_table() -> str:
     """Return the table of the fields of a scenario, as Markdown."""
     fields = grid_schema()["$defs"]["PartialScenario"]["properties"]
     rows = []
-    for name, field in fields.items():
-        row = _describe(name, field)
-        if name == "weather":
+    for field, form in fields.items():
+        row = _describe(field, form)
+        if field == "weather":
             row[3] = ", ".join(f"`{kind}`" for kind in WEATHERS)
-        if name == "precipitation_mm_h":
+        if field == "precipitation_mm_h":
             limits = load_physical_limits()
-            of_kinds = {
-                kind: getattr(limits, row.rate_limit) for kind, row in WEATHERS.items() if row.rate_limit
-            }
-            row[3] = ", ".join(f"{kind}: 0 to {limit.value:g}" for kind, limit in of_kinds.items())
+            falling = [(kind.name, kind.rate_limit) for kind in WEATHERS.values() if kind.rate_limit]
+            row[3] = ", ".join(f"{name}: 0 to {getattr(limits, limit).value:g}" for name, limit in falling)
         rows.append(row)
     return format_table(HEAD, rows)
 

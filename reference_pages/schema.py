@@ -1,4 +1,4 @@
-"""The page of a dataset's schema: its views, arrays and grid file, from the tables that name the columns."""
+"""The page of a dataset's schema, and tables of symbols and of measured channels, from the tables that name columns."""
 
 import re
 from typing import Any
@@ -6,6 +6,7 @@ from typing import Any
 from flows.reading.query import list_columns
 from flows.store.arrays import arrays_of
 from reference_pages.markdown import format_table
+from tasks.campaign.channels import MAIN_CHANNELS, SIDE_CHANNELS
 from tasks.conventions import CHANNELS_BY_NAME
 
 MEANINGS = {
@@ -72,5 +73,14 @@ def _write_arrays(described: list[dict[str, Any]]) -> str:
     )
 
 
-TABLES = {"symbols": write_symbol_table}
-"""Function that writes the table, by the name under which a page asks for it."""
+def write_channel_table() -> str:
+    """Return the table of the columns of a measured run, those first that every map must name, as Markdown."""
+    rows = [
+        (f"`{channel.name}`", "yes" if channel in MAIN_CHANNELS else "", channel.unit, channel.description)
+        for channel in (*MAIN_CHANNELS, *SIDE_CHANNELS)
+    ]
+    return format_table(("channel", "main", "unit", "meaning"), rows)
+
+
+TABLES = {"symbols": write_symbol_table, "measured channels": write_channel_table}
+"""Function that writes each table, by the name under which a page asks for it."""

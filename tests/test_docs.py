@@ -139,7 +139,7 @@ def test_columns_of_the_glossary_are_columns():
     rows = re.findall(
         r"^\|.*\|$", (DOCS / "reference" / "glossary.md").read_text().split("## Words")[0], flags=re.M
     )
-    of_files = {"slip_stiffness", "pitch_scale", "coast_deceleration", "wheel_radius"}
+    of_files = {"efficiency", "slip_stiffness", "pitch_scale", "coast_deceleration", "wheel_radius"}
     assert {name for row in rows for name in re.findall(r"`(\w+)`", row)} - of_files <= set(CHANNELS_BY_NAME)
 
 
