@@ -6,7 +6,7 @@ READY := .venv/.ready
 DEMO ?= datasets/demo
 WORKERS ?= 2
 
-.PHONY: demo test test-minutes check docs docs-serve study study-schedule study-crash study-fuzz study-faults study-double-track study-scale study-production study-mutants study-exports study-calibration study-editors study-learning freeze bench lock clean
+.PHONY: demo test test-minutes check docs docs-serve study study-schedule study-crash study-fuzz study-faults study-double-track study-scale study-production study-mutants study-exports study-calibration study-editors study-learning freeze bench lock size clean
 
 # Whatever comes from the network is held against a hash of constraints.txt, but for torch: one version of it has builds
 # with and without CUDA, one an index, and which of them is at hand differs; what a CUDA build needs beyond is not in the
@@ -41,13 +41,17 @@ test: $(READY)
 test-minutes: $(READY)
 	$(BIN)/python -m pytest -m minutes
 
+# How large the project is: code, tests, words of the documents and their long sentences.
+size: $(READY)
+	$(BIN)/python -m benchmarks.size
+
 check: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-# The documentation as a site, in build/docs; with docs-serve at 127.0.0.1:8000, where its search works too.
+# The documentation as a site, in build/docs, which needs no server; docs-serve shows it at 127.0.0.1:8000 while you write.
 docs docs-serve: export NO_MKDOCS_2_WARNING := 1
 docs docs-serve: $(READY)
 	$(PIP) install --no-build-isolation --editable '.[docs]'
@@ -60,17 +64,17 @@ study-schedule: $(READY)
 	$(BIN)/python -m benchmarks.scheduled_runs
 
 study-crash: $(READY)
-	$(BIN)/python -m benchmarks.crashes
+	$(BIN)/python -m studies.crashes
 
 study-fuzz: $(READY)
-	$(BIN)/python -m benchmarks.fuzzing
+	$(BIN)/python -m studies.fuzzing
 
 study-faults: $(READY)
-	$(BIN)/python -m benchmarks.store_faults
+	$(BIN)/python -m studies.store_faults
 
 study-double-track: $(READY)
-	$(BIN)/python -m benchmarks.double_track --make datasets/double-track
-	$(BIN)/python -m benchmarks.double_track --judge datasets/double-track
+	$(BIN)/python -m studies.double_track --make datasets/double-track
+	$(BIN)/python -m studies.double_track --judge datasets/double-track
 
 # How memory and time grow with the clips; SCALE="100000 --folder /dev/shm" takes some 4 CPU-minutes.
 study-scale: $(READY)
@@ -80,7 +84,7 @@ study-production: $(READY)
 	$(BIN)/python -m benchmarks.production
 
 study-mutants: $(READY)
-	$(BIN)/python -m benchmarks.mutants
+	$(BIN)/python -m studies.mutants
 
 # The readers of the exported formats, in an environment of their own; nuscenes-devkit asks for old versions of libraries
 # that it runs without.
@@ -100,7 +104,7 @@ study-editors: $(READY)
 
 # A small network learns friction from pictures (docs/tutorial/learn-friction.md): ten minutes, most of them for the dataset.
 study-learning: $(READY)
-	$(BIN)/python -m benchmarks.learn_friction
+	$(BIN)/python -m studies.learn_friction
 
 freeze: $(READY)
 	$(BIN)/musync lab freeze

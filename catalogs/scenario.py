@@ -64,6 +64,17 @@ NOT_NEGATIVE = (
     "precipitation_mm_h", "snow_accumulation_h", "peak_pressure_mpa", "hazard_length_m", "ramp_s", "release_s",
     "brake_onset_s", "brake_onset_m", "hold_s",
 )  # fmt: skip
+HIGHEST = {
+    "precipitation_mm_h": "rain_rate",
+    "hazard_height_m": "hazard_height",
+    "snow_accumulation_h": "snow_accumulation",
+    "initial_speed_km_h": "initial_speed",
+    "peak_pressure_mpa": "peak_pressure",
+    **dict.fromkeys(("ramp_s", "hold_s", "release_s", "brake_onset_s"), "brake_time"),
+    **dict.fromkeys(("brake_onset_m", "hazard_center_m"), "position"),
+    "hazard_length_m": "hazard_length",
+}
+"""Physical limit of each number, of a height by its size; a kind of weather may have another one of its rate."""
 UNKNOWN_WEATHER = "unknown"
 """Replaces a weather that could not be read, as NaN replaces a number: no rule applies to either."""
 
@@ -147,25 +158,27 @@ def find_range_problems(scenario: Scenario) -> list[str]:
     return problems + [problem for problem in found if problem is not None]
 
 
+def list_ranges() -> dict[str, tuple[float | None, float]]:
+    """Return the least and the largest value of each number of a scenario; None where there is no least [its unit]."""
+    limits = load_physical_limits()
+    least: dict[str, float] = dict.fromkeys(NOT_NEGATIVE, 0.0)
+    least["initial_speed_km_h"] = limits.slowest_initial_speed.value
+    least["hazard_height_m"] = -limits.hazard_height.value
+    return {name: (least.get(name), getattr(limits, highest).value) for name, highest in HIGHEST.items()}
+
+
 def _list_limits(s: Scenario, limits: PhysicalLimits) -> list[tuple[str, float, Scalar]]:
     """Each number with its name and its limit."""
-    by_name = {
-        "snow_accumulation_h": limits.snow_accumulation,
-        "initial_speed_km_h": limits.initial_speed,
-        "peak_pressure_mpa": limits.peak_pressure,
-        **dict.fromkeys(("ramp_s", "hold_s", "release_s", "brake_onset_s"), limits.brake_time),
-        **dict.fromkeys(("brake_onset_m", "hazard_center_m"), limits.position),
-        "hazard_length_m": limits.hazard_length,
-    }
     kind = WEATHERS.get(s.weather)
-    rate = getattr(limits, kind.rate_limit) if kind and kind.rate_limit else limits.rain_rate
-    limited = [
-        ("precipitation_mm_h", s.precipitation_mm_h, rate),
-        ("the size of hazard_height_m", abs(s.hazard_height_m), limits.hazard_height),
-    ]
-    limited += [
-        (name, value, limit) for name, limit in by_name.items() if (value := getattr(s, name)) is not None
-    ]
+    limited = []
+    for name, highest in HIGHEST.items():
+        value = getattr(s, name)
+        if name == "precipitation_mm_h" and kind and kind.rate_limit:
+            highest = kind.rate_limit
+        if name == "hazard_height_m":
+            name, value = f"the size of {name}", abs(value)
+        if value is not None:
+            limited.append((name, value, getattr(limits, highest)))
     if kind and kind.accumulates and not any(find_limit_problem(*one) for one in limited):
         fallen = s.precipitation_mm_h * s.snow_accumulation_h
         limited.append(("precipitation_mm_h times snow_accumulation_h", fallen, limits.snow_water_equivalent))

@@ -1,19 +1,16 @@
 """Pages of the catalogues: every entry with value, unit and source, as its file has them."""
 
-import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from catalogs.effects import load_effects
 from catalogs.entries import CATALOGUE, entry_names, find_entry
 from catalogs.grids import load_grid
 from catalogs.vehicles import vehicle_content, vehicle_numbers
 from reference_pages.markdown import format_cell, format_table, format_value
 from tasks.conventions import CHANNELS_BY_NAME
-from tasks.vehicle.effects.library import Effect
 
 RULES = (
     ("gates", "A clip's pose check"),
@@ -30,8 +27,6 @@ LISTED = ("tyre", "channel map", "stop study", "bump study")
 
 REFERENCE = "paper-reference"
 """Vehicle that stands first beside others."""
-NUMBER = re.compile(r"\{[^}]*\}")
-"""Place of a number in a sentence of the library."""
 
 
 def write_weather_page() -> str:
@@ -42,27 +37,6 @@ def write_weather_page() -> str:
         " [add a kind of weather](../../how-to/add-a-weather-kind.md) how there come to be more.\n\n"
     )
     return page + "\n".join(_describe_file(path, path.stem) for path in _yaml_files("weather"))
-
-
-def write_effects_page() -> str:
-    """Return the page of the library: the effects that `close-loop` may name."""
-    rows = [
-        (
-            f"`{effect.name}`",
-            effect.effect_class,
-            effect.variable,
-            effect.enters,
-            NUMBER.sub("...", effect.says),
-            _name_numbers(effect),
-        )
-        for effect in load_effects()
-    ]
-    return (
-        "# Effects that close-loop may name\n\nThe entries of `catalogs/effects/library.yaml`. Units, bounds and"
-        " sources of their numbers stand in [the table of effects](../effects.md). An *effect* is physics that the"
-        " model lacks, a *retune* a number of the vehicle that is off, a *sensor* a measurement that is off.\n\n"
-        + format_table(("effect", "class", "depends on", "what it adds", "in words", "numbers"), rows)
-    )
 
 
 def write_vehicles_page() -> str:
@@ -201,13 +175,8 @@ def _yaml_files(folder: str) -> list[Path]:
     return sorted((CATALOGUE / folder).glob("*.yaml"))
 
 
-def _name_numbers(effect: Effect) -> str:
-    return ", ".join(f"`{parameter.name}`" for parameter in effect.parameters)
-
-
 WRITERS = {
     "reference/catalogues/weather.md": write_weather_page,
-    "reference/catalogues/effects.md": write_effects_page,
     "reference/catalogues/vehicles.md": write_vehicles_page,
     "reference/catalogues/grids.md": write_grids_page,
     "reference/catalogues/others.md": write_other_kinds_page,

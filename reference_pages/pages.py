@@ -3,16 +3,19 @@
 import re
 from collections.abc import Callable
 
-from reference_pages import catalogues, modules, verdict_rules
-from reference_pages.schema import write_schema_page
+from reference_pages import catalogues, commands, effects, fmu, grids, modules, schema, verdict_rules
 
 WRITERS: dict[str, Callable[[], str]] = {
     **catalogues.WRITERS,
     **modules.WRITERS,
-    "reference/schema.md": write_schema_page,
+    "reference/schema.md": schema.write_schema_page,
 }
 """Pages, by their path below ``docs/``."""
-TABLES: dict[str, Callable[[], str]] = verdict_rules.TABLES
+TABLES: dict[str, Callable[[], str]] = {
+    name: write
+    for module in (commands, effects, fmu, grids, schema, verdict_rules)
+    for name, write in module.TABLES.items()
+}
 """Tables of pages that people write, by the name under which a page asks for them."""
 ASKED = re.compile(r"^<!-- table: (.+) -->$", flags=re.M)
 """Line of a page at whose place a table belongs."""

@@ -13,10 +13,10 @@ import typer
 import yaml
 from typer.exceptions import TyperException
 
+from benchmarks.size import list_sentences, measure_documents
 from catalogs.channel_maps.conditions import Conditions
 from catalogs.grids import load_grid
 from flows.cli import app
-from flows.registry import COMMANDS
 from manifests.provenance import SOURCE_ROOT
 from reference_pages.pages import WRITERS
 from tasks.conventions import CHANNELS_BY_NAME
@@ -26,6 +26,8 @@ from tests.documents import DOCS, DOCUMENTS, list_blocks, list_command_lines, li
 OURS = {"musync", "flows", "manifests", "catalogs", "tasks"}
 NOT_OURS = {"clip", "dask_jobqueue", "dask_kubernetes"}
 """Modules of the documents' Python that only their readers have."""
+MOST_WORDS, MOST_LONG = 34_000, 0.015
+"""Of all documents together: words, and the share of sentences of more than 30 words (``make size``)."""
 PARTS = ["tutorial", "how-to", "reference", "explanation", "evidence"]
 
 
@@ -99,12 +101,6 @@ def test_files_of_the_source_that_a_document_names_exist(document):
     assert sorted(file for file in named if not (SOURCE_ROOT / file).exists()) == []
 
 
-def test_the_page_of_commands_says_of_each_what_its_help_says():
-    text = (DOCS / "reference" / "commands.md").read_text()
-    said = {c.name: re.findall(rf"^\| `musync {c.name}[ `].*", text, flags=re.M) for c in COMMANDS}
-    assert not [c.name for c in COMMANDS if not any(c.sentence.rstrip(".") in row for row in said[c.name])]
-
-
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
 def test_every_link_in_a_document_leads_somewhere(document):
     for target in re.findall(r"\]\((?!http)([^)#]+)", document.read_text()):
@@ -143,7 +139,7 @@ def test_columns_of_the_glossary_are_columns():
     rows = re.findall(
         r"^\|.*\|$", (DOCS / "reference" / "glossary.md").read_text().split("## Words")[0], flags=re.M
     )
-    of_files = {"slip_stiffness", "pitch_scale", "coast_deceleration", "wheel_radius"}
+    of_files = {"efficiency", "slip_stiffness", "pitch_scale", "coast_deceleration", "wheel_radius"}
     assert {name for row in rows for name in re.findall(r"`(\w+)`", row)} - of_files <= set(CHANNELS_BY_NAME)
 
 
@@ -156,3 +152,14 @@ def test_every_table_and_figure_of_the_paper_has_its_row():
     if not paper.is_file():
         pytest.skip("the paper's source is absent; only the number of its tables and figures was checked")
     assert labels == set(re.findall(r"\\label\{((?:tab|fig):\w+)\}", paper.read_text()))
+
+
+def test_the_documents_end():
+    words, long = measure_documents()
+    assert words <= MOST_WORDS and long <= MOST_LONG
+
+
+def test_the_first_page_is_read_in_two_minutes():
+    text = (SOURCE_ROOT / "README.md").read_text()
+    assert len(text.split()) <= 400
+    assert all(len(sentence.split()) <= 30 for sentence in list_sentences(text))

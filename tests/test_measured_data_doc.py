@@ -1,7 +1,6 @@
 """docs/evidence/measured-drives.md: its commands run as they stand, and its tables hold what they give."""
 
 import json
-import re
 import shlex
 from pathlib import Path
 
@@ -10,15 +9,12 @@ from typer.testing import CliRunner
 
 from flows.cli import app
 from manifests.provenance import SOURCE_ROOT
+from tests.documents import DOCS, list_blocks
 
 pytestmark = pytest.mark.minutes
-TEXT = "".join(
-    (SOURCE_ROOT / "docs" / page).read_text()
-    for page in ("how-to/import-measured-data.md", "evidence/measured-drives.md")
-)
-COMMANDS = [
-    line for block in re.findall(r"```\n(.*?)```", TEXT, flags=re.S) for line in block.strip().splitlines()
-]
+PAGES = [DOCS / "how-to/import-measured-data.md", DOCS / "evidence/measured-drives.md"]
+TEXT = "".join(page.read_text() for page in PAGES)
+COMMANDS = [line for page in PAGES for block in list_blocks(page, "") for line in block.splitlines()]
 
 
 def table(heading: str) -> list[list[str]]:

@@ -93,7 +93,10 @@ class Blocks(Strict):
         dict[Label, PartialScenario], Field(description="A list of scenarios, each with its name.")
     ] = {}
     latin_hypercube: Annotated[
-        LatinHypercube | None, Field(description="Scenarios drawn evenly from ranges of numbers.")
+        LatinHypercube | None,
+        Field(
+            description="count scenarios: each field of ranges takes one value from each of count equal strata."
+        ),
     ] = None
 
     @model_validator(mode="after")

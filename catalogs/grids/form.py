@@ -26,21 +26,38 @@ BEFORE = {"low_speed": "literal", "variant": "full"}
 class GridFile(Blocks):
     """A grid as written in YAML."""
 
-    name: Name
-    scene: Reference = "street"
-    vehicle: Reference = "paper-reference"
-    surface: Reference = "dense-asphalt"
-    camera: Reference = "dashcam-480x320"
+    name: Name = Field(description="Name of the dataset.")
+    scene: Reference = Field(
+        default="street",
+        description="Built-in street (hill climbs by 8 % from station 40 m on), or folder of a scene of your own.",
+    )
+    vehicle: Reference = Field(default="paper-reference", description="Vehicle: name, or file of your own.")
+    surface: Reference = Field(default="dense-asphalt", description="Pavement: name, or file of your own.")
+    camera: Reference = Field(default="dashcam-480x320", description="Camera: name, or file of your own.")
     hazard_marking: Reference | None = Field(
         default=None, description="Paint on raised road features; without an entry they are left bare."
     )
-    vehicle_mode: Literal["paper", "coupled"] = "paper"
-    frames: Whole = Field(default=81, ge=2, le=int(LIMITS.frames.value))
-    frame_rate_hz: LaxNumber = Field(default=10.0, gt=0, le=LIMITS.frame_rate.value, validate_default=True)
+    vehicle_mode: Literal["paper", "coupled"] = Field(
+        default="paper",
+        description="Model of the motion; a vehicle that was fitted brings its own mode.",
+    )
+    frames: Whole = Field(
+        default=81,
+        ge=2,
+        le=int(LIMITS.frames.value),
+        description="Pictures of a clip, the one at 0 s among them.",
+    )
+    frame_rate_hz: LaxNumber = Field(
+        default=10.0,
+        gt=0,
+        le=LIMITS.frame_rate.value,
+        validate_default=True,
+        description="Pictures a second [Hz]",
+    )
     duration_s: LaxNumber | None = Field(
         default=None,
         gt=0,
-        description="Length of the telemetry from the first frame on; without it, it ends with the last frame.",
+        description="Length of the telemetry from the first frame on; without it, it ends with the last frame [s]",
     )
     low_speed: Literal["steady", "literal"] = Field(
         default="steady",
@@ -52,7 +69,12 @@ class GridFile(Blocks):
         description="Coupling that is cut on purpose (the paper's ablation): the picture stays that of the scenario,"
         " the motion is the variant's. full cuts none.",
     )
-    seed: Whole = Field(default=2025, ge=0, lt=2**53)
+    seed: Whole = Field(
+        default=2025,
+        ge=0,
+        lt=2**53,
+        description="First visual seed: places of drops, flakes and patches of snow.",
+    )
     visual_seeds: Whole = Field(
         default=1, ge=1, le=1000, description="Clips of each scenario, with visual seeds from seed upward."
     )
@@ -60,14 +82,16 @@ class GridFile(Blocks):
         default="linear",
         description="linear adds up light; paper adds drops and flakes as 8-bit differences (Appendix A.4).",
     )
-    labels: bool = False
+    labels: bool = Field(
+        default=False, description="Stores normal, road position, flow and marks of each pixel too."
+    )
     compression: Literal["zstd", "lz4"] = Field(
         default="zstd",
         exclude_if=lambda compression: compression == "zstd",
         description="Of stored frames, without loss; lz4 is written more slowly and read more quickly, for training.",
     )
-    pictures: bool = True
-    base: PartialScenario = PartialScenario()
+    pictures: bool = Field(default=True, description="false makes telemetry alone, as --no-frames does.")
+    base: PartialScenario = Field(default=PartialScenario(), description="Fields of every scenario.")
     exclude: list[Condition] = Field(
         default=[], description="Combinations to leave out: those that meet any of these conditions."
     )

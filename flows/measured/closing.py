@@ -166,7 +166,7 @@ def _number_json(
 
 
 def _say_own_numbers(outcome: Outcome, library: Sequence[Effect]) -> str:
-    """Return what the numbers that the file hardly knew say of the car, else the one pulled most beside no name and no hint."""
+    """Return what the numbers that the file hardly knew say of the car, else the one pulled most beside no name."""
     told = {rival.name for _, rival in outcome.verdict.rivals}
     if own := [effect for effect in outcome.calibrated if effect.name not in told]:
         return join_phrases(say_effect(effect, library) for effect in own)

@@ -181,10 +181,11 @@ class Run:
         first : sample that becomes the first
         end : sample behind the last; None for that of the run
         """
-        drive, slope, throttle, sampled = (
+        drive, slope, throttle = (
             None if trace is None else trace[first:end]
-            for trace in (self.drive_torque, self.road_slope, self.throttle, self.sampled)
+            for trace in (self.drive_torque, self.road_slope, self.throttle)
         )
+        sampled = None if self.sampled is None else self.sampled[first:end]
         return replace(
             self, pressure=self.pressure[first:end], response=self.response[first:end], drive_torque=drive,
             road_slope=slope, throttle=throttle, sampled=sampled,

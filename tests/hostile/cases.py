@@ -1,13 +1,13 @@
 """Cases that the fuzzer found: each is a change of a sound document that its loader must refuse in a sentence.
 
 `TEXTS` take a whole file's place. `PLACES` put a value into a tree, `WORDS` replace bytes, `COLUMNS` replace a column
-of Parquet; each names the parser of `benchmarks.fuzzing.parsers` and the file of its sound document.
+of Parquet; each names the parser of `studies.fuzzing.parsers` and the file of its sound document.
 """
 
 import pyarrow as pa
 
-from benchmarks.fuzzing.rules import INF, NAN
-from benchmarks.fuzzing.trees import BOMB, Raw
+from studies.fuzzing.rules import INF, NAN
+from studies.fuzzing.trees import BOMB, Raw
 
 DEEP = b"[" * 100_000
 TEXTS: dict[str, bytes] = {

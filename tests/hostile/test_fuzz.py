@@ -8,11 +8,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from benchmarks.fuzzing import trees
-from benchmarks.fuzzing.__main__ import plan_inputs
-from benchmarks.fuzzing.desk import FINDINGS, Desk, lay_out, read_input, write_documents
-from benchmarks.fuzzing.inputs import Documents, Input, make_input
-from benchmarks.fuzzing.parsers import BY_NAME, PARSERS
+from studies.fuzzing import trees
+from studies.fuzzing.__main__ import plan_inputs
+from studies.fuzzing.desk import FINDINGS, Desk, lay_out, read_input, write_documents
+from studies.fuzzing.inputs import Documents, Input, make_input
+from studies.fuzzing.parsers import BY_NAME, PARSERS
 from tests.hostile.cases import COLUMNS, PLACES, TEXTS, WORDS
 
 OF_TEXT = [parser.name for parser in PARSERS if parser.name not in {"manifest", "telemetry", "planned grid"}]
@@ -56,7 +56,7 @@ def test_forty_inputs_are_refused_in_a_sentence_or_sound(shelf, tmp_path):
     ]
     assert len(readings) >= 40 and {name for name, *_ in readings} == set(BY_NAME)
     told = [reading for reading in readings if reading[2] in FINDINGS]
-    assert told == [], "python -m benchmarks.fuzzing --seed 12 --parser P --input N makes one of them again"
+    assert told == [], "python -m studies.fuzzing --seed 12 --parser P --input N makes one of them again"
 
 
 def test_an_input_can_be_made_again_alone(documents):

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.fuzzing import desk, watched
-from benchmarks.fuzzing.desk import write_documents
-from benchmarks.fuzzing.parser import Parser
-from benchmarks.fuzzing.rules import FINITE
-from benchmarks.fuzzing.sound import write_texts
-from benchmarks.fuzzing.watched import read_watched
+from studies.fuzzing import desk, watched
+from studies.fuzzing.desk import write_documents
+from studies.fuzzing.parser import Parser
+from studies.fuzzing.rules import FINITE
+from studies.fuzzing.sound import write_texts
+from studies.fuzzing.watched import read_watched
 from tasks.errors import InputError
 
 kept = []
@@ -78,7 +78,7 @@ def test_what_becomes_of_an_input_is_counted(tmp_path, monkeypatch, read, outcom
         monkeypatch.setattr(watched, "LONGEST_WAIT_S", 2.0)
     monkeypatch.setattr(watched, "LOOKED_AT_S", 0.1)
     monkeypatch.setattr(watched, "LARGEST_BYTES", 2**50)  # a fork of a large process is no finding
-    monkeypatch.setattr("benchmarks.fuzzing.inputs.KNOWINGLY", 1.0)
+    monkeypatch.setattr("studies.fuzzing.inputs.KNOWINGLY", 1.0)
     (tmp_path / "p" / "0").mkdir(parents=True)
     (tmp_path / "p" / "0" / "a.yaml").write_text("a: 1")
     readings = list(read_watched([("p", range(3))], tmp_path, seed=1, workers=1))

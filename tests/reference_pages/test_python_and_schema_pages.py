@@ -10,6 +10,7 @@ from flows.store.arrays import arrays_of
 from reference_pages.modules import PAGES, write_module_page
 from reference_pages.schema import write_schema_page
 from tasks.conventions import CHANNELS_BY_NAME
+from tests.browsers import open_chromium
 from tests.documents import DOCUMENTS, list_blocks
 
 OBJECTS = [path for _, _, objects in PAGES.values() for path in objects]
@@ -61,16 +62,35 @@ def test_every_equation_of_the_documents_becomes_mathml():
         assert "\\" not in words and "&" not in words, block
 
 
-@pytest.mark.minutes
-def test_the_site_builds_without_a_warning(tmp_path):
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
     pytest.importorskip("mkdocs", reason="mkdocs builds the site: pip install 'musync-gs[docs]'")
     import subprocess
     import sys
 
     from manifests.provenance import SOURCE_ROOT
 
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path)]
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)]
     done = subprocess.run(command, cwd=SOURCE_ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    page = (tmp_path / "reference" / "python" / "vehicle.html").read_text()
+    return folder
+
+
+@pytest.mark.minutes
+def test_the_site_builds_without_a_warning(site):
+    page = (site / "reference" / "python" / "vehicle.html").read_text()
     assert "compute_contact_load" in page and "(paper, Eq. app_unilateral_contact)" in page
+
+
+@pytest.mark.minutes
+def test_the_search_works_from_files_and_fetches_nothing(site):
+    asked = []
+    with open_chromium() as browser:
+        tab = browser.new_page()
+        tab.on("request", lambda request: asked.append(request.url))
+        tab.goto((site / "how-to" / "write-a-grid.html").as_uri())
+        tab.click(".md-search__input")
+        tab.keyboard.type("quarantine")
+        assert tab.get_attribute(".md-search-result__link", "href").startswith("file:")
+    assert [url for url in asked if not url.startswith(("file:", "data:"))] == []

@@ -27,15 +27,26 @@ def numbers(line):
 def test_the_documented_table_is_the_computed_one(rows):
     """To two units of the last printed digit of a length: the Euler step of paper mode scatters by millimetres."""
     lines = DOCUMENT.read_text(encoding="utf-8").splitlines()
-    start = lines.index(format_table({})[0])
-    documented = dict(numbers(line) for line in lines[start + 2 : start + 2 + len(rows)])
-    assert list(documented) == list(rows)
+    start = lines.index(format_table({})[0]) + 2
+    documented = dict(numbers(line) for line in lines[start : lines.index("", start)])
+    computed = dict(numbers(line) for line in format_table(rows)[2:])
     tolerance = (0.02, 0.02, 0.005, 0.06, 0.05, 0.02, 0.001, 20.0)
-    for name, line in zip(rows, format_table(rows)[2:], strict=True):
+    for name, printed_row in documented.items():
         for found, printed, atol, title in zip(
-            numbers(line)[1], documented[name], tolerance, HEADER[1:], strict=True
+            computed[name], printed_row, tolerance, HEADER[1:], strict=True
         ):
             np.testing.assert_allclose(found, printed, atol=atol, err_msg=f"{name}, {title}")
+
+
+def test_the_documented_table_holds_the_largest_differences(rows):
+    largest = {
+        name: max(getattr(row, name) for row in rows.values())
+        for name in ("speed_rmse", "pitch_rmse_deg", "slip_rmse")
+    }
+    printed = DOCUMENT.read_text(encoding="utf-8")
+    shown = [row for name, row in rows.items() if f"| {name} | " in printed]
+    for name, value in largest.items():
+        assert max(getattr(row, name) for row in shown) == pytest.approx(value, rel=0.05), name
 
 
 def test_the_documented_dive_of_slow_stops_is_the_computed_one(drive):

@@ -54,6 +54,8 @@ Splines = tuple[NDArray[np.float64], ...]
 """Derivatives of every training run by the knots of all splines, float64 [M, K] each."""
 STEPS = 6
 """Gauss-Newton steps of a fit [1]."""
+REFUTED = 0.75
+"""Share of the fitted explanation's gain that another must lose through the simulation to be refuted [1]."""
 REFINED = 3
 """Single candidates that are tried through the simulation before the first turn [1]."""
 
@@ -99,6 +101,7 @@ class _Place:
     fitted: Fit
     splines: Splines
     splined: tuple[Hypothesis, ...] = ()
+    refuted: bool = False
 
 
 def find_explanations(
@@ -188,14 +191,31 @@ def _settle_explanation(
             place = replace(place, splines=splines, splined=place.fitted.parts)
         grams = gather_grams(place.evidence, place.fitted, place.splines, columns)
         found = search_explanations(grams, most=rules.most_effects, width=rules.beam_width, forms=forms)
-        told = keep_members(found[0], tell_members(grams, found[0], rules))
         here = next((e for e in found if _is_fitted(e, place.fitted)), None)
+        if place.refuted and here is not None:
+            # far from a fit without its effect, derivatives about that fit promise what no simulation keeps
+            found = [e for e in found if e.log_odds <= here.log_odds or not _leaves_out(e, here)]
+        told = keep_members(found[0], tell_members(grams, found[0], rules))
         if turn == rules.most_turns - 1 or _is_fitted(told, place.fitted):
             break
         if forms and here is not None and not _is_worth_it(found[0], here, grams, rules):
             break
-        place = _move_to(told, place, null)
+        moved = _move_to(told, place, null)
+        lost = _compute_cost(moved.fitted, told) - _compute_cost(place.fitted, told if here is None else here)
+        refuted = here is not None and lost > REFUTED * here.gain + log(rules.named_odds)
+        place = replace(place, refuted=True) if refuted else moved
     return place, grams, found
+
+
+def _compute_cost(fitted: Fit, explanation: Explanation) -> float:
+    """Return half the misfit of a fit, less the logarithm of the prior odds of what it holds [1]."""
+    return 0.5 * fitted.objective - sum(member.log_prior for member in explanation.members)
+
+
+def _leaves_out(explanation: Explanation, here: Explanation) -> bool:
+    """Whether an explanation with effects of the library leaves out a member of the fitted one."""
+    known = any(member.effect is not None for member in explanation.members)
+    return known and not set(here.names) <= set(explanation.names)
 
 
 def _is_worth_it(best: Explanation, here: Explanation, grams: RunGrams, rules: DecisionRules) -> bool:
@@ -322,7 +342,7 @@ def _move_to(explanation: Explanation, place: _Place, null: Fit) -> _Place:
     sigma = widen_session(explanation, place.evidence.session_sigma)
     fitted = fit_hypotheses(place.evidence.train, parts, sigma, session=null.session, iterations=STEPS)
     evidence = differentiate_at(place.evidence, fitted)
-    return replace(place, evidence=evidence, fitted=_refit(evidence, fitted))
+    return replace(place, evidence=evidence, fitted=_refit(evidence, fitted), refuted=False)
 
 
 def _refit(evidence: Evidence, fitted: Fit) -> Fit:

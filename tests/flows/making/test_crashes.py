@@ -2,12 +2,12 @@
 
 import time
 
-from benchmarks.crashes.commands import kill_commands
-from benchmarks.crashes.disturbances import write_without_right
-from benchmarks.crashes.kills import files_of, half_clips
-from benchmarks.crashes.processes import start_run
 from flows.making.generate import generate_dataset
 from flows.store.layout import Layout
+from studies.crashes.commands import kill_commands
+from studies.crashes.disturbances import write_without_right
+from studies.crashes.kills import files_of, half_clips
+from studies.crashes.processes import start_run
 
 
 def test_a_killed_run_resumes_to_the_same_bytes_and_commits_no_half_clip(toy_dataset, tmp_path):

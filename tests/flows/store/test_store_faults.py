@@ -2,7 +2,7 @@
 
 import pytest
 
-from benchmarks.store_faults.study import study_faults
+from studies.store_faults.study import study_faults
 
 
 @pytest.mark.minutes
