@@ -6,7 +6,7 @@ from typing import Any
 from flows.pages.figures import Figure, Line, Panel, Style, pick_style
 
 COLUMNS = 4
-CHANCE = Line(name="chance", x=[0.0, 1.0], y=[0.0, 1.0], style=Style("soft", "dot"))
+CHANCE = Line(name="chance", x=[0.0, 1.0], y=[0.0, 1.0], style=Style("soft", "dotted"))
 
 
 def draw_roc(rows: Sequence[Mapping[str, Any]], meanings: Mapping[str, str]) -> Figure:

@@ -166,7 +166,7 @@ def _draw_geometry(rows: Sequence[Row]) -> list[Figure]:
             ]
             lines.append(Line(name=method, x=windows, y=means, marked=True, style=pick_style(place)))
         floors = [np.mean([r["floor"] for r in mine if r["window"] == w]) for w in windows]
-        lines.append(Line(name="perfect pose", x=windows, y=floors, style=Style("ink", "dash")))
+        lines.append(Line(name="perfect pose", x=windows, y=floors, style=Style("ink", "dashed")))
         if mine:
             panels.append(
                 Panel(title=name, x="smoothing window [frames]", y="error over response", lines=lines)

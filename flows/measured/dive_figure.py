@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from flows.pages.figures import Figure, Line, Panel, Style
 
 CURVES = {
-    "dive_deg": ("measured", Style("ink", "dash")),
+    "dive_deg": ("measured", Style("ink", "dashed")),
     "predicted_dive_deg": ("predicted", Style("a")),
 }
 TIME = "time from the event's start [s]"

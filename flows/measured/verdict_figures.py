@@ -27,7 +27,7 @@ STANDING = 1.0
 POINTS = 1000
 """Points of a curve that a figure of a run can show."""
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-STYLES = {"frozen": Style("b", "dot"), "after": Style("a")}
+STYLES = {"frozen": Style("b", "dotted"), "after": Style("a")}
 """Of the vehicle file's model, and of the one with what was found."""
 
 

@@ -14,7 +14,10 @@ from numpy.typing import NDArray
 STYLE_SHEET = Path(__file__).with_name("page.css")
 COLOURS = ("a", "b", "c", "d", "e", "f")
 """Of the style sheet, which has ``ink`` and ``soft`` too."""
-DASHES = ("solid", "dash", "dot")
+DASHES = {"solid": "solid", "dashed": "dash", "dotted": "dot"}
+"""Dashes of a line by name, as Plotly calls them."""
+BAND = "30"
+"""Opacity of a band, as the end of its colour."""
 DIGITS = 6
 """Of a number, that a screen can show."""
 GAP_PX, STACKED_GAP_PX = 66, 26
@@ -125,7 +128,7 @@ def pick_style(place: int) -> Style:
     place : of the line among those of the figure, from 0
     """
     dash, colour = divmod(place, len(COLOURS))
-    return Style(COLOURS[colour], DASHES[dash % len(DASHES)])
+    return Style(COLOURS[colour], [*DASHES][dash % len(DASHES)])
 
 
 @cache
@@ -171,7 +174,7 @@ def as_plotly(figure: Figure, digits: int | None = DIGITS) -> dict[str, Any]:
         })  # fmt: skip
         layout["shapes"] += [
             {"type": "rect", "xref": f"x{place}", "yref": f"y{place} domain", "x0": start, "x1": end, "y0": 0, "y1": 1,
-             "fillcolor": read_colours()["soft-band"], "line": {"width": 0}, "layer": "below"}
+             "fillcolor": read_colours()["soft"] + BAND, "line": {"width": 0}, "layer": "below"}
             for start, end in panel.shaded
         ]  # fmt: skip
     return {"data": data, "layout": layout}
@@ -179,18 +182,18 @@ def as_plotly(figure: Figure, digits: int | None = DIGITS) -> dict[str, Any]:
 
 def _draw_line(line: Line, digits: int | None) -> list[dict[str, Any]]:
     """Return the edges of a line's band, and the line."""
-    colour, filled = (read_colours()[name] for name in (line.style.colour, f"{line.style.colour}-band"))
+    colour = read_colours()[line.style.colour]
     x, y, low, high = (_plain(values, digits) for values in (line.x, line.y, line.low, line.high))
     base = {"type": "scatter", "x": x, "legendgroup": line.name}
     edge = base | {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip", "showlegend": False}
     drawn = base | {
         "mode": {None: "markers", False: "lines", True: "lines+markers"}[line.marked], "name": _as_text(line.name),
-        "y": y, "hovertemplate": "%{y:.3g}", "line": {"color": colour, "width": 1.6, "dash": line.style.dash},
+        "y": y, "hovertemplate": "%{y:.3g}", "line": {"color": colour, "width": 1.6, "dash": DASHES[line.style.dash]},
         "marker": {"size": 5, "color": colour},
     }  # fmt: skip
     if low is None:
         return [drawn]
-    return [edge | {"y": low}, edge | {"y": high, "fill": "tonexty", "fillcolor": filled}, drawn]
+    return [edge | {"y": low}, edge | {"y": high, "fill": "tonexty", "fillcolor": colour + BAND}, drawn]
 
 
 def _as_text(text: str) -> str:

@@ -14,12 +14,16 @@ const hidden = new Set();
 const colourOf = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 /** Names of the style sheet's colours by their light value, in which figures come. */
-const NAMES = Object.fromEntries(
-  [...document.styleSheets[0].cssRules[0].style].map((name) => [document.styleSheets[0].cssRules[0].style.getPropertyValue(name).trim(), name]));
+const light = document.styleSheets[0].cssRules[0].style;
+const NAMES = Object.fromEntries([...light].map((name) => [light.getPropertyValue(name).trim(), name]));
 
-/** A part of a figure in the colours of the page. */
-const paint = (value) => JSON.parse(JSON.stringify(value), (key, shown) =>
-  (key.endsWith("color") && (NAMES[shown] || shown.startsWith("--")) ? colourOf(NAMES[shown] ?? shown) : shown));
+/** A part of a figure in the colours of the page; what follows the six digits of a colour is its opacity. */
+const paint = (value) => JSON.parse(JSON.stringify(value), (key, shown) => {
+  if (!key.endsWith("color")) return shown;
+  const name = NAMES[shown.slice(0, 7)];
+  if (name) return colourOf(name) + shown.slice(7);
+  return shown.startsWith("--") ? colourOf(shown) : shown;
+});
 
 const STYLE = {
   margin: { l: 56, r: 12, t: 26, b: 40 }, showlegend: false,

@@ -9,7 +9,6 @@ from matplotlib.figure import Figure as Drawing
 
 from flows.pages.figures import Figure, Panel, read_colours
 
-DASHES = {"solid": "-", "dash": (0, (4, 2)), "dot": ":"}
 WIDTH, HEIGHT = (11.0, 5.4), 2.6
 """Of a figure of several panels a row and of one, and of a row [in]."""
 
@@ -55,7 +54,7 @@ def _draw_panel(axis: Axes, panel: Panel, colours: dict[str, str]) -> None:
             axis.fill_between(x, low, high, color=colour, alpha=0.2, lw=0)
         axis.plot(
             x, np.asarray(line.y, float), color=colour, lw=1.3, label=_as_text(line.name) or "_",
-            ls="" if line.marked is None else DASHES[line.style.dash],
+            ls="" if line.marked is None else line.style.dash,
             marker="" if line.marked is False else ("x" if line.marked is None else "o"), ms=4,
         )  # fmt: skip
     axis.set_title(_as_text(panel.title), fontsize=9, loc="left")

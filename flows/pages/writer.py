@@ -15,7 +15,6 @@ from flows.pages.figures import STYLE_SHEET, Figure, as_plotly
 FILES = Path(__file__).parent
 LETTER = re.compile(r"[^\W\d]")
 HASH = re.compile(r"[0-9a-f]{16,}(, [0-9a-f]{16,})*")
-CSS_DASHES = {"solid": "solid", "dash": "dashed", "dot": "dotted"}
 DASH = "–"
 """In place of a value that there is not."""
 
@@ -170,7 +169,7 @@ def fill_template(name: str, *, folder: Path | None = None, **values: Any) -> st
     )  # fmt: skip
     pages.filters |= {
         "kind": _name_kind, "look": _name_look, "plotly": as_plotly, "value": format_value,
-        "words": lambda name: name.replace("_", " "), "css_dash": CSS_DASHES.__getitem__,
+        "words": lambda name: name.replace("_", " "),
     }  # fmt: skip
     return pages.get_template(name).render(**values)
 

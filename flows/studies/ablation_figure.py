@@ -13,7 +13,7 @@ STYLES = {
     "vertical-only": Style("c"),
     "fixed-mu": Style("d"),
     "full": Style("a"),
-    "reference": Style("ink", "dash"),
+    "reference": Style("ink", "dashed"),
 }
 RATE = {"rain": "rain [mm/h]", "snow": "snow, water equivalent [mm/h]"}
 

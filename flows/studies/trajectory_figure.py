@@ -55,7 +55,7 @@ def draw_trajectories(
         ]
         shown = [Line(name=told, x=time, y=y, style=style) for told, y, style in curves]
         left = [Line(name=told, x=time, y=y - truth[name], style=style) for told, y, style in curves]
-        reference_line = Line(name="reference", x=time, y=truth[name], style=Style("ink", "dash"))
+        reference_line = Line(name="reference", x=time, y=truth[name], style=Style("ink", "dashed"))
         above.append(Panel(y=label, lines=[reference_line, *shown], shaded=[window]))
         below.append(Panel(y="difference", lines=left, shaded=[window]))
     pairs = [[*above[k : k + 2], *below[k : k + 2]] for k in (0, 2)]

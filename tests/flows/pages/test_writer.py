@@ -67,7 +67,7 @@ def assert_text_alone(html: str, hostile: str) -> Elements:
 
 def draw(name: str) -> Figure:
     line = Line(name=name, x=[0.0, 1.0, 2.0], y=[1.0, None, float("nan")], low=[0, 0, 0], high=[2, 2, 2])
-    other = Line(name="other", x=[0.0, 2.0], y=[1.23456789, 0.0], style=Style("b", "dot"))
+    other = Line(name="other", x=[0.0, 2.0], y=[1.23456789, 0.0], style=Style("b", "dotted"))
     panels = [Panel(title=name, x=name, y=name, lines=[line, other], shaded=[(0.5, 1.0)]) for _ in range(2)]
     return Figure(caption=name, panels=panels, columns=2)
 
