@@ -14,8 +14,7 @@ from flows.drawing import as_svg
 from flows.measured.dive_figure import draw_dives
 from flows.store.outputs import Outputs
 from flows.studies.report import Drawing, StudyTable, write_study_page
-from tasks.campaign.attrition import tabulate_attrition
-from tasks.campaign.selection import Judged, select_events
+from tasks.campaign.selection import Judged, select_events, tabulate_attrition
 from tasks.studies.brake_dive import pitch_mode, with_model
 from tasks.studies.leave_one_out import VARIANTS, Fold, Score, leave_one_drive_out, macro_mean
 from tasks.vehicle.parameters import Vehicle
