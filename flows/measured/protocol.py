@@ -15,8 +15,7 @@ from flows.pages.figures import Figure
 from flows.pages.static import as_svg
 from flows.pages.writer import Section, Table, write_page
 from flows.store.outputs import Outputs
-from tasks.campaign.attrition import tabulate_attrition
-from tasks.campaign.selection import Judged, select_events
+from tasks.campaign.selection import Judged, select_events, tabulate_attrition
 from tasks.studies.brake_dive import pitch_mode, with_model
 from tasks.studies.leave_one_out import VARIANTS, Fold, Score, leave_one_drive_out, macro_mean
 from tasks.vehicle.parameters import Vehicle

@@ -1,7 +1,9 @@
 """The scheduled run as a Prefect flow: named, logged, tried again; verdicts and contact sheet as artifacts."""
 
 import base64
+from collections.abc import Mapping
 from datetime import UTC, datetime
+from inspect import signature
 from pathlib import Path
 from typing import Any
 from uuid import UUID
@@ -27,6 +29,7 @@ from prefect.runtime import deployment, flow_run
 from prefect.tasks import exponential_backoff
 
 from catalogs.grids import load_grid
+from catalogs.sentences import shorten
 from flows.running.prefect_progress import show_progress
 from flows.running.runner import RunnerName, end_with_parent
 from flows.scheduled.failure_report import is_told_of, report_failure, report_run
@@ -75,7 +78,20 @@ def _report_crash(flow: Any, flow_run: Any, state: Any) -> None:
     options = read_options(flow_run.parameters)
     at = flow_run.expected_start_time or datetime.now(UTC)
     notify = options["notify"] if is_told_of("failed", options["notify_on"]) else None
-    report_failure(options["grid"], options["root"], at, RuntimeError(state.message), notify)
+    report_failure(
+        options["grid"], options["root"], at, _explain_crash(flow_run.parameters, state.message), notify
+    )
+
+
+def _explain_crash(parameters: Mapping[str, Any], message: str) -> Exception:
+    """What ended a run from outside; Prefect ends one that has parameters of other names, and says no more of it."""
+    known = signature(scheduled.fn).parameters
+    if unknown := [name for name in parameters if name not in known]:
+        return InputError(
+            f"a run may have the parameters {', '.join(known)}; it has {shorten(', '.join(unknown))}: post it without"
+            f" ({message})"
+        )
+    return RuntimeError(message)
 
 
 @flow(name="musync-scheduled", flow_run_name=_name_run, persist_result=False, on_crashed=[_report_crash])

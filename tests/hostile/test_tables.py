@@ -148,6 +148,13 @@ def test_what_the_footer_tells_beyond_the_plan_is_refused_before_a_row_is_read(s
     assert "must have at most" in str(outcomes["audit-physics"])
 
 
+def test_each_file_of_a_table_is_bounded_before_sql_reads_it(stage):
+    *_, last = sorted(stage.dataset.telemetry.glob("frames/family=*/*.parquet"))
+    pq.write_table(pa.concat_tables([pq.read_table(last, partitioning=None)] * 120), last)
+    reseal(stage.dataset)
+    assert "must have at most" in str(endure(stage, "sql")["sql"])
+
+
 def test_folders_and_files_that_the_manifest_does_not_name_are_no_tables(stage):
     part = stage.dataset.telemetry / "ticks" / "family=dry" / "part-0000.parquet"
     for family in ("family=../../victim", "family='; ATTACH 'x", "family=dry", "family=a=b"):

@@ -101,6 +101,7 @@ RECEIPTS: dict[str, Callable[[Stage], object]] = {
     "without figures": lambda s: edit_receipt(s, lambda r: r.pop("figures")),
     "with figures that are text": lambda s: edit_receipt(s, lambda r: r.update(figures={"peak_pitch": "<b>"})),
     "with a label that is a path": lambda s: edit_receipt(s, lambda r: r.update(label="../../victim/id_rsa")),
+    "of another scenario": lambda s: edit_receipt(s, lambda r: r["scenario"].update(initial_speed_km_h=5.0)),
     "that is no JSON": lambda s: s.dataset.receipt(clip_of(s, 0)).write_text("{" * 100_000),
     "that is empty": lambda s: s.dataset.receipt(clip_of(s, 0)).write_text(""),
     "of a clip that is not there": lambda s: shutil.rmtree(s.dataset.frames / "rgb" / "c" / "0"),

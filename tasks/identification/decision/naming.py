@@ -6,6 +6,7 @@ from math import log
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtri
 
 from tasks.campaign.campaign import CHANNELS, FILE_NUMBERS, SESSION
 from tasks.identification.decision.answer import NamedEffect, Parameter, make_estimate
@@ -14,9 +15,10 @@ from tasks.identification.decision.forms import KNOTS, find_scanned_ranges, make
 from tasks.identification.decision.odds import Explanation, RunGrams, keep_members, weigh_explanation
 from tasks.identification.decision.search import Finding, make_hypotheses, widen_session
 from tasks.identification.decision.told import OpenExplanation
-from tasks.identification.inference.fit import Fit, fit_hypotheses
+from tasks.identification.inference.fit import SETTLED, Fit, fit_hypotheses
 from tasks.identification.inference.forward import predict_channels
 from tasks.identification.inference.hypothesis import Hypothesis, compose_parameters
+from tasks.identification.inference.linearisation import differentiate_about_offsets
 from tasks.identification.inference.quantiles import NORMAL_QUANTILE
 from tasks.identification.rules import DecisionRules
 from tasks.vehicle.effects.library import Effect
@@ -25,6 +27,8 @@ from tasks.vehicle.effects.ports import PORT_UNITS
 FELT = CHANNELS.index("longitudinal_acceleration")
 STEPS = 8
 """Gauss-Newton steps of a last fit [1]."""
+MOST_REFINED = 4
+"""Times that a last fit is taken about its own offsets [1]."""
 
 
 def fit_told(finding: Finding, opened: OpenExplanation) -> Fit:
@@ -58,6 +62,52 @@ def fit_told(finding: Finding, opened: OpenExplanation) -> Fit:
             )
             trials = [(*parts[:i], shape, *parts[i + 1 :]) for shape in shapes]
     return min((fit(trial) for trial in trials), key=lambda fitted: fitted.objective)
+
+
+def settle_told(
+    finding: Finding, opened: Sequence[OpenExplanation], rules: DecisionRules
+) -> tuple[list[OpenExplanation], Fit]:
+    """Return the open explanations and the fit of the first, whose members are surely large when fitted alone too.
+
+    Parameters
+    ----------
+    finding : the runs and what was fitted to them
+    opened : the explanations that are open, the first being the one that is told
+    rules : the odds of a name
+    """
+    first, *others = opened
+    reach = float(ndtri(rules.named_odds / (1.0 + rules.named_odds)))
+    while True:
+        fitted = refine_fit(finding, fit_told(finding, first))
+        large = []
+        for member in first.told:
+            if member.effect is not None:
+                value, error = _find_first_number(member, member.effect, first.explanation, fitted)
+                if abs(value) - reach * error <= member.matters:
+                    continue
+            large.append(member)
+        if len(large) == len(first.told):
+            return [first, *(other for other in others if not other.numbers >= first.numbers)], fitted
+        first = replace(first, told=tuple(large))
+
+
+def refine_fit(finding: Finding, fitted: Fit) -> Fit:
+    """Return a fit again with the derivatives taken about it and about each run's own offsets, until it settles.
+
+    Parameters
+    ----------
+    finding : the runs
+    fitted : fit of what an explanation tells
+    """
+    for _ in range(MOST_REFINED):
+        runs = differentiate_about_offsets(finding.evidence, fitted)
+        before, fitted = fitted, fit_hypotheses(
+            runs, fitted.parts, fitted.session_sigma, values=fitted.values, session=fitted.session,
+            offsets=fitted.offsets, iterations=STEPS,
+        )  # fmt: skip
+        if before.objective - fitted.objective < SETTLED:
+            break
+    return fitted
 
 
 def measure_force(finding: Finding, fitted: Fit, names: Sequence[str]) -> float:
@@ -144,23 +194,40 @@ def list_calibrated(
 def _list_parameters(
     member: Candidate, explanation: Explanation, fitted: Fit | None
 ) -> tuple[str, tuple[Parameter, ...]]:
-    """Return the name and the parameters of a member: of the last fit, with the errors of the explanation."""
+    """Return the name and the parameters of a member: of the last fit, if there is one."""
     places = explanation.find_places(member)
     value, error = explanation.values[places], explanation.errors[places]
     if member.effect is None:
         return _list_form_parameters(member, value, error, fitted)
-    first = member.effect.parameters[0]
-    values, errors = np.array([value[0]]), np.array([error[0]])
-    if fitted is not None and first.name not in SESSION:
-        values, errors = _find_part(member.name, fitted)
-        errors = np.concatenate((error, errors[1:]))
-    if fitted is not None and first.name in SESSION:
-        values = np.array([fitted.session[SESSION.index(first.name)]])
+    values, errors = value, error
+    if fitted is not None:
+        number = member.effect.parameters[0].name
+        values, errors = (
+            _find_part(member.name, fitted) if number not in SESSION else (value.copy(), error.copy())
+        )
+        values[0], errors[0] = _find_first_number(member, member.effect, explanation, fitted)
     rows = member.effect.parameters[: len(values)]
     return member.name, tuple(
         _make_parameter(row.name, v, e, row.lower, row.upper, row.unit)
         for row, v, e in zip(rows, values, errors, strict=True)
     )
+
+
+def _find_first_number(
+    member: Candidate, effect: Effect, explanation: Explanation, fitted: Fit
+) -> tuple[float, float]:
+    """Return the first number of a member by the last fit, and its error: the fit's or the explanation's.
+
+    That of the explanation knows what every other number may be off, and what differs from run to run; that of the fit
+    is about each run's own offsets. The larger holds.
+    """
+    error = float(explanation.errors[explanation.find_places(member)][0])
+    name = effect.parameters[0].name
+    if name in SESSION:
+        place = SESSION.index(name)
+        return float(fitted.session[place]), max(error, float(fitted.session_error[place]))
+    values, errors = _find_part(member.name, fitted)
+    return float(values[0]), max(error, float(errors[0]))
 
 
 def _list_form_parameters(

@@ -180,10 +180,10 @@ def list_open_explanations(
         and _has_form(best) > _has_form(f)
         and _explains_as_much(grams, f.explanation, best.explanation, rules)
     ]  # fmt: skip
-    simplest = min(
-        [f for f in within if not f.told] or laws or [f for f in within if f.names <= best.names],
-        key=lambda found: (len(found.names), -found.log_odds, -found.explanation.log_odds),
-    )
+    whole = min(laws, key=_rank_simplest) if laws else best
+    # a member whose odds do not speak for it is not told
+    parts = [f for f in within if f.names <= whole.names]
+    simplest = min([f for f in within if not f.told] or parts or [whole], key=_rank_simplest)
     apart = [f for f in within if not f.numbers >= simplest.numbers and not _holds_again(f, simplest)]
     # of explanations that add to one another the simplest stands for all
     others = [f for f in apart if not any(g.names < f.names for g in apart)]
@@ -192,6 +192,11 @@ def list_open_explanations(
         OpenExplanation(explanation=f.explanation, told=f.told, log_odds=f.log_odds - simplest.log_odds)
         for f in (simplest, *others)
     ]
+
+
+def _rank_simplest(opened: OpenExplanation) -> tuple[int, float, float]:
+    """Return by what the simplest of explanations comes first, and of those the best."""
+    return len(opened.names), -opened.log_odds, -opened.explanation.log_odds
 
 
 def _has_form(opened: OpenExplanation) -> bool:

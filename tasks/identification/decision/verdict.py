@@ -18,6 +18,7 @@ from tasks.identification.decision.naming import (
     fit_told,
     list_calibrated,
     name_members,
+    settle_told,
 )
 from tasks.identification.decision.odds import find_odds, measure_disagreement
 from tasks.identification.decision.search import Finding, find_explanations
@@ -99,8 +100,9 @@ def judge_runs(
     if foreign:
         nothing = next(e for e in finding.explanations if not e.members)
         opened = [OpenExplanation(explanation=nothing, told=(), log_odds=0.0)]
+    opened, fitted = settle_told(finding, opened, rules)
     first, *others = opened
-    evidence, fitted = finding.evidence, fit_told(finding, first)
+    evidence = finding.evidence
     named = name_members(first, finding.grams, fitted)
     rivals = _list_rivals(first, others, finding)
     tried = _list_tried(finding, first)

@@ -106,6 +106,21 @@ class RunEvidence:
         y[:, CHANNELS.index("pitch")] += offsets[PITCH_OFFSET]
         return whiten_channels(self.model.measured - y, self.rho, self.sigma, self.model.sampled)
 
+    def place(
+        self, theta: NDArray[np.float64], slots: tuple[Slot, ...], offsets: NDArray[np.float64]
+    ) -> tuple[RunModel, NDArray[np.float64], tuple[Slot, ...]]:
+        """Return the run, the parameters and the forms that have its own offsets in them.
+
+        Parameters
+        ----------
+        theta : float64 [len(EFFECT_TABLE)] all parameters [units of the table]
+        slots : forms
+        offsets : float64 [D] the run's offsets and disturbance knots
+        """
+        faster = offsets[INITIAL_SPEED] * (1.0 + float(theta[PARAMETER_INDEX["speed_scale"]]))
+        model = replace(self.model, initial_speed=self.model.initial_speed + faster)
+        return model, *move_by_offsets(theta, slots, offsets, self.knots)
+
     def add_offsets(self, residual: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return a residual with the linear part of the run's own offsets and disturbances, float64 [M].
 

@@ -139,6 +139,28 @@ def differentiate_at(evidence: Evidence, at: Fit) -> Evidence:
     )
 
 
+def differentiate_about_offsets(evidence: Evidence, at: Fit) -> tuple[RunEvidence, ...]:
+    """Return the training runs with derivatives about a fit and about each run's own offsets there, without a library.
+
+    A run's own friction decides when its anti-lock brake acts: derivatives about an offset of 0 may tell many times too
+    much about the brake there.
+
+    Parameters
+    ----------
+    evidence : the runs
+    at : fit, the new linearisation point
+    """
+    theta, slots = at.compose()
+    runs = []
+    for run, offsets in zip(evidence.train, at.offsets, strict=True):
+        model, moved, forms = run.place(theta, slots, offsets)
+        fresh = differentiate_run(
+            model, run.rho, run.sigma, moved, (), evidence.tolerances, evidence.disturbance, forms
+        )
+        runs.append(replace(fresh, model=run.model, origin=offsets))
+    return tuple(runs)
+
+
 def rescale_disturbances(evidence: Evidence, disturbance: Disturbance) -> Evidence:
     """Return the same runs under other scales of the disturbances.
 

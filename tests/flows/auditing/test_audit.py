@@ -148,6 +148,7 @@ def test_a_seed_draws_the_same_clips_again_and_without_one_nobody_knows_which(to
 
     draws = {drawn(seed) for seed in range(100)}
     assert drawn(7) == drawn(7) and {len(draw) for draw in draws} == {2} and len(draws) == 12
+    assert [len(draw_clips(manifest, share, 7)) for share in (0.0, 0.01, 0.26)] == [0, 1, 2]
     seeds = {audited(toy_dataset, share=0.0)["seed"] for _ in range(3)}
     assert len(seeds) == 3 and audited(toy_dataset, share=0.0, seed=7)["seed"] == 7
 

@@ -1,4 +1,4 @@
-"""pykitti reads the sequences and the drives; poses, packets and signs are ours."""
+"""pykitti, where it is installed, reads the sequences and the drives; times, poses, packets and signs are ours."""
 
 import numpy as np
 import pytest
@@ -6,12 +6,31 @@ import pytest
 from flows.making.catalogue import catalogue_of
 from tests.flows.exporting.conftest import BRAKING, HUMP
 
-pykitti = pytest.importorskip("pykitti", reason="pip install pykitti")
+
+@pytest.fixture
+def pykitti():
+    return pytest.importorskip("pykitti", reason="pip install pykitti")
+
+
+def test_times_poses_and_pitch_stand_in_the_files_themselves(export, stored, toy_dataset):
+    clip, mount = stored[BRAKING], catalogue_of(toy_dataset.root).camera.T_rig_camera
+    sequences = export("kitti") / "odometry"
+    np.testing.assert_allclose(
+        np.loadtxt(sequences / "sequences" / "00" / "times.txt"), clip.frames["t_ns"] / 1e9, atol=1e-6
+    )
+    camera = clip.T_world_rig @ mount
+    poses = np.loadtxt(sequences / "poses" / "00.txt").reshape(-1, 3, 4)
+    np.testing.assert_allclose(poses, (np.linalg.inv(camera[0]) @ camera)[:, :3], atol=1e-9)
+    oxts = export("kitti") / "raw" / "1970_01_01" / "1970_01_01_drive_0000_sync" / "oxts"
+    stamps = [np.datetime64(line) for line in (oxts / "timestamps.txt").read_text().splitlines()]
+    np.testing.assert_array_equal(np.array(stamps, "M8[ns]").astype(np.int64), clip.frames["t_ns"])
+    pitch = [np.loadtxt(path)[4] for path in sorted((oxts / "data").iterdir())]
+    np.testing.assert_allclose(pitch, clip.frames["pitch"], atol=1e-12)
 
 
 @pytest.mark.parametrize(("number", "label"), [(0, BRAKING), (1, HUMP)])
 def test_a_sequence_has_pictures_times_calibration_and_camera_poses(
-    export, stored, toy_dataset, number, label
+    pykitti, export, stored, toy_dataset, number, label
 ):
     clip, camera = stored[label], catalogue_of(toy_dataset.root).camera
     read = pykitti.odometry(str(export("kitti") / "odometry"), f"{number:02d}")
@@ -28,7 +47,9 @@ def test_a_sequence_has_pictures_times_calibration_and_camera_poses(
 
 
 @pytest.mark.parametrize(("number", "label"), [(0, BRAKING), (1, HUMP)])
-def test_a_drive_has_oxts_packets_in_si_with_pitch_nose_down(export, stored, toy_dataset, number, label):
+def test_a_drive_has_oxts_packets_in_si_with_pitch_nose_down(
+    pykitti, export, stored, toy_dataset, number, label
+):
     clip = stored[label]
     read = pykitti.raw(str(export("kitti") / "raw"), "1970_01_01", f"{number:04d}")
     assert [(t.second * 10**6 + t.microsecond) for t in read.timestamps] == (
@@ -57,7 +78,7 @@ def test_a_drive_has_oxts_packets_in_si_with_pitch_nose_down(export, stored, toy
     assert np.abs(risen - (ours[1:, 2, 3] - ours[0, 2, 3])).max() < 0.2 * np.abs(ours[:, 2, 3]).max() + 1e-4
 
 
-def test_a_braking_car_dips_its_nose_and_slows(export):
+def test_a_braking_car_dips_its_nose_and_slows(pykitti, export):
     packet = pykitti.raw(str(export("kitti") / "raw"), "1970_01_01", "0000").oxts[-1].packet
     assert packet.pitch > 0.001
     assert packet.af < -1

@@ -108,6 +108,25 @@ def driven() -> SimpleNamespace:
     return SimpleNamespace(ticks=ticks, frames=frames, T_world_rig=np.tile(np.eye(4), (6, 1, 1)))
 
 
+def test_the_can_bus_has_its_own_units(driven, toy_dataset):
+    for name, value in {"speed": 10.0, "wheel_speed_f": 2 * np.pi, "wheel_speed_r": 4 * np.pi}.items():
+        driven.ticks[name][:] = value
+    messages = describe_can_bus(driven, catalogue_of(toy_dataset.root).vehicle, start_us=7)
+    monitor, wheels = (messages[kind][1] for kind in ("vehicle_monitor", "zoe_veh_info"))
+    assert monitor == pytest.approx(
+        {
+            "rear_left_rpm": 120,
+            "rear_right_rpm": 120,
+            "vehicle_speed": 36,
+            "brake": 0,
+            "brake_switch": 1,
+            "utime": 500_007,
+        }
+    )
+    turns = {f"{wheel}_wheel_speed": rpm for wheel, rpm in (("FL", 60), ("FR", 60), ("RL", 120), ("RR", 120))}
+    assert wheels == pytest.approx(turns | {"longitudinal_accel": 0, "odom_speed": 36, "utime": 10_007})
+
+
 def test_what_a_reference_trace_does_not_know_is_no_key_of_a_message(driven, toy_dataset):
     vehicle = catalogue_of(toy_dataset.root).vehicle
     for name in ("brake_pressure_mpa", "wheel_speed_f", "wheel_speed_r"):

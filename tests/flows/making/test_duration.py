@@ -136,3 +136,4 @@ def test_rule_and_length_decide_the_ids_of_clips_and_coupled_mode_has_no_rule(tm
     assert id_of()[1] and not id_of(low_speed="literal")[1]
     coupled = id_of(vehicle_mode="coupled")
     assert coupled == id_of(vehicle_mode="coupled", low_speed="literal") and not coupled[1]
+    assert coupled[0] not in ids

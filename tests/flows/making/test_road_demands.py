@@ -48,14 +48,14 @@ def write_bend(folder: Path, *scenarios: str) -> str:
 
 def test_more_than_the_grip_is_refused_with_clip_station_demand_and_what_there_is(tmp_path):
     grid = write_bend(
-        tmp_path, "ice: {weather: ice, initial_speed_km_h: 36}", "dry: {initial_speed_km_h: 36}"
+        tmp_path, "ice: {weather: ice, initial_speed_km_h: 28.8}", "dry: {initial_speed_km_h: 28.8}"
     )
     with pytest.raises(InputError) as caught:
         make_plan(grid, "cpu")
     (problem,) = caught.value.problems
     for words in (
         "scenario ice: the bend at station",
-        "asks 2.00 m/s2 at 36 km/h",
+        "asks 1.28 m/s2 at 29 km/h",
         "gives 0.98",
         "drive more slowly",
     ):

@@ -23,6 +23,19 @@ def test_a_brake_in_a_turn_is_told(tmp_path: Path) -> None:
     assert any("log (up to 8" in warning for warning in report["warnings"])
 
 
+def test_a_unit_that_nobody_knows_is_told_and_that_of_the_map_is_taken(tmp_path: Path) -> None:
+    log = log_signal(braking_columns())
+    source = Path(write_csv(tmp_path / "log.csv", log))
+    names, *rows = source.read_text().splitlines()
+    units = ",".join("furlong/h" if name == "v_kmh" else "" for name in log)
+    source.write_text("\n".join([names, units, *rows]))
+    report = import_measurements(
+        str(source), map=write_map(tmp_path, csv={"units_row": True}), out=str(tmp_path / "campaign")
+    )
+    (told,) = [warning for warning in report["warnings"] if "furlong/h" in warning]
+    assert told.startswith("signal v_kmh is in furlong/h by its file") and "taken to be in km/h" in told
+
+
 @pytest.mark.parametrize(("computed", "told"), [(False, True), (True, False)])
 def test_slopes_that_no_map_names_are_told_where_an_accelerometer_feels_them(
     tmp_path: Path, computed: bool, told: bool

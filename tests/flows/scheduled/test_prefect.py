@@ -72,9 +72,11 @@ def scheduled_flows():
     scheduling.generate_dataset = wrong
     state = prefect_schedule.scheduled(**asked, return_state=True)
     serve("killed")
-    run = SimpleNamespace(parameters=asked | {"notify": "touch pwned"}, expected_start_time=datetime.now(UTC))
-    (hook,) = prefect_schedule.scheduled.on_crashed_hooks
-    hook(None, run, SimpleNamespace(message="status code -9"))
+    now, (hook,) = datetime.now(UTC), prefect_schedule.scheduled.on_crashed_hooks
+    hook(None, SimpleNamespace(parameters=asked, expected_start_time=now), SimpleNamespace(message="status code -9"))
+    serve("posted")
+    posted = SimpleNamespace(parameters=asked | {"notify": "touch pwned"}, expected_start_time=now)
+    hook(None, posted, SimpleNamespace(message="status code 1"))
     with get_client(sync_client=True) as client:
         found = {a.key: [a.type, a.data] for a in client.read_artifacts()}
         names = [run.name for run in client.read_flow_runs()]
@@ -286,8 +288,13 @@ def test_a_run_that_fails_for_good_is_reported_and_the_hook_told_once(scheduled)
 
 def test_a_run_that_was_killed_is_reported_by_whoever_started_it(scheduled):
     (report,) = (scheduled["folder"] / "killed" / "reports").iterdir()
-    assert "status code -9" in report.read_text()
-    assert (scheduled["folder"] / "told").read_text().splitlines()[1:] == [str(report)]
+    assert "error: RuntimeError: status code -9\n" in report.read_text()
+    assert (scheduled["folder"] / "told").read_text().splitlines()[1] == str(report)
+
+
+def test_the_report_of_a_run_with_an_unknown_parameter_names_it(scheduled):
+    (report,) = (scheduled["folder"] / "posted" / "reports").iterdir()
+    assert "scheduler, keep; it has notify: post it without (status code 1)" in report.read_text()
 
 
 def test_the_deployment_for_a_work_pool_names_a_flow_and_parameters_that_exist_and_are_sound(scheduled):
