@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from math import log
+from math import inf, log
 
 import numpy as np
 from scipy.special import ndtri
@@ -160,17 +160,21 @@ def list_open_explanations(
     needed = [take_away_members(grams, explanation, rules) for explanation in reversed(ranked)]
     # of the same members the best comes last, and stays
     by_told: dict[Told, OpenExplanation] = {}
+    most = -inf
     for explanation in {e.names: e for e in needed}.values():
         told = find_shared_members(grams, explanation, rules)
         # what the runs disagree about may leave another explanation as good as the best, and no better
         against = min(-compare_explanations(grams, ranked[0], explanation, rules.signature_error), 0.0)
+        most = max(most, against)
+        if not told and any(is_surely_large(explanation, m, rules) for m in explanation.members):
+            continue  # it holds something, and nothing that may be named
         known = by_told.get(frozenset(m.name for m in told))
         if known is None or against > known.log_odds:
             found = OpenExplanation(explanation=explanation, told=told, log_odds=against)
             by_told[found.names] = found
-    span = log(rules.named_odds)
-    most = max(found.log_odds for found in by_told.values())
-    within = [found for found in by_told.values() if found.log_odds >= most - span]
+    within = [found for found in by_told.values() if found.log_odds >= most - log(rules.named_odds)]
+    if not within:
+        return [OpenExplanation(explanation=ranked[0], told=(), log_odds=0.0)]
     best = max(within, key=lambda found: (found.log_odds, found.explanation.log_odds))
     # what an effect of the library explains as well is no form
     laws = [
