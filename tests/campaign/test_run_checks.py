@@ -189,8 +189,9 @@ def test_an_effect_that_the_model_lacks_is_no_fault(effect: Effect, share: float
     theta = np.zeros(len(EFFECT_TABLE))
     for k, parameter in enumerate(effect.parameters):
         bound = parameter.upper if share > 0 else parameter.lower
-        # a car's, where the bounds are those of trucks
-        size = np.clip(abs(share) * bound, -20.0 * parameter.step, 20.0 * parameter.step)
+        size = abs(share) * bound
+        if parameter.effect == "engine braking":
+            size = min(size, 10.0 * parameter.step)  # a car's, where the bounds are those of trucks
         theta[parameter.index] = size if k == 0 else parameter.start
     for speed, peak in ((6.0, 1.0), (15.0, 1.5), (20.0, 4.0)):
         run = replace(plain_run(speed, peak), disc_rise=150.0)

@@ -126,7 +126,7 @@ def test_held_out_runs_do_not_decide() -> None:
 def test_where_nothing_is_missing_nothing_is_named_and_the_verdict_says_why() -> None:
     verdict = judged({}, change=lambda campaign: replace(campaign, brake_rest=0.05))
     assert (verdict.verdict, verdict.effects, verdict.rivals) == ("NOTHING", (), ())
-    refusal, gauge = verdict.reasons
+    refusal, *_, gauge = verdict.reasons
     assert "has odds of" in refusal and "a name needs 20 : 1" in refusal
     assert "rests at 0.050 MPa" in gauge
     assert 0.0 < verdict.detectable["brake_lag"] < 0.08

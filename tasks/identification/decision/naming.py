@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from tasks.campaign.campaign import CHANNELS, SESSION
-from tasks.identification.decision.answer import NamedEffect, Parameter
+from tasks.campaign.campaign import CHANNELS, FILE_NUMBERS, SESSION
+from tasks.identification.decision.answer import NamedEffect, Parameter, make_estimate
 from tasks.identification.decision.candidates import Candidate
 from tasks.identification.decision.forms import KNOTS, find_scanned_ranges, make_form_hypotheses
 from tasks.identification.decision.odds import Explanation, RunGrams, keep_members, weigh_explanation
@@ -162,6 +162,33 @@ def name_members(opened: OpenExplanation, grams: RunGrams, fitted: Fit | None) -
             )
         )
     return sorted(named, key=lambda effect: -effect.gain)
+
+
+def list_calibrated(
+    fitted: Fit, named: Sequence[NamedEffect], library: Sequence[Effect], least: float
+) -> list[NamedEffect]:
+    """Return the vehicle's own numbers that a prediction rests on where its file hardly knows the brake's gain.
+
+    They are no discovery: those whose 95 % interval does not hold the file's value, without what is named.
+
+    Parameters
+    ----------
+    fitted : fit of what is named
+    named : effects that are named
+    library : effects, of which the numbers are
+    least : tolerance of the gain from which the file hardly knows it [1]
+    """
+    if fitted.session_sigma[FILE_NUMBERS.index("pressure_gain")] < least:
+        return []
+    told = {effect.parameters[0].name for effect in named}
+    numbers = {e.parameters[0].name: e for e in library if e.effect_class == "retune"}
+    calibrated = []
+    for name, value, error in zip(FILE_NUMBERS, fitted.session, fitted.session_error, strict=True):
+        if name in numbers and name not in told and abs(value) > NORMAL_QUANTILE * error:
+            row = numbers[name].parameters[0]
+            estimate = _make_parameter(name, value, error, row.lower, row.upper, row.unit)
+            calibrated.append(make_estimate(numbers[name], estimate, float(error)))
+    return calibrated
 
 
 def _list_parameters(

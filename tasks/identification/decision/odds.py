@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.linalg.lapack import dpotrf, dpotrs
 
+from tasks.campaign.campaign import FILE_NUMBERS
 from tasks.identification.decision.candidates import Candidate, Columns
 
 ALONG_ROAD = {"longitudinal_force", "brake_torque"}
@@ -90,7 +91,7 @@ class Explanation:
     values : float64 [K] of each member's columns, one after the other [their units]
     errors : float64 [K] their standard deviations
     spreads : standard deviation from run to run of each member, over its size [1]
-    session : float64 [7] numbers of the session
+    session : float64 [8] numbers of the session
     everything : float64 [C] mean of every column's number where the gain is taken, without spread of the runs; 0 where
         it takes no part
     """
@@ -177,7 +178,7 @@ def weigh_explanation(
     return Explanation(
         members=tuple(members), log_odds=gain_with_spread + sum(m.log_prior for m in members), gain=gain, values=values,
         errors=np.sqrt(np.einsum("ij,ij->j", inverse, inverse)), spreads=tuple(spreads),
-        session=(mean + prior.centre)[len(nobody.columns) - 7 : len(nobody.columns)], everything=everything,
+        session=(mean + prior.centre)[: len(nobody.columns)][-len(FILE_NUMBERS) :], everything=everything,
     )  # fmt: skip
 
 

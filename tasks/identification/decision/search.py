@@ -6,8 +6,15 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.campaign import SESSION, Campaign
-from tasks.identification.decision.candidates import Candidate, Columns, can_show, list_columns, tell_limit
+from tasks.campaign.campaign import FILE_NUMBERS, SESSION, Campaign
+from tasks.identification.decision.candidates import (
+    Candidate,
+    Columns,
+    can_show,
+    list_columns,
+    tell_curve,
+    tell_limit,
+)
 from tasks.identification.decision.forms import (
     KNOTS,
     RIDGE,
@@ -17,6 +24,7 @@ from tasks.identification.decision.forms import (
     rewhiten_splines,
 )
 from tasks.identification.decision.odds import (
+    FEWEST,
     Explanation,
     RunGrams,
     compare_explanations,
@@ -36,6 +44,7 @@ from tasks.identification.inference.linearisation import (
     prepare_evidence,
     rescale_disturbances,
 )
+from tasks.identification.inference.start import GAIN, GRIP, estimate_session, is_grip_free
 from tasks.identification.rules import DecisionRules
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import Effect
@@ -45,6 +54,8 @@ Splines = tuple[NDArray[np.float64], ...]
 """Derivatives of every training run by the knots of all splines, float64 [M, K] each."""
 STEPS = 6
 """Gauss-Newton steps of a fit [1]."""
+REFUTED = 0.75
+"""Share of the fitted explanation's gain that another must lose through the simulation to be refuted [1]."""
 REFINED = 3
 """Single candidates that are tried through the simulation before the first turn [1]."""
 
@@ -90,6 +101,7 @@ class _Place:
     fitted: Fit
     splines: Splines
     splined: tuple[Hypothesis, ...] = ()
+    refuted: bool = False
 
 
 def find_explanations(
@@ -113,10 +125,14 @@ def find_explanations(
     rules : of the decision
     """
     models = [prepare_run(run, vehicle, surface) for run in campaign.train]
+    gain = float(estimate_session(campaign, models, rules)[GAIN])
     shown = [
         effect
         for effect in library
-        if can_show(effect, vehicle, campaign.channels) and tell_limit(effect, models, rules.joint)
+        if can_show(effect, vehicle, campaign.channels)
+        and not (effect.parameters[0].name == GRIP and is_grip_free(campaign))
+        and tell_limit(effect, models, gain, rules)
+        and tell_curve(effect, models)
     ]
     retuned = [effect for effect in shown if effect.parameters[0].name in SESSION]
     numbers = tuple(effect for effect in shown if effect.parameters[0].name not in SESSION)
@@ -131,7 +147,8 @@ def find_explanations(
     first = _refine_first(singles, place, null, rules)
     if first is not None:
         place = _settle_scales(_move_to(first, place, null))
-    for forms in (False, True):
+    # the shape of a form is not told by a run or two
+    for forms in (False, True) if len(models) >= FEWEST else (False,):
         place, grams, found = _settle_explanation(place, null, columns, rules, forms=forms)
     return Finding(
         evidence=place.evidence, null=null, fitted=place.fitted, grams=grams, explanations=tuple(found)
@@ -174,14 +191,31 @@ def _settle_explanation(
             place = replace(place, splines=splines, splined=place.fitted.parts)
         grams = gather_grams(place.evidence, place.fitted, place.splines, columns)
         found = search_explanations(grams, most=rules.most_effects, width=rules.beam_width, forms=forms)
-        told = keep_members(found[0], tell_members(grams, found[0], rules))
         here = next((e for e in found if _is_fitted(e, place.fitted)), None)
+        if place.refuted and here is not None:
+            # far from a fit without its effect, derivatives about that fit promise what no simulation keeps
+            found = [e for e in found if e.log_odds <= here.log_odds or not _leaves_out(e, here)]
+        told = keep_members(found[0], tell_members(grams, found[0], rules))
         if turn == rules.most_turns - 1 or _is_fitted(told, place.fitted):
             break
         if forms and here is not None and not _is_worth_it(found[0], here, grams, rules):
             break
-        place = _move_to(told, place, null)
+        moved = _move_to(told, place, null)
+        lost = _compute_cost(moved.fitted, told) - _compute_cost(place.fitted, told if here is None else here)
+        refuted = here is not None and lost > REFUTED * here.gain + log(rules.named_odds)
+        place = replace(place, refuted=True) if refuted else moved
     return place, grams, found
+
+
+def _compute_cost(fitted: Fit, explanation: Explanation) -> float:
+    """Return half the misfit of a fit, less the logarithm of the prior odds of what it holds [1]."""
+    return 0.5 * fitted.objective - sum(member.log_prior for member in explanation.members)
+
+
+def _leaves_out(explanation: Explanation, here: Explanation) -> bool:
+    """Whether an explanation with effects of the library leaves out a member of the fitted one."""
+    known = any(member.effect is not None for member in explanation.members)
+    return known and not set(here.names) <= set(explanation.names)
 
 
 def _is_worth_it(best: Explanation, here: Explanation, grams: RunGrams, rules: DecisionRules) -> bool:
@@ -232,7 +266,7 @@ def _find_centre(fitted: Fit, columns: Columns) -> NDArray[np.float64]:
             own = [c.columns[0] for c in columns.candidates if part.names[0] == _name_number(c)][:1]
             centre[own] = fitted.values[at]
         at += len(part.names)
-    centre[-len(SESSION) :] = fitted.session
+    centre[-len(FILE_NUMBERS) :] = fitted.session
     return centre
 
 
@@ -288,12 +322,12 @@ def _find_second(name: str, fitted: Fit) -> float:
 
 
 def widen_session(explanation: Explanation, sigma: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the session's prior sigmas, with the slab where an explanation names one of its numbers, float64 [7].
+    """Return the session's prior sigmas, with the slab where an explanation names one of its numbers, float64 [8].
 
     Parameters
     ----------
     explanation : its members
-    sigma : float64 [7] tolerances
+    sigma : float64 [8] tolerances
     """
     wide = sigma.copy()
     for member in explanation.members:
@@ -308,7 +342,7 @@ def _move_to(explanation: Explanation, place: _Place, null: Fit) -> _Place:
     sigma = widen_session(explanation, place.evidence.session_sigma)
     fitted = fit_hypotheses(place.evidence.train, parts, sigma, session=null.session, iterations=STEPS)
     evidence = differentiate_at(place.evidence, fitted)
-    return replace(place, evidence=evidence, fitted=_refit(evidence, fitted))
+    return replace(place, evidence=evidence, fitted=_refit(evidence, fitted), refuted=False)
 
 
 def _refit(evidence: Evidence, fitted: Fit) -> Fit:

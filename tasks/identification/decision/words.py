@@ -62,17 +62,17 @@ def tell_verdict(
     """
     effects, error, manoeuvres = verdict.effects, verdict.error, verdict.manoeuvre_error
     misses = verdict.misses or bool(verdict.disagreement and not effects)
-    if not effects and suggested is not None:
-        return (
-            "These runs prove nothing that the model lacks. They suggest that"
-            f" {say_effect(suggested, library)}, at odds that are too small for a name."
-        )
     if not effects:
         nothing = (
             "The model misses these runs by more than their noise, and nothing that can be named explains it"
             if misses
             else "These runs show nothing that the model lacks"
         )
+        if suggested is not None:
+            nothing = (
+                "These runs prove nothing that the model lacks. They suggest that"
+                f" {say_effect(suggested, library)}, at odds that are too small for a name"
+            )
         if not own or not is_lowered(error["speed"]) or not _is_told_apart(error["speed"]):
             return f"{nothing}."
         return (

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 
-from tasks.campaign.campaign import CHANNELS, SESSION, Tolerances
+from tasks.campaign.campaign import CHANNELS, FILE_NUMBERS, Tolerances
 from tasks.identification.inference.disturbance import (
     ACCELERATION_BIAS,
     DISTURBED,
@@ -34,7 +34,7 @@ from tasks.identification.inference.noise import whiten_channels
 from tasks.vehicle.effects.slots import Slot
 from tasks.vehicle.effects.table import PARAMETER_INDEX
 
-SESSION_INDEX = tuple(PARAMETER_INDEX[name] for name in SESSION)
+SESSION_INDEX = tuple(PARAMETER_INDEX[name] for name in FILE_NUMBERS)
 DIVERGED = 1e6
 """Reading beyond which a simulation diverges, in the unit of any channel."""
 BROKEN = 1e4
