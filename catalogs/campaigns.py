@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from pydantic import BaseModel, ConfigDict, field_validator
 
+from catalogs.campaign_checks import load_campaign_checks
 from catalogs.campaign_files import (
     LARGEST_RUN,
     CampaignHeader,
@@ -18,7 +19,7 @@ from catalogs.channel_maps.tolerances import Tolerances as TolerancesEntry
 from catalogs.documents import read_content
 from catalogs.quantities import Text, parse_entry
 from catalogs.sentences import cap_problems, shorten, shorten_value
-from tasks.campaign.brake_gain import find_gain_problems
+from tasks.campaign.assembly import judge_columns
 from tasks.campaign.campaign import (
     CHANNELS,
     SESSION,
@@ -27,10 +28,10 @@ from tasks.campaign.campaign import (
     Tolerances,
     find_motion,
 )
-from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME, SpeedSource
-from tasks.campaign.resting_pressure import find_brake_rest, measure_resting_levels
-from tasks.campaign.resting_throttle import find_throttle_rest
-from tasks.campaign.run_validation import COLUMN_UNITS, find_motion_problem, find_recording_problems
+from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME, COLUMN_UNITS, SpeedSource
+from tasks.campaign.checks import apply_checks
+from tasks.campaign.measured import MeasuredRun, Session
+from tasks.campaign.resting_pressure import find_brake_rest, find_throttle_rest, measure_resting_levels
 from tasks.campaign.slow_channels import collect_samples, fill_between_samples
 from tasks.errors import InputError
 from tasks.surface.weather import DRY
@@ -115,7 +116,8 @@ def read_campaign(folder: str | Path) -> Campaign:
     needed = list(dict.fromkeys(needed))
     digest = hashlib.sha256(header_bytes + table_bytes)
     interval, judged = 1.0 / header.sample_rate_hz, set(held_out)
-    runs, first_of, readable = [], dict[bytes, str](), dict[str, dict[str, np.ndarray]]()
+    runs, first_of, table = [], dict[bytes, str](), load_campaign_checks()
+    readable: list[MeasuredRun] = []
     for row in rows:
         path = folder / "runs" / f"{row['run']}.parquet"
         if not path.is_file():
@@ -130,28 +132,29 @@ def read_campaign(folder: str | Path) -> Campaign:
                 )
             columns, units = parse_columns(content, path.name, COLUMN_UNITS)
             columns = {name: values for name, values in columns.items() if name not in header.not_measured}
-            found = find_recording_problems(
-                columns, units, interval, needed, brake_stands_in=header.brake_stands_for is not None
+            about = MeasuredRun(
+                name=row["run"],
+                interval=interval,
+                slippery=row["weather"] != DRY,
+                over_feature=float(row["hazard_length_m"]) > 0.0,
+            )
+            measured, found = judge_columns(
+                columns, units, about, needed, table, brake_stands_in=header.brake_stands_for is not None
             )
         except InputError as error:
             found = list(error.problems)
         problems += [f"{row['run']}: {problem}" for problem in found]
         if not found:
-            readable[row["run"]] = {
-                name: fill_between_samples(name, values) for name, values in columns.items()
-            }
+            readable.append(measured)
         if not found and signal in columns and "speed" in columns:
             columns["brake_pressure"] = BRAKE_SIGNALS[signal] * columns[signal]
             run = _make_run(
                 row, columns, interval, held_out=row["run"] in judged, of_wheels=header.speed_from == "wheels"
             )
-            if problem := find_motion_problem(run.speed, interval, run.hazard_length > 0.0):
-                problems.append(f"{run.name}: {problem}")
             first, _ = find_motion(run.speed)
             runs.append(run.begin_at(first) if first else run)
-    if header.brake_stands_for is None:
-        slippery = [row["run"] for row in rows if row["weather"] != DRY]
-        problems += find_gain_problems(readable, interval, slippery=slippery)
+    told = apply_checks(table.session, Session(runs=readable))
+    problems += [one.sentence for one in told if one.check.fault != "warning"]
     if problems:
         raise InputError(cap_problems([f"{shorten(folder.name)}: {problem}" for problem in problems]))
     zero = 0.0

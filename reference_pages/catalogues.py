@@ -18,7 +18,6 @@ RULES = (
     ("physical_limits", "Limits of a scenario"),
     ("calibrated_range", "Calibrated range"),
     ("plausible_vehicle", "Plausible vehicles"),
-    ("joint_numbers", "Numbers of the joint fit"),
 )
 """Files of the catalogue's own folder, with their headings."""
 TABLED = ("camera", "surface", "bus", "calibration procedure", "hazard marking", "protocol")

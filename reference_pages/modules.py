@@ -104,8 +104,6 @@ PAGES: dict[str, tuple[str, str, tuple[str, ...]]] = {
             "tasks.identification.decision.verdict",
             "tasks.identification.decision.answer",
             "tasks.identification.decision.held_out",
-            "tasks.identification.joint.numbers",
-            "tasks.identification.joint.verdict",
         ),
     ),
     "conventions": (

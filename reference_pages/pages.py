@@ -3,7 +3,17 @@
 import re
 from collections.abc import Callable
 
-from reference_pages import catalogues, commands, effects, fmu, grids, modules, schema, verdict_rules
+from reference_pages import (
+    campaign_checks,
+    catalogues,
+    commands,
+    effects,
+    fmu,
+    grids,
+    modules,
+    schema,
+    verdict_rules,
+)
 
 WRITERS: dict[str, Callable[[], str]] = {
     **catalogues.WRITERS,
@@ -13,7 +23,7 @@ WRITERS: dict[str, Callable[[], str]] = {
 """Pages, by their path below ``docs/``."""
 TABLES: dict[str, Callable[[], str]] = {
     name: write
-    for module in (commands, effects, fmu, grids, schema, verdict_rules)
+    for module in (campaign_checks, commands, effects, fmu, grids, schema, verdict_rules)
     for name, write in module.TABLES.items()
 }
 """Tables of pages that people write, by the name under which a page asks for them."""

@@ -1,8 +1,7 @@
-"""Tables of the page on a verdict's rules: numbers of the decision and of the joint fit, and sizes that matter."""
+"""Tables of the page on a verdict's rules: numbers of the decision, and sizes that matter."""
 
 import re
 from inspect import getdoc
-from typing import Any
 
 import yaml
 
@@ -10,7 +9,7 @@ from catalogs.decision_rules import DECISION_RULES
 from catalogs.effects import LIBRARY_FILE
 from reference_pages.markdown import format_table
 from tasks.identification.decision.forms import PORT_STEP, SCANNED
-from tasks.identification.rules import DecisionRules, JointRules
+from tasks.identification.rules import DecisionRules
 from tasks.vehicle.effects.ports import PORT_UNITS
 from tasks.vehicle.effects.table import PARAMETERS
 
@@ -32,13 +31,10 @@ def read_meanings(rules: type) -> dict[str, str]:
 
 def write_decision_table() -> str:
     """Return the table of the numbers by which odds become a verdict, as Markdown."""
-    content = yaml.safe_load(DECISION_RULES.read_text(encoding="utf-8"))
-    return _tabulate({name: entry for name, entry in content.items() if name != "joint"}, DecisionRules)
-
-
-def write_joint_table() -> str:
-    """Return the table of the numbers of the joint fit, as Markdown."""
-    return _tabulate(yaml.safe_load(DECISION_RULES.read_text(encoding="utf-8"))["joint"], JointRules)
+    meanings = read_meanings(DecisionRules)
+    numbers = yaml.safe_load(DECISION_RULES.read_text(encoding="utf-8"))
+    rows = [(f"`{n}`", e["value"], e["unit"], meanings[n], e["source"]) for n, e in numbers.items()]
+    return format_table(("number", "value", "unit", "what it is", "reason"), rows)
 
 
 def write_size_table() -> str:
@@ -60,16 +56,8 @@ def write_form_table() -> str:
     return format_table(("port", "variables", "size that matters", "unit"), rows)
 
 
-def _tabulate(numbers: dict[str, dict[str, Any]], rules: type) -> str:
-    """Return a row a number: value, unit, meaning and reason."""
-    meanings = read_meanings(rules)
-    rows = [(f"`{n}`", e["value"], e["unit"], meanings[n], e["source"]) for n, e in numbers.items()]
-    return format_table(("number", "value", "unit", "what it is", "reason"), rows)
-
-
 TABLES = {
     "decision rules": write_decision_table,
-    "joint rules": write_joint_table,
     "sizes that matter": write_size_table,
     "sizes of forms": write_form_table,
 }

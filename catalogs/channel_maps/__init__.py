@@ -14,10 +14,9 @@ from catalogs.entries import find_entry
 from catalogs.names import LONGEST_NAME
 from catalogs.quantities import CatalogueEntry, Number, Text
 from catalogs.sentences import cap_problems, describe_rules, shorten, shorten_value
-from tasks.campaign.channels import CHANNELS_BY_NAME, MAIN_CHANNELS, UNITS, SpeedSource
+from tasks.campaign.channels import CHANNELS_BY_NAME, MAIN_CHANNELS, UNITS, SpeedSource, describe_wheel_gain
+from tasks.campaign.clocks import TIME_OF_DAY
 from tasks.campaign.signals import ChannelRule, Gain
-from tasks.campaign.time_of_day import TIME_OF_DAY
-from tasks.campaign.wheel_validation import describe_wheel_gain
 from tasks.errors import InputError
 
 HIGHEST_RATE = 1_000_000.0

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from catalogs.campaign_checks import load_campaign_checks
 from catalogs.channel_maps import ChannelMap
 from catalogs.recordings.bags import BAG, is_bag_folder, list_storage_files
 from catalogs.recordings.bus_json import BUS_JSON
@@ -17,7 +18,8 @@ from catalogs.recordings.nuscenes_bus import SCENE, find_scene, list_scene_files
 from catalogs.recordings.oxts import OXTS, find_oxts_folder, list_oxts_files
 from catalogs.recordings.tables import CSV, PARQUET
 from catalogs.recordings.vbo import VBO
-from tasks.campaign.clocks import describe_restarts
+from tasks.campaign.checks import apply_checks
+from tasks.campaign.measured import Clock
 from tasks.campaign.signals import Signal
 from tasks.errors import InputError
 
@@ -95,9 +97,13 @@ def read_signals(path: Path, channel_map: ChannelMap) -> dict[str, Signal]:
         Listing every signal that is missing or is not of numbers, with names that come near.
     """
     signals = _find_form(path).read(path, channel_map)
-    restarts = {describe_restarts(signal.time): name for name, signal in signals.items()}
-    if problems := [f"{path.name}: the clock of {name} {told}" for told, name in restarts.items() if told]:
-        raise InputError(problems)
+    restarts = {
+        one.sentence: name
+        for name, signal in signals.items()
+        for one in apply_checks(load_campaign_checks().clock, Clock(time=signal.time))
+    }
+    if restarts:
+        raise InputError([f"{path.name}: the clock of {name} {told}" for told, name in restarts.items()])
     return {name: _replace_values(signal, channel_map.meanings_of(name)) for name, signal in signals.items()}
 
 

@@ -17,8 +17,8 @@ from catalogs.recordings.forms import (
     summarise_signal,
 )
 from catalogs.recordings.nuscenes_bus import is_list_of_messages, read_scene, summarise_scene
+from tasks.campaign.clocks import convert_to_seconds
 from tasks.campaign.signals import Signal
-from tasks.campaign.time_of_day import convert_to_seconds
 from tasks.errors import InputError
 
 

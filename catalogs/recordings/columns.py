@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from catalogs.channel_maps import TimeEntry
 from catalogs.sentences import shorten, shorten_value
-from tasks.campaign.time_of_day import DAY, TIME_OF_DAY, convert_to_seconds, pass_midnight
+from tasks.campaign.clocks import DAY, TIME_OF_DAY, convert_to_seconds, pass_midnight
 from tasks.errors import InputError
 
 NO_VALUE = {"", "-", "--", "---", "nan", "-nan", "null", "none", "n/a", "na", "#n/a", "#na", "<na>", "nil"}

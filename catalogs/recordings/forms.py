@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from catalogs.channel_maps import ChannelMap, TimeEntry
 from catalogs.sentences import shorten
 from tasks.campaign.channels import UNITS
+from tasks.campaign.clocks import TIME_OF_DAY, has_digits_of_day
 from tasks.campaign.signals import Signal
 from tasks.campaign.stated_units import parse_unit, read_unit_of_name
-from tasks.campaign.time_of_day import TIME_OF_DAY, has_digits_of_day
 from tasks.errors import InputError
 
 LARGEST_FILE = 2**30

@@ -27,8 +27,8 @@ from catalogs.recordings.matlab_hdf import HDF_SIGNATURE, open_hdf_variables
 from catalogs.recordings.matlab_v5 import load_v5_variables
 from catalogs.recordings.matlab_values import Array, Refused, Struct
 from catalogs.sentences import shorten
+from tasks.campaign.clocks import convert_to_seconds
 from tasks.campaign.signals import Signal
-from tasks.campaign.time_of_day import convert_to_seconds
 from tasks.errors import InputError
 
 UNIT_NAMES = ("Units", "units", "Unit", "unit")

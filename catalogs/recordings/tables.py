@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from catalogs.campaign_checks import load_campaign_checks
 from catalogs.campaign_files import open_parquet, read_unit
 from catalogs.channel_maps import ChannelMap, CsvEntry, TimeEntry
 from catalogs.documents import read_content
@@ -27,7 +28,8 @@ from catalogs.recordings.forms import (
 )
 from catalogs.recordings.text_rows import find_row_of_names, read_text_table
 from catalogs.sentences import shorten_value
-from tasks.campaign.clocks import describe_restarts
+from tasks.campaign.checks import apply_checks
+from tasks.campaign.measured import Clock
 from tasks.campaign.signals import Signal
 from tasks.campaign.stated_units import parse_unit
 from tasks.errors import InputError
@@ -91,10 +93,10 @@ def _read_with(open_table: Open) -> Callable[[Path, ChannelMap], dict[str, Signa
         if problems:
             told = _describe_rows_of_text(table, series, [time, *columns.values()])
             raise InputError(told or problems)
-        if restarts := describe_restarts(
-            time, table_row=1 + len(channel_map.csv.rows_below) * bool(table.csv)
-        ):
-            raise InputError(f"{path.name}: clock {clock.source} {restarts}")
+        first = 1 + len(channel_map.csv.rows_below) * bool(table.csv)
+        rows = Clock(time=time, kind="row", where=" below the names", first=first)
+        if restarts := apply_checks(load_campaign_checks().clock, rows):
+            raise InputError(f"{path.name}: clock {clock.source} {restarts[0].sentence}")
         return {
             name: sample_column(time, values, clock, table.units.get(name, ""))
             for name, values in columns.items()

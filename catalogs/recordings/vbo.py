@@ -27,9 +27,9 @@ from catalogs.recordings.forms import (
     summarise_signal,
 )
 from catalogs.sentences import shorten
+from tasks.campaign.clocks import TIME_OF_DAY, convert_to_seconds
 from tasks.campaign.signals import Signal
 from tasks.campaign.stated_units import parse_unit
-from tasks.campaign.time_of_day import TIME_OF_DAY, convert_to_seconds
 from tasks.errors import InputError
 
 CLOCK = TimeEntry(source="time", unit=TIME_OF_DAY)

@@ -1,17 +1,11 @@
 """The report of an audit: its sentence, its lines for people, and a page that can be filed by itself."""
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
-
 from flows.auditing.verify import describe_files, describe_signature
-from flows.pages import DATASET_PAGE, make_policy
+from flows.pages.writer import Cell, Command, Part, Section, Table, write_page
 from manifests.explain import ABSENT
-
-PAGE = Path(__file__).parent / "audit_page"
 
 
 def tell_verdict(result: Mapping[str, Any]) -> str:
@@ -127,21 +121,125 @@ def write_audit_page(result: Mapping[str, Any]) -> str:
     ----------
     result : of `flows.auditing.audit.audit_dataset`
     """
-    style = "\n".join(sheet.read_text() for sheet in (DATASET_PAGE / "report.css", PAGE / "page.css"))
-    return _read_template().render(
-        result=result,
-        tools=compare_tools(result["tools_recorded"], result["tools_here"]),
-        remedies=list_remedies(result),
-        places=[describe_place(row) for row in result["mismatches"]],
-        style=style,
-        policy=make_policy(style=style),
+    remedies = list_remedies(result)
+    compared: list[Part] = [
+        _list_comparisons(result),
+        *(["What to do:", remedies] if remedies else []),
+        Table(title="Damaged files", rows=[
+            {"file": row["path"], "damage": row["damage"], "clip": row["clip_id"]} for row in result["damaged"]
+        ]),
+        Table(title="Clips made again", rows=[
+            {"clip": clip["label"], "id": clip["clip_id"], "outcome": _tell_outcome(clip)} for clip in result["remade"]
+        ]),
+    ]  # fmt: skip
+    mismatches = [
+        f"{row['label']} ({', '.join(row['changed'])}): {describe_place(row)}."
+        f" Can come from: {', '.join(row['why']) or 'no input that is recorded'}."
+        for row in result["mismatches"]
+    ]
+    tools = [
+        {"tool": name, "made the dataset": made,
+         "audited it": Cell(value=here, tone="bad") if made != here else "the same"}
+        for name, made, here in compare_tools(result["tools_recorded"], result["tools_here"])
+    ]  # fmt: skip
+    differing = [
+        "These differ between what made the dataset and what audited it:", result["differences"]
+    ] if result["differences"] else [
+        "No recorded input or tool that decides bytes differs between what made the dataset and what audited it."
+    ]  # fmt: skip
+    return write_page(
+        f"Audit of {result['grid']}, run {result['run_id']}",
+        result["verdict"],
+        [
+            Section(title="The dataset", parts=[_list_dataset_facts(result)]),
+            Section(title="This audit", parts=[_list_audit_facts(result)]),
+            Section(title="What was compared", parts=compared),
+            Section(title="Where clips differ first", parts=[mismatches] if mismatches else []),
+            Section(title="Inputs and tools", parts=[*differing, Table(title="Tools", rows=tools)]),
+            Section(title="To check this report", parts=_list_commands(result)),
+        ],
+        above=result["not_checked"],
+        lead=[f"Audit of {result['grid']}, {result['ended_utc']}"],
+        tone="good" if result["verified"] else "bad",
     )
 
 
-@lru_cache
-def _read_template() -> Template:
-    pages = Environment(loader=FileSystemLoader(PAGE), autoescape=True, undefined=StrictUndefined)
-    return pages.get_template("audit.html")
+def _list_dataset_facts(result: Mapping[str, Any]) -> dict[str, str]:
+    facts = {
+        "address": result["dataset"],
+        "grid": f"{result['grid']}, {_count(result['clips'], 'clip')}",
+        "run": result["run_id"],
+        "seal": result["seal"],
+        "SHA-256 of manifest.json": result["manifest_sha256"],
+        "signature": result["signature"],
+    }
+    if result["key_id"]:
+        facts |= {"checked with key": result["key_id"], "SHA-256 of that key (DER)": result["key_sha256"]}
+    if result["signers"]:
+        facts["keys that the envelope names"] = ", ".join(result["signers"])
+    return facts
+
+
+def _list_audit_facts(result: Mapping[str, Any]) -> dict[str, str]:
+    machine, tools = result["machine"], result["tools_here"]
+    changed = ", changed since" if tools["git"] and tools["git"]["changed"] else ""
+    source = f"commit {tools['git']['commit']}{changed}" if tools["git"] else "of no checkout"
+    return {
+        "began (UTC)": result["started_utc"],
+        "ended (UTC)": result["ended_utc"],
+        "machine": f"{machine['name']}, {machine['system']}, {machine['processors']} processors",
+        "musync": f"{tools['code']['version']}, {source}",
+        "asked for": f"a share of {result['share']} of the clips, drawn by seed {result['seed']}, made again in reverse"
+        f" order by {_count(result['workers'], 'worker')} ({result['runner']})",
+    }
+
+
+def _list_comparisons(result: Mapping[str, Any]) -> list[str]:
+    """Return in sentences what was compared with what, and what of it differs."""
+    compared, same = result["compared"], sum(clip["as_recorded"] for clip in result["remade"])
+    intact = f"{result['intact']} {'is' if result['intact'] == 1 else 'are'}"
+    lines = [
+        f"The SHA-256 of {_count(result['files'], 'file')} with the record: {intact} as recorded.",
+        f"The decoded content, stored and recorded, of {compared['tables']} tables and {compared['arrays']} arrays of"
+        f" {len(result['remade'])} of {result['clips']} clips, made again from the inputs that the dataset keeps:"
+        f" {same} of these clips came out as recorded.",
+    ]
+    if result["unrecorded"]:
+        there = "There is" if len(result["unrecorded"]) == 1 else "There are"
+        lines.append(
+            f"{there} {_count(len(result['unrecorded']), 'file')} that nobody recorded:"
+            f" {', '.join(result['unrecorded'])}."
+        )
+    contradictions = (
+        _count(len(result["contradictions"]), "contradiction") if result["contradictions"] else None
+    )
+    return [
+        *lines,
+        "Every table, record and array's metadata with the plan, the kept inputs and the bytes that muSync writes, of"
+        f" all clips: {contradictions or 'no contradictions'}.",
+        *(f"Records that contradict each other: {sentence}" for sentence in result["contradictions"]),
+        *(f"No clip could be made again: {problem}" for problem in result["not_remade"]),
+    ]
+
+
+def _list_commands(result: Mapping[str, Any]) -> list[str | Command]:
+    key = " --key PUBLIC.pem" if result["key_id"] else ""
+    return [
+        "The first command takes about a second a gigabyte; the second makes the same clips again. The dataset is the"
+        " one of this report if the SHA-256 of its manifest.json is the one above.",
+        Command(
+            text=f"musync verify DIR{key}\nmusync audit DIR --share {result['share']} --seed {result['seed']}{key}"
+        ),
+    ]
+
+
+def _tell_outcome(clip: Mapping[str, Any]) -> Cell:
+    same = clip["as_recorded"]
+    return Cell(value="as recorded" if same else "differs", tone="good" if same else "bad")
+
+
+def _count(number: int, thing: str) -> str:
+    return f"{number} {thing}{'' if number == 1 else 's'}"
 
 
 def compare_tools(recorded: Mapping[str, Any], here: Mapping[str, Any]) -> list[tuple[str, str, str]]:

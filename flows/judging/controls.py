@@ -10,8 +10,7 @@ from catalogs.gates import load_gates
 from catalogs.grids.form import TICK_RATE_HZ
 from catalogs.studies.ablation import cut_coupling
 from catalogs.variants import VARIANTS, Variant
-from flows.drawing import as_svg
-from flows.judging.controls_figure import roc_figure
+from flows.judging.controls_figure import draw_roc
 from flows.judging.evaluation_rows import find_control
 from flows.judging.judged_clip import METHODS, JudgedClip, View, judge_clip
 from flows.judging.physics import clip_facts
@@ -20,6 +19,7 @@ from flows.making.driving import simulate_drive
 from flows.making.places import refuse_changed_scene
 from flows.making.plan import Plan, read_plan
 from flows.making.traced import refuse_traced
+from flows.pages.static import as_svg
 from flows.running.orchestration import run_as_stage
 from flows.store.address import open_for_reading
 from flows.store.outputs import Outputs
@@ -99,7 +99,7 @@ def run_controls(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     result = {**summarise_controls(rows, list_untried(clips, false)), "rows": [*rows, *list_unread_rows()]}
     results.write_json("controls.json", result)
     if rows and out is not None:
-        results.write("controls.svg", as_svg(roc_figure(rows, CONTROLS)))
+        results.write("controls.svg", as_svg(draw_roc(rows, CONTROLS)))
     return result
 
 

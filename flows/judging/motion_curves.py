@@ -1,20 +1,16 @@
 """The paper's figure of recovered motion: change of progress in weather, pitch over a road feature, by visual seed."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from flows.drawing import escape_formulas
+from flows.pages.figures import Figure, Line, Panel, pick_style
 from tasks.eval.video_motion import MotionProtocol
 
 Floats = NDArray[np.float64]
-COLOURS = {"photometric": "#1f6fb2", "pnp": "#c0392b", "essential": "#2e8b57"}
-OTHERS = ("#1f6fb2", "#c0392b", "#2e8b57", "#b8860b", "#7d5ba6", "#5f6b73")
-"""Of curves that are no method of ours."""
-PROGRESS, PITCH = "change of progress [1]", "pitch of the event [deg]"
+PROGRESS, PITCH = "change of progress", "pitch of the event [deg]"
 LEAST_SPAN = {PROGRESS: 0.02, PITCH: 0.25}
 """Half of the least range that a panel spans, so that noise looks like noise."""
 
@@ -66,41 +62,35 @@ def make_event_panel(
 
 
 def draw_motion(panels: Sequence[MotionPanel], meant: str) -> Figure:
-    """Draw the panels, two a line: black what is meant, in colour the mean over seeds with one standard deviation.
+    """Draw the panels, two a row: what is meant, and the mean over seeds with one standard deviation.
 
     Parameters
     ----------
     panels : one at least
-    meant : what the black curve is, for the legend
+    meant : what the curve of what is meant is, for the key
     """
-    lines = -(-len(panels) // 2)
-    figure = Figure(figsize=(10, 2.6 * lines + 0.5), layout="constrained")
-    axes = figure.subplots(lines, 2, squeeze=False).ravel()
-    shown: dict[str, None] = {}
-    for axis, panel in zip(axes, panels, strict=False):
-        axis.axhline(0.0, color="#bbbbbb", lw=0.6, zorder=0)
-        if panel.shaded is not None:
-            axis.axvspan(*panel.shaded, color="#888888", alpha=0.15, lw=0)
-        axis.plot(panel.times, panel.meant, color="black", lw=1.6, label=escape_formulas(meant))
-        for name, values in panel.recovered.items():
-            shown.setdefault(name)
-            colour = COLOURS.get(name, OTHERS[list(shown).index(name) % len(OTHERS)])
-            mean = values.mean(axis=0)
-            axis.plot(panel.times, mean, color=colour, lw=1.0, label=escape_formulas(name))
-            if len(values) > 1:
-                spread = values.std(axis=0, ddof=1)
-                axis.fill_between(panel.times, mean - spread, mean + spread, color=colour, alpha=0.2, lw=0)
-        axis.set_title(escape_formulas(panel.title), fontsize=9)
-        axis.set_xlabel("time [s]", fontsize=8)
-        axis.set_ylabel(panel.quantity, fontsize=8)
-        axis.tick_params(labelsize=7)
-        low, high = axis.get_ylim()
-        least = LEAST_SPAN[panel.quantity]
-        axis.set_ylim(min(low, -least), max(high, least))
-    for axis in axes[len(panels) :]:
-        axis.set_axis_off()
-    told = {
-        label: line for axis in axes for line, label in zip(*axis.get_legend_handles_labels(), strict=True)
-    }
-    figure.legend(told.values(), told.keys(), fontsize=8, ncols=4, loc="outside lower center", frameon=False)
-    return figure
+    names = list(dict.fromkeys(name for panel in panels for name in panel.recovered))
+    return Figure(
+        caption=f"Recovered motion beside {meant}: mean over visual seeds, with one standard deviation where there are"
+        " several; shaded: the event window.",
+        panels=[_draw_panel(panel, meant, names) for panel in panels],
+        columns=2,
+    )  # fmt: skip
+
+
+def _draw_panel(panel: MotionPanel, meant: str, names: Sequence[str]) -> Panel:
+    lines = [Line(name=meant, x=panel.times, y=panel.meant)]
+    for name, values in panel.recovered.items():
+        mean = values.mean(axis=0)
+        line = Line(name=name, x=panel.times, y=mean, style=pick_style(names.index(name)))
+        if len(values) > 1:
+            spread = values.std(axis=0, ddof=1)
+            line = replace(line, low=mean - spread, high=mean + spread)
+        lines.append(line)
+    return Panel(
+        title=panel.title,
+        y=panel.quantity,
+        lines=lines,
+        shaded=[panel.shaded] if panel.shaded is not None else [],
+        least=LEAST_SPAN[panel.quantity],
+    )

@@ -173,7 +173,7 @@ def commit_clip(
     work: ClipWork,
     surface: SurfaceState,
     ride: Rollout,
-    ranges: Mapping[str, float],
+    ranges: dict[str, float],
     frames: Columns,
     buffers: Columns,
     verdict: Mapping[str, Any],

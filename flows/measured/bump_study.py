@@ -9,10 +9,10 @@ from catalogs.bump_studies import load_bump_study
 from catalogs.drives import read_drives
 from catalogs.vehicles import load_vehicle
 from flows.store.outputs import Outputs
-from tasks.campaign.sensor_agreement import measure_sensor_agreement
 from tasks.errors import InputError
 from tasks.studies.brake_dive import pitch_mode
 from tasks.studies.road_bump import fit_feature, fit_feature_and_car, passage_of
+from tasks.studies.sensor_agreement import measure_sensor_agreement
 
 NEEDED = ("speed", "pitch", "pitch_rate", "vertical_acceleration", "longitudinal_acceleration")
 

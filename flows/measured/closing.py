@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catalogs.campaigns import read_campaign
+from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import LIBRARY_FILE, load_effects
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_tolerances, load_vehicle, vehicle_content
@@ -16,18 +17,17 @@ from flows.measured.closing_ledger import count_readings, record_reading
 from flows.measured.friction_pulls import compute_friction_pulls, tell_friction_pulls
 from flows.measured.grown_vehicle import grown_vehicle, tyre_beside
 from flows.measured.residuals import compute_residual_rmse, predict_runs
-from flows.measured.searches import SEARCHES, judge_campaign
 from flows.measured.verdict_report import write_verdict_page
 from flows.store.outputs import Outputs
 from manifests.canonical import sha256_of, sha256_of_file
 from manifests.provenance import code_version
 from tasks.campaign.braking_heat import estimate_disc_temperatures
-from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
+from tasks.campaign.campaign import CHANNELS, FILE_NUMBERS, SESSION, Campaign
 from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter, Verdict
 from tasks.identification.decision.excitation import find_reached_range
-from tasks.identification.decision.verdict import Outcome
-from tasks.identification.decision.words import join_phrases, say_effect, tell_verdict
-from tasks.identification.joint.verdict import JointOutcome
+from tasks.identification.decision.naming import measure_force
+from tasks.identification.decision.verdict import Outcome, judge_runs
+from tasks.identification.decision.words import join_phrases, list_unshared, say_effect, tell_verdict
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.table import PARAMETERS
 
@@ -65,7 +65,7 @@ def close_loop(
     results.write_json("split.json", split_of(measured))
     count_readings(measured)  # a faulty ledger is told of before the fit
     measured = replace(measured, tolerances=measured.tolerances.with_session(session_tolerances(name)))
-    outcome = judge_campaign(measured, model, road, load_effects())
+    outcome = judge_runs(measured, model, road, load_effects(), load_decision_rules())
     earlier = record_reading(measured, sha256_of([vehicle_content(name)]))
     result = verdict_json(outcome.verdict) | tell_search(outcome)
     result = tell_friction_pulls(result, measured.tolerances.friction)
@@ -122,16 +122,14 @@ def find_unused_tolerances(vehicle: str) -> list[str]:
     return [name for name in load_tolerances(vehicle) if name not in moved]
 
 
-def _reached_ranges(outcome: Outcome | JointOutcome) -> dict[str, tuple[float, float]]:
+def _reached_ranges(outcome: Outcome) -> dict[str, tuple[float, float]]:
     """Return what the training runs reached of the variable of each form that is named."""
-    if isinstance(outcome, JointOutcome):
-        return {}  # a joint fit names no forms
     verdict, runs = outcome.verdict, [run.model for run in outcome.finding.evidence.train]
     forms = {effect.variable for effect in verdict.effects if effect.effect_class == "form"}
     return {variable: find_reached_range(runs, verdict.theta, verdict.slots, variable) for variable in forms}
 
 
-def tell_search(outcome: Outcome | JointOutcome) -> dict[str, Any]:
+def tell_search(outcome: Outcome) -> dict[str, Any]:
     """Return what a search says beside its verdict, as plain values: in words, and what is left over.
 
     Parameters
@@ -140,36 +138,21 @@ def tell_search(outcome: Outcome | JointOutcome) -> dict[str, Any]:
     """
     library, verdict = load_effects(), outcome.verdict
     train, held_out = predict_runs(outcome)
-    rivals = [rival for _, rival in verdict.rivals]
     planned_for = verdict.experiment.between[0] if verdict.experiment else None
     suggested = next((effect for effect in verdict.tried if effect.name == planned_for), None)
-    sentence = tell_verdict(
-        verdict.effects, rivals, library, verdict.error, verdict.manoeuvre_error, suggested,
-        verdict.misses or bool(verdict.disagreement and not verdict.effects), _say_own_numbers(outcome, library),
-    )  # fmt: skip
-    told = {
+    force = 0.0
+    if len(verdict.odds) > 1:
+        apart = [effect.name for effect in list_unshared(verdict.effects, verdict.odds)]
+        force = measure_force(outcome.finding, outcome.fitted, apart)
+    sentence = tell_verdict(verdict, library, suggested, _say_own_numbers(outcome, library), force)
+    return {
         "channels": [CHANNELS[c] for c in train[0].channels],
         "sentence": sentence,
         "calibrated": [effect_json(effect, library) for effect in outcome.calibrated],
+        "numbers": _number_json(FILE_NUMBERS, outcome.fitted.session, outcome.fitted.session_error),
+        "residual_rmse": compute_residual_rmse((*train, *held_out)),
+        "friction_pulls_sigma": compute_friction_pulls(outcome),
     }
-    if isinstance(outcome, Outcome):
-        residual = compute_residual_rmse((*train, *held_out))
-        pulls = compute_friction_pulls(outcome)
-        return {
-            "search": SEARCHES[0],
-            **told,
-            "numbers": _number_json(SESSION, outcome.fitted.session, outcome.fitted.session_error),
-            "residual_rmse": residual,
-            "friction_pulls_sigma": pulls,
-        }
-    names = [number.name for number in outcome.fitted.numbers]
-    return {
-        "search": SEARCHES[1],
-        **told,
-        "numbers": _number_json(names, outcome.fitted.values, outcome.errors),
-        "starts_agreeing": {"agreeing": outcome.agreeing[0], "of": outcome.agreeing[1]},
-        "residual_rmse": compute_residual_rmse(held_out),
-    }  # fmt: skip
 
 
 def _number_json(
@@ -182,15 +165,15 @@ def _number_json(
     }
 
 
-def _say_own_numbers(outcome: Outcome | JointOutcome, library: Sequence[Effect]) -> str:
-    """Return what the numbers that the file hardly knew say of the car, else, beside no name, the one pulled most."""
+def _say_own_numbers(outcome: Outcome, library: Sequence[Effect]) -> str:
+    """Return what the numbers that the file hardly knew say of the car, else the one pulled most beside no name."""
     told = {rival.name for _, rival in outcome.verdict.rivals}
     if own := [effect for effect in outcome.calibrated if effect.name not in told]:
         return join_phrases(say_effect(effect, library) for effect in own)
-    if isinstance(outcome, JointOutcome) or outcome.verdict.effects:
+    if outcome.verdict.effects or outcome.verdict.experiment is not None:
         return ""
     base = outcome.fitted
-    place = int(np.argmax(base.pulls))
+    place = int(np.argmax(base.pulls[: len(SESSION)]))
     number = next(e for e in library if e.effect_class == "retune" and e.parameters[0].name == SESSION[place])
     return f"most: {number.say({SESSION[place]: float(base.session[place])})}"
 

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from catalogs.effects.truths import Truth, load_sizes, load_truths
 from catalogs.studies.closing import load_closing_study
@@ -12,7 +13,6 @@ from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
 from flows.measured.closing_benchmark_summary import pair_outcome, summarise_benchmark
 from flows.measured.closing_benchmark_tables import benchmark_tables
-from flows.measured.searches import judge_campaign
 from flows.store.journal import append_line, read_lines
 from flows.store.outputs import Outputs
 from manifests.canonical import sha256_of
@@ -20,6 +20,7 @@ from manifests.provenance import code_version, source_hashes
 from tasks.campaign.planned_runs import RICH, RunPlan
 from tasks.identification.benchmark import classify_outcome, make_synthetic_campaign, measure_interval_miss
 from tasks.identification.decision.answer import Verdict
+from tasks.identification.decision.verdict import judge_runs
 
 FILE, TABLES, LOG = "closing-benchmark.json", "closing-benchmark.md", "campaigns.jsonl"
 RATES = "closing_error_rates.json"
@@ -37,7 +38,6 @@ JUDGES = (
     "tasks/surface/",
     "catalogs/effects/",
     "catalogs/decision_rules",
-    "catalogs/joint_numbers",
     "catalogs/studies/closing.",
     "catalogs/surfaces/",
     "catalogs/tyre_families",
@@ -47,7 +47,6 @@ JUDGES = (
     "catalogs/vehicles/numbers",
     "catalogs/vehicles/paper",
     "catalogs/weather/",
-    "flows/measured/searches",
 )
 """Sources that a verdict depends on: campaigns judged by the same ones belong to one table."""
 
@@ -117,7 +116,7 @@ def close_loop_benchmark(
         )  # fmt: skip
         made = time.process_time()
         library = tuple(effect for effect in effects if effect.name not in left_out)
-        verdict = judge_campaign(campaign, model, surface, library).verdict
+        verdict = judge_runs(campaign, model, surface, library, load_decision_rules()).verdict
         miss = measure_interval_miss(verdict, planned.name, planned.values) if planned.name else None
         row = {
             "kind": planned.kind,

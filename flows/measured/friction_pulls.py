@@ -33,9 +33,9 @@ def find_pulled_runs(result: Mapping[str, Any]) -> dict[str, float]:
 
     Parameters
     ----------
-    result : the verdict as plain values; one of a joint fit has no pulls
+    result : the verdict as plain values
     """
-    pulls: Mapping[str, float] = result.get("friction_pulls_sigma", {})
+    pulls: Mapping[str, float] = result["friction_pulls_sigma"]
     return {name: pull for name, pull in pulls.items() if abs(pull) > TOLD_PULL}
 
 

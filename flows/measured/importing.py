@@ -2,7 +2,7 @@
 
 import csv
 import io
-from dataclasses import replace
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +10,11 @@ import numpy as np
 import pyarrow as pa
 import yaml
 
+from catalogs.campaign_checks import load_campaign_checks
 from catalogs.campaigns import HEAT_COLUMN, SLOPE_COLUMN
 from catalogs.channel_maps import ChannelMap, FaultyMap, load_channel_map
 from catalogs.channel_maps.conditions import Conditions
 from catalogs.recordings import recording_files, recording_root, stored_files
-from catalogs.recordings.limits import load_recording_limits
-from flows.measured.import_warnings import has_stand_in, list_warnings
 from flows.measured.readable_recordings import find_signal_problems, leave_out_faulty, read_recordings
 from flows.measured.run_plan import PlannedRun, find_run_problems, plan_runs
 from flows.measured.signal_listing import list_recorded_signals
@@ -24,14 +23,14 @@ from flows.store.missing import null_missing
 from flows.store.telemetry import write_parquet
 from manifests.canonical import sha256_of_file
 from tasks.campaign.assembly import Assembled, assemble_run
-from tasks.campaign.brake_gain import find_gain_problems
 from tasks.campaign.braking_heat import measure_braking_heat
 from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME
-from tasks.campaign.deceleration import find_deceleration_problems
+from tasks.campaign.checks import apply_checks
+from tasks.campaign.measured import MeasuredRun, Recordings, Session
 from tasks.campaign.signals import Signal
 from tasks.campaign.slow_channels import measure_slow_rates
+from tasks.campaign.speed_by_acceleration import estimate_slopes
 from tasks.campaign.stated_units import find_unknown_units
-from tasks.campaign.unmapped_slope import estimate_slopes
 from tasks.errors import InputError
 from tasks.surface.weather import DRY
 
@@ -83,37 +82,22 @@ def import_measurements(
     left_out += unused
     if problems := find_run_problems(planned, recordings, channel_map.sample_rate_hz):
         raise InputError(problems)
-    made = [
-        (
-            run,
-            assemble_run(
-                recordings[run.file], channel_map.rules, run.start, run.end, channel_map.sample_rate_hz
-            ),
-        )
-        for run in planned
-    ]
-    interval = 1.0 / channel_map.sample_rate_hz
-    made, told = leave_out_faulty(made, interval)
+    made, told = leave_out_faulty([(run, _assemble(run, recordings, channel_map)) for run in planned])
     left_out += told
     lost += [run.name for run in planned if run.name not in {kept.name for kept, _ in made}]
-    readable = {run.name: found.readable for run, found in made}
-    limit, rules = load_recording_limits().deceleration.value, {r.channel: r for r in channel_map.rules}
-    problems = find_deceleration_problems(
-        readable, interval, limit, rules["speed"].unit if "speed" in rules else "m/s"
-    )
-    if not has_stand_in(channel_map):
-        slippery = [run.name for run, _ in made if run.conditions.weather != DRY]
-        problems += find_gain_problems(readable, interval, slippery=slippery)
-    if problems:
+    computed = dict.fromkeys(found.computed for _, found in made if found.computed)
+    if computed:
+        channel_map, made = _leave_out_acceleration(channel_map, made)
+    table = load_campaign_checks()
+    of_session = apply_checks(table.session, Session(runs=[found.run for _, found in made]))
+    if problems := [one.sentence for one in of_session if one.check.fault != "warning"]:
         raise InputError(problems)
-    computed = any(found.computed for _, found in made)
-    warnings = list_warnings(channel_map, readable, list(recordings.values()), computed=computed)
+    logged = Recordings(signals=list(recordings.values()), rules=channel_map.rules)
+    warnings = [one.sentence for one in (*of_session, *apply_checks(table.recordings, logged))]
     unknown = [
         found for signals in recordings.values() for found in find_unknown_units(channel_map.rules, signals)
     ]
-    warnings += dict.fromkeys(unknown)
-    if computed:
-        channel_map, made = _leave_out_acceleration(channel_map, made)
+    warnings += [*computed, *dict.fromkeys(unknown)]
     sources = {
         file.relative_to(root).as_posix(): sha256_of_file(file)
         for recording in recordings
@@ -128,6 +112,20 @@ def import_measurements(
         beside["faulty"] = lost
     heat = _estimate_heat(channel_map, made, recordings)
     return write_campaign(folder, root, channel_map, made, heat, sources, sha256_of_file(map_file), beside)
+
+
+def _assemble(
+    run: PlannedRun, recordings: dict[Path, dict[str, Signal]], channel_map: ChannelMap
+) -> Assembled:
+    """Return a planned run on its clock."""
+    about = MeasuredRun(
+        name=run.name,
+        interval=1.0 / channel_map.sample_rate_hz,
+        slippery=run.conditions.weather != DRY,
+        over_feature=run.conditions.hazard_length_m > 0.0,
+    )
+    signals, rules, table = recordings[run.file], channel_map.rules, load_campaign_checks()
+    return assemble_run(signals, rules, run.start, run.end, channel_map.sample_rate_hz, table, about=about)
 
 
 def write_campaign(
@@ -158,7 +156,8 @@ def _fill_folder(
 ) -> dict[str, Any]:
     rate = channel_map.sample_rate_hz
     felt = "longitudinal_acceleration" in channel_map.channels
-    slopes = estimate_slopes({run.name: found.readable for run, found in made}, 1.0 / rate) if felt else {}
+    limits = {check.name: check.conditions for check in load_campaign_checks().session}
+    slopes = estimate_slopes([found.run for _, found in made], **limits["felt_slope"]) if felt else {}
     split = {part: [run.name for run, _ in made if run.part == part] for part in ("train", "held_out")}
     table = io.StringIO()
     columns = ["run", *Conditions.model_fields, HEAT_COLUMN, SLOPE_COLUMN, "drive", "start_s"]
@@ -243,10 +242,7 @@ def _leave_out_acceleration(
     left = channel_map.model_copy(
         update={"channels": channels, "not_measured": (*channel_map.not_measured, name)}
     )
-    return left, [
-        (run, replace(found, columns={c: x for c, x in found.columns.items() if c != name}))
-        for run, found in made
-    ]
+    return left, [(run, found.without(name)) for run, found in made]
 
 
 def _brake_facts(channel_map: ChannelMap) -> dict[str, str]:
@@ -259,7 +255,7 @@ def _brake_facts(channel_map: ChannelMap) -> dict[str, str]:
     return {"brake_signal": found[0]} if found else {}
 
 
-def run_table(columns: dict[str, np.ndarray], rate: float) -> pa.Table:
+def run_table(columns: Mapping[str, np.ndarray], rate: float) -> pa.Table:
     """A run's Parquet table: time from 0 and its channels, units in the field metadata."""
     count = len(next(iter(columns.values())))
     fields = [pa.field("time", pa.float64(), metadata={"units": "s"})] + [

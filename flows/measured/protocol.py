@@ -10,12 +10,12 @@ from catalogs.drives import read_drives
 from catalogs.protocols import load_protocol
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle
-from flows.drawing import as_svg
 from flows.measured.dive_figure import draw_dives
+from flows.pages.figures import Figure
+from flows.pages.static import as_svg
+from flows.pages.writer import Section, Table, write_page
 from flows.store.outputs import Outputs
-from flows.studies.report import Drawing, StudyTable, write_study_page
-from tasks.campaign.attrition import tabulate_attrition
-from tasks.campaign.selection import Judged, select_events
+from tasks.campaign.selection import Judged, select_events, tabulate_attrition
 from tasks.studies.brake_dive import pitch_mode, with_model
 from tasks.studies.leave_one_out import VARIANTS, Fold, Score, leave_one_drive_out, macro_mean
 from tasks.vehicle.parameters import Vehicle
@@ -92,36 +92,36 @@ def brake_protocol(
     writer.writeheader()
     writer.writerows(table)
     results.write("attrition.csv", text.getvalue())
-    drawings = []
+    figures = []
     if folds:
         # of the last variant pitch and its rate calibrate, where the rate was measured
         variant = result["macro"][-1]["variant"]
-        drawing = as_svg(draw_dives([fold for fold in result["folds"] if fold["variant"] == variant]))
-        results.write(DIVES, drawing)
-        drawings = [
-            Drawing(caption="Dive of each drive, predicted from the others, and its mean", svg=drawing)
-        ]
-    results.write(PAGE, _write_page(result, drawings))
+        figures = [draw_dives([fold for fold in result["folds"] if fold["variant"] == variant])]
+        results.write(DIVES, as_svg(figures[0]))
+    results.write(PAGE, _write_page(result, figures))
     return result
 
 
-def _write_page(result: dict[str, Any], drawings: list[Drawing]) -> str:
+def _write_page(result: dict[str, Any], figures: list[Figure]) -> str:
     folds = [
         {name: value for name, value in fold.items() if name != "mean_trajectory"} for fold in result["folds"]
     ]
-    units = ", ".join(f"{name} [{unit}]" for name, unit in SCORE_UNITS.items())
-    return write_study_page(
+    units = ", ".join(f"{name} [{unit}]" for name, unit in SCORE_UNITS.items() if unit != "1")
+    return write_page(
+        "muSync: brake dives",
         f"Brake dives of {result['campaign']}",
-        f"The paper's Appendix C.5: of {result['candidates']} candidate events in {result['drives']} drives"
-        f" {result['retained']} keep all rules. Each drive is predicted from a calibration on the others."
-        f" {result.get('note', '')}",
         [
-            StudyTable(title="Mean over drives", rows=result["macro"], note=units),
-            StudyTable(title="Drives", rows=folds),
-            StudyTable(title="Rules, and how many events break each", rows=result["attrition"]),
+            Section(title="Dives", parts=figures),
+            Section(title="Predictions", parts=[
+                Table(title="Mean over drives", rows=result["macro"], note=units), Table(title="Drives", rows=folds),
+            ]),
+            Section(title="Rules, and how many events break each",
+                    parts=[Table(rows=result["attrition"])]),
         ],
-        drawings,
-    )
+        lead=[f"The paper's Appendix C.5: of {result['candidates']} candidate events in {result['drives']} drives"
+        f" {result['retained']} keep all rules. Each drive is predicted from a calibration on the others."
+        f" {result.get('note', '')}"],
+    )  # fmt: skip
 
 
 def _event_row(judged: Judged) -> dict[str, Any]:

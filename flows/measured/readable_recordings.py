@@ -2,27 +2,27 @@
 
 from pathlib import Path
 
+from catalogs.campaign_checks import load_campaign_checks
 from catalogs.channel_maps import ChannelMap
 from catalogs.recordings import read_signals, recording_files
-from catalogs.recordings.limits import load_recording_limits
 from flows.measured.run_plan import PlannedRun
 from flows.measured.shared_problems import PlacedProblem, join_shared_problems, place_in_file
 from tasks.campaign.assembly import Assembled
 from tasks.campaign.channels import UNITS
-from tasks.campaign.clocks import describe_clock_scale
-from tasks.campaign.run_validation import find_motion_problem
-from tasks.campaign.signals import Signal, average_sources
+from tasks.campaign.checks import apply_checks
+from tasks.campaign.measured import Recordings
+from tasks.campaign.signals import Signal
 from tasks.campaign.stated_units import choose_unit, find_unit_problems
 from tasks.errors import InputError
 
-Recordings = dict[Path, dict[str, Signal]]
+Signals = dict[Path, dict[str, Signal]]
 MOST_FAULTY = 1 / 3
 """Share of recordings, or of runs, that may be left out for their faults; more are a fault of the map [1]."""
 
 
 def read_recordings(
     files: tuple[Path, ...], channel_map: ChannelMap
-) -> tuple[ChannelMap, Recordings, list[str], list[str]]:
+) -> tuple[ChannelMap, Signals, list[str], list[str]]:
     """Return the map with every unit, the signals of each recording, and why some are left out, with their names.
 
     Parameters
@@ -35,7 +35,7 @@ def read_recordings(
     InputError
         Listing the problems of all, where more are faulty than may be left out.
     """
-    recordings: Recordings = {}
+    recordings: Signals = {}
     problems: list[PlacedProblem] = []
     for file in files:
         try:
@@ -82,14 +82,13 @@ def find_signal_problems(source: Path, channel_map: ChannelMap | None) -> list[s
 
 
 def leave_out_faulty(
-    made: list[tuple[PlannedRun, Assembled]], interval: float
+    made: list[tuple[PlannedRun, Assembled]],
 ) -> tuple[list[tuple[PlannedRun, Assembled]], list[str]]:
     """Return the runs without those whose own samples are faulty, and the faults of these.
 
     Parameters
     ----------
     made : runs on their clocks
-    interval : of the clocks [s]
 
     Raises
     ------
@@ -100,7 +99,7 @@ def leave_out_faulty(
     placed = [
         PlacedProblem(name=run.name, place=f"{run.name} ({run.file.name})", sentence=problem)
         for run, found in made
-        for problem in (*found.problems, *_find_still(run, found, interval))
+        for problem in found.problems
     ]
     told = join_shared_problems(placed, len(made), "runs")
     faulty = {problem.name for problem in placed}
@@ -111,14 +110,7 @@ def leave_out_faulty(
     return kept, told
 
 
-def _find_still(run: PlannedRun, found: Assembled, interval: float) -> list[str]:
-    if "speed" not in found.readable:
-        return []
-    problem = find_motion_problem(found.readable["speed"], interval, run.conditions.hazard_length_m > 0.0)
-    return [] if problem is None else [problem]
-
-
-def _fill_units(channel_map: ChannelMap, recordings: Recordings) -> ChannelMap:
+def _fill_units(channel_map: ChannelMap, recordings: Signals) -> ChannelMap:
     """Return a map in which each channel without a unit has that which the recordings state."""
     problems, channels = [], dict(channel_map.channels)
     for name, entry in channel_map.channels.items():
@@ -140,17 +132,8 @@ def _fill_units(channel_map: ChannelMap, recordings: Recordings) -> ChannelMap:
 
 def _find_recording_problems(signals: dict[str, Signal], channel_map: ChannelMap) -> list[str]:
     """Return units that are not the map's, and a clock whose unit it is not, before runs are looked for."""
-    problems = find_unit_problems(channel_map.rules, signals)
-    limits, clock = load_recording_limits(), channel_map.time
+    clock = channel_map.time
     taken = clock.unit if clock is not None and clock.unit in UNITS else "s"
-    speed = next(
-        (average_sources(signals, rule) for rule in channel_map.rules if rule.channel == "speed"), None
-    )
-    scale = describe_clock_scale(
-        list(signals.values()),
-        speed,
-        taken,
-        deceleration=limits.deceleration.value,
-        shortest=limits.sampling_step.value,
-    )
-    return [*problems, scale] if scale else problems
+    recording = Recordings(signals=[signals], rules=channel_map.rules, clock_unit=taken)
+    told = apply_checks(load_campaign_checks().recording, recording)
+    return [*find_unit_problems(channel_map.rules, signals), *(one.sentence for one in told)]

@@ -9,13 +9,10 @@ from numpy.typing import NDArray
 from tasks.campaign.campaign import CHANNELS
 from tasks.identification.decision.verdict import Outcome
 from tasks.identification.inference.forward import RunModel, predict_channels
-from tasks.identification.joint.fit import lead_offsets
-from tasks.identification.joint.stops import predict_stop
-from tasks.identification.joint.verdict import JointOutcome
 from tasks.vehicle.effects.table import EFFECT_TABLE
 
-MODELS = ("frozen", "retuned", "after")
-"""Models of a verdict: the vehicle file's, with its own numbers fitted, and with what was found."""
+MODELS = ("frozen", "after")
+"""Models of a verdict: the vehicle file's, and with what was found."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,17 +31,13 @@ class RunPrediction:
     predicted: Mapping[str, NDArray[np.float64]]
 
 
-def predict_runs(
-    outcome: Outcome | JointOutcome,
-) -> tuple[tuple[RunPrediction, ...], tuple[RunPrediction, ...]]:
+def predict_runs(outcome: Outcome) -> tuple[tuple[RunPrediction, ...], tuple[RunPrediction, ...]]:
     """Return the training runs and the held-out runs with the predictions of the frozen and the grown model.
 
     Parameters
     ----------
-    outcome : the verdict and what it stands on; a joint fit has the re-tuned model too on its held-out runs
+    outcome : the verdict and what it stands on
     """
-    if isinstance(outcome, JointOutcome):
-        return _predict_stops(outcome)
     evidence = outcome.finding.evidence
     channels = tuple(np.flatnonzero(np.isfinite(evidence.sensors[1])).tolist())
     train, held_out = (
@@ -57,30 +50,6 @@ def predict_runs(
             for run, after in zip(runs, outcome.predict_readings(runs), strict=True)
         )
         for runs in ([run.model for run in evidence.train], evidence.held_out)
-    )
-    return train, held_out
-
-
-def _predict_stops(outcome: JointOutcome) -> tuple[tuple[RunPrediction, ...], tuple[RunPrediction, ...]]:
-    fitted = outcome.fitted
-    train = tuple(
-        RunPrediction(
-            model=stop.model,
-            channels=tuple(stop.channels.tolist()),
-            predicted={
-                "frozen": predict_stop(stop, {}, lead_offsets(stop, {}, fitted.scales)),
-                "after": predict_stop(stop, fitted.by_name, offsets),
-            },
-        )
-        for stop, offsets in zip(outcome.train, fitted.offsets, strict=True)
-    )
-    held_out = tuple(
-        RunPrediction(
-            model=stop.model,
-            channels=tuple(stop.channels.tolist()),
-            predicted=dict(zip(MODELS, predicted, strict=True)),
-        )
-        for stop, predicted in zip(outcome.held_out, outcome.predicted, strict=True)
     )
     return train, held_out
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from catalogs.campaign_checks import load_campaign_checks
 from catalogs.campaign_files import MOST_SAMPLES
 from catalogs.channel_maps import ChannelMap, SegmentEntry
 from catalogs.channel_maps.conditions import Conditions
@@ -139,12 +140,12 @@ def _cut_recordings(
     left_out: list[str] = []
     faulty = 0
     for file, signals in recordings.items():
-        parts = cut_segments(signals, channel_map.rules, rule, cut)
+        parts = cut_segments(signals, channel_map.rules, rule, cut, load_campaign_checks())
         if not parts:
             left_out.append(
                 f"{shorten(file.relative_to(root))}: no run, for the brake is never applied above"
-                f" {segment.above_mpa:g} MPa for {segment.minimum_s:g} s: cut it by runs in place of segment where it"
-                " is to be used, as a coast-down is"
+                f" {rule.tell_pressure(segment.above_mpa)} for {segment.minimum_s:g} s: cut it by runs in place of"
+                " segment where it is to be used, as a coast-down is"
             )
         for part in parts:
             if part.fault:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from catalogs.sentences import shorten
-from tasks.campaign.run_names import list_names
+from tasks.campaign.checks import list_names
 
 SHARED = 3
 """Places from which a fault is told once for all of them [1]."""

@@ -1,22 +1,21 @@
-"""Numbers behind the figures of a verdict: residuals, deceleration by pressure, splines, numbers that are alike."""
+"""The figures of a verdict: curves over time, deceleration by pressure, splines, correlations."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flows.measured.residuals import MODELS, RunPrediction
+from flows.measured.residuals import RunPrediction
+from flows.pages.figures import Figure, Line, Panel, Style, Values
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
 from tasks.identification.decision.candidates import Candidate
 from tasks.identification.decision.forms import KNOTS, find_scanned_ranges
 from tasks.identification.decision.odds import Explanation, weigh_explanation
 from tasks.identification.decision.verdict import Outcome
 from tasks.identification.inference.quantiles import NORMAL_QUANTILE
-from tasks.identification.joint.fit import JointFit
-from tasks.identification.joint.numbers import SMOOTHED
-from tasks.identification.joint.words import find_separating_run
+from tasks.identification.inference.tyre_limit import SMOOTHED
 from tasks.vehicle.effects.ports import PORT_UNITS, VARIABLE_UNITS, format_unit
 
 BINS = 14
@@ -25,38 +24,87 @@ FEWEST_SAMPLES = 5
 """Samples from which a part of the range has a median and a band."""
 STANDING = 1.0
 """Speed below which a deceleration says nothing of the brake [m/s]."""
-ALIKE = 0.9
-"""Correlation from which two numbers stand in for each other [1]."""
-DIGITS = 5
+POINTS = 1000
+"""Points of a curve that a figure of a run can show."""
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-LEAST_GAIN = 0.1
-"""Gain of a spline that is drawn, where the axis is logarithmic [1]."""
+STYLES = {"frozen": Style("b", "dotted"), "after": Style("a")}
+"""Of the vehicle file's model, and of the one with what was found."""
 
 
-def make_residual_figures(runs: Sequence[RunPrediction]) -> list[dict[str, Any]]:
-    """Return measured less model over time for each run, with the brake pressure.
+def draw_run(run: RunPrediction, noise: Mapping[str, Any], left: Mapping[str, Any]) -> Figure:
+    """Draw what was measured and predicted over time, beside it what is left, and the brake pressure.
 
     Parameters
     ----------
-    runs : measured runs with their predictions
+    run : measured run with its predictions
+    noise : of each channel ``sigma`` [unit of the channel]
+    left : RMSE of each channel, ``frozen`` and ``after`` [unit of the channel]
     """
-    return [
-        {
-            "name": run.model.run.name,
-            "time_s": _plain(np.arange(run.model.samples) * run.model.run.interval),
-            "pressure_mpa": _plain(run.model.pressure),
-            "models": [name for name in MODELS if name in run.predicted],
-            "channels": [
-                {"name": CHANNELS[c], "unit": format_plain_unit(CHANNEL_UNITS[c])}
-                | {name: _plain((run.model.measured - y)[:, c]) for name, y in run.predicted.items()}
-                for c in run.channels
-            ],
-        }
-        for run in runs
+    thin = slice(None, None, max(run.model.samples // POINTS, 1))
+    time = (np.arange(run.model.samples) * run.model.run.interval)[thin]
+    panels, said = [], []
+    for c in run.channels:
+        name, unit = CHANNELS[c], format_plain_unit(CHANNEL_UNITS[c])
+        reach = NORMAL_QUANTILE * noise[name]["sigma"]
+        measured = run.model.measured[thin, c]
+        predicted = {model: values[thin, c] for model, values in run.predicted.items()}
+        after = predicted["after"]
+        said.append(
+            f"{_as_words(name)} {left[name]['frozen']:.3g} → {left[name]['after']:.3g} {unit}".rstrip()
+        )
+        panels.append(Panel(title=_as_words(name), y=unit, lines=[
+            Line(name="noise, 95 %", x=time, y=np.full(len(time), np.nan), low=after - reach, high=after + reach,
+                 style=Style("soft")),
+            *(Line(name=model, x=time, y=values, style=STYLES[model]) for model, values in predicted.items()),
+            Line(name="measured", x=time, y=measured),
+        ]))  # fmt: skip
+        panels.append(Panel(title=f"{_as_words(name)}, measured less model", y=unit, lines=[
+            _draw_limits("noise, 95 %", time[[0, -1]], reach),
+            *(Line(name=model, x=time, y=measured - y, style=STYLES[model]) for model, y in predicted.items()),
+        ]))  # fmt: skip
+    panels.append(
+        Panel(title="brake pressure", y="MPa", lines=[Line(name="", x=time, y=run.model.pressure[thin])])
+    )
+    return Figure(
+        caption=f"{run.model.run.name}: error frozen → after: {'; '.join(said)}",
+        description=f"Measured, frozen and after over time of {run.model.run.name}, and what each leaves:"
+        f" {'; '.join(said)}; below them the brake pressure",
+        panels=panels,
+        columns=2,
+        linked=True,
+        panel_px=210,
+    )  # fmt: skip
+
+
+def draw_brake_curve(runs: Sequence[RunPrediction]) -> Figure:
+    """Draw deceleration against brake pressure.
+
+    Parameters
+    ----------
+    runs : training runs with their predictions
+    """
+    curve = make_brake_curve(runs)
+    x = curve["pressure_mpa"]
+    lines = [
+        Line(name="measured", x=x, y=curve["measured"], low=curve["low"], high=curve["high"], marked=True),
+        Line(name="frozen", x=x, y=curve["frozen"], marked=True, style=STYLES["frozen"]),
+        Line(name="after", x=x, y=curve["fitted"], marked=True, style=STYLES["after"]),
     ]
+    at = (
+        f": at {x[-1]:.3g} MPa measured {curve['measured'][-1]:.3g}, frozen {curve['frozen'][-1]:.3g}, after"
+        f" {curve['fitted'][-1]:.3g} m/s²"
+        if len(x)
+        else ""
+    )
+    return Figure(
+        caption=f"Deceleration and brake pressure, each over {SMOOTHED:g} s",
+        description=f"Deceleration against brake pressure{at}",
+        panels=[Panel(x="brake pressure [MPa]", y="deceleration [m/s²]", lines=lines)],
+        panel_px=340,
+    )
 
 
-def make_brake_curve(runs: Sequence[RunPrediction]) -> dict[str, list[float | None]]:
+def make_brake_curve(runs: Sequence[RunPrediction]) -> dict[str, NDArray[np.float64]]:
     """Return deceleration against brake pressure over runs: medians by pressure, and the measured band.
 
     Speeds of the measurement and of both models are treated alike: their decrease over a short time.
@@ -70,12 +118,15 @@ def make_brake_curve(runs: Sequence[RunPrediction]) -> dict[str, list[float | No
     place = np.clip(np.digitize(pressure, edges) - 1, 0, BINS - 1)
     parts = [place == k for k in range(BINS) if np.sum(place == k) >= FEWEST_SAMPLES]
     return {
-        "pressure_mpa": [_shorten(pressure[part].mean()) for part in parts],
-        "low": [_shorten(np.quantile(measured[part], 0.05)) for part in parts],
-        "measured": [_shorten(np.median(measured[part])) for part in parts],
-        "high": [_shorten(np.quantile(measured[part], 0.95)) for part in parts],
-        "frozen": [_shorten(np.median(frozen[part])) for part in parts],
-        "fitted": [_shorten(np.median(fitted[part])) for part in parts],
+        name: np.array([statistic(values[part]) for part in parts])
+        for name, values, statistic in (
+            ("pressure_mpa", pressure, np.mean),
+            ("low", measured, lambda y: np.quantile(y, 0.05)),
+            ("measured", measured, np.median),
+            ("high", measured, lambda y: np.quantile(y, 0.95)),
+            ("frozen", frozen, np.median),
+            ("fitted", fitted, np.median),
+        )
     }
 
 
@@ -91,8 +142,8 @@ def _compute_decelerations(run: RunPrediction) -> NDArray[np.float64]:
     return np.vstack((pressure, slower))[:, np.all(speeds[:, lag:] > STANDING, axis=0)]
 
 
-def make_spline_figures(outcome: Outcome) -> dict[str, Any]:
-    """Return where the residual of the training runs lies: gains of splines, and the spline at the named port.
+def draw_splines(outcome: Outcome) -> tuple[list[dict[str, Any]], Figure]:
+    """Return where the residual of the training runs lies: a row of gains for each spline, and one spline drawn.
 
     Parameters
     ----------
@@ -111,68 +162,79 @@ def make_spline_figures(outcome: Outcome) -> dict[str, Any]:
     rows.sort(key=lambda row: -row[1].gain)
     ports = [effect.port for effect in outcome.verdict.effects]
     form, alone, both, _ = next((row for row in rows if row[0].port in ports), rows[0])
-    return {
-        "gains": [
-            {
-                "name": f"{f.port} over {f.variable}".replace("_", " "),
-                "frozen": _shorten(max(before.gain, LEAST_GAIN)),
-                "after": _shorten(max(left, LEAST_GAIN)),
-            }
-            for f, before, _, left in rows
-        ],
-        "spline": {
-            "x_name": f"{form.variable} [{format_unit(VARIABLE_UNITS[form.variable])}]".replace("_", " "),
-            "y_name": f"{form.port} [{PORT_UNITS[form.port]}]".replace("_", " "),
-            "x": _plain(np.linspace(*grids[form.variable], KNOTS)),
-            "frozen": _make_band(alone, form),
-            "after": _make_band(both, form),
-        },
-    }
+    gains = [
+        {"spline": _as_words(f"{f.port} over {f.variable}"), "gain, frozen": float(before.gain),
+         "gain, after": float(left)}
+        for f, before, _, left in rows
+    ]  # fmt: skip
+    x = np.linspace(*grids[form.variable], KNOTS)
+    lines = [_draw_band(name, x, fit, form) for name, fit in (("frozen", alone), ("after", both))]
+    port = _label(form.port, PORT_UNITS[form.port])
+    panel = Panel(
+        x=_label(form.variable, format_unit(VARIABLE_UNITS[form.variable])), y=_as_words(port), lines=lines
+    )
+    at = ", ".join(f"{line.name} {np.asarray(line.y)[-1]:.3g}" for line in lines)
+    figure = Figure(
+        caption="The spline at the named port, else the one that gains most, with the band that holds 95 %",
+        description=f"Spline of the residual: {panel.y} over {panel.x}, at {x[-1]:.3g} {at}",
+        panels=[panel],
+        panel_px=300,
+    )
+    return gains, figure
 
 
-def _make_band(explanation: Explanation, form: Candidate) -> dict[str, list[float | None]]:
-    places = explanation.find_places(form)
-    values, reach = explanation.values[places], NORMAL_QUANTILE * explanation.errors[places]
-    return {"values": _plain(values), "low": _plain(values - reach), "high": _plain(values + reach)}
-
-
-def find_alike_numbers(fitted: JointFit) -> list[dict[str, Any]]:
-    """Return pairs of fitted numbers that stand in for each other, the most alike first, with what tells them apart.
+def draw_correlation(correlation: Mapping[str, Mapping[str, Any]]) -> Figure:
+    """Draw the correlation of the held-out residual with the brake pressure over the delay.
 
     Parameters
     ----------
-    fitted : the fit
+    correlation : by channel, as of a verdict's ``residual_input_correlation``
     """
-    inverse = np.linalg.inv(fitted.information)
-    sigma = np.sqrt(np.diag(inverse))
-    correlation = inverse / np.outer(sigma, sigma)
-    pairs = [
-        {
-            "names": (a.name, b.name),
-            "correlation": float(correlation[i, j]),
-            "separate": find_separating_run((a, b)),
-        }
-        for i, a in enumerate(fitted.numbers)
-        for j, b in enumerate(fitted.numbers[:i])
-        if abs(correlation[i, j]) > ALIKE
-    ]
-    return sorted(pairs, key=lambda pair: -abs(pair["correlation"]))
+    panels, said = [], []
+    for channel, c in correlation.items():
+        ends = [c["lag_s"][0], c["lag_s"][-1]]
+        panels.append(Panel(title=_as_words(channel), x="residual after pressure [s]", y="correlation", lines=[
+            _draw_limits("independent, 95 %", ends, c["band"]),
+            *(Line(name=model, x=c["lag_s"], y=c[model], style=style) for model, style in STYLES.items()),
+        ]))  # fmt: skip
+        most = ", ".join(f"{max(map(abs, c[model])):.3g} {model}" for model in STYLES)
+        said.append(f"{_as_words(channel)} at most {most}, band {c['band']:.3g}")
+    return Figure(
+        caption="Correlation over the delay of the residual",
+        description=f"Correlation with brake pressure: {'; '.join(said)}",
+        panels=panels,
+        columns=2,
+    )
+
+
+def _draw_limits(name: str, ends: Values, reach: float) -> Line:
+    """Return a band about 0."""
+    return Line(name=name, x=ends, y=[None] * 2, low=[-reach] * 2, high=[reach] * 2, style=Style("soft"))
+
+
+def _draw_band(name: str, x: NDArray[np.float64], explanation: Explanation, form: Candidate) -> Line:
+    places = explanation.find_places(form)
+    values, reach = explanation.values[places], NORMAL_QUANTILE * explanation.errors[places]
+    return Line(
+        name=name, x=x, y=values, low=values - reach, high=values + reach, marked=True, style=STYLES[name]
+    )
 
 
 def format_plain_unit(unit: str) -> str:
-    """Return a unit as a reader knows it.
+    """Return a unit as a reader knows it; a share has none.
 
     Parameters
     ----------
     unit : of the tables
     """
+    if unit == "1":
+        return ""
     return re.sub(r"(?<=[A-Za-z)])\^?(-?[0-9])", lambda found: found[1].translate(RAISED), unit)
 
 
-def _plain(values: NDArray[np.floating[Any]]) -> list[float | None]:
-    return [_shorten(value) for value in values]
+def _label(name: str, unit: str) -> str:
+    return _as_words(f"{name} [{unit}]" if unit not in ("", "1") else name)
 
 
-def _shorten(value: float) -> float | None:
-    """Return a number with the digits that a screen can show; JSON has no infinity."""
-    return float(f"{value:.{DIGITS}g}") if np.isfinite(value) else None
+def _as_words(name: str) -> str:
+    return name.replace("_", " ")

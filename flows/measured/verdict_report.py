@@ -1,30 +1,28 @@
 """The page of a verdict: one HTML file that needs no other."""
 
+import re
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
 from flows.measured.closing_error_rates import tell_error_rates
 from flows.measured.friction_pulls import find_pulled_runs
 from flows.measured.residuals import predict_runs
 from flows.measured.verdict_figures import (
-    find_alike_numbers,
+    draw_brake_curve,
+    draw_correlation,
+    draw_run,
+    draw_splines,
     format_plain_unit,
-    make_brake_curve,
-    make_residual_figures,
-    make_spline_figures,
 )
-from flows.pages import DATASET_PAGE, make_policy, read_plotly
+from flows.pages.writer import Cell, Command, Part, Section, Table, write_page
 from tasks.campaign.campaign import Campaign
 from tasks.identification.decision.verdict import Outcome
-from tasks.identification.joint.verdict import JointOutcome
-from tasks.identification.joint.words import find_separating_run
 from tasks.vehicle.effects.library import Effect
 
-PAGE = Path(__file__).parent / "verdict_page"
+MOST_WORDS = 30
+"""Of the sentence that a page opens with."""
 IMPORT = "musync import-measurements RECORDINGS --map MAP.yaml --out CAMPAIGN"
 MEANING = {
     "FOUND": "the model lacks this",
@@ -38,10 +36,8 @@ MISSED = "what is missing cannot be named"
 """Meaning of NOTHING where the runs disagree with the model by more than their noise."""
 
 
-def write_verdict_page(outcome: Outcome | JointOutcome, result: Mapping[str, Any], campaign: Campaign) -> str:
+def write_verdict_page(outcome: Outcome, result: Mapping[str, Any], campaign: Campaign) -> str:
     """Return the page.
-
-    Scripts run by their hashes alone: one that got in with a name of the campaign would not, and nothing is fetched.
 
     Parameters
     ----------
@@ -49,31 +45,192 @@ def write_verdict_page(outcome: Outcome | JointOutcome, result: Mapping[str, Any
     result : the verdict as plain values
     campaign : measured runs
     """
-    pages = Environment(loader=FileSystemLoader(PAGE), autoescape=True, undefined=StrictUndefined)
-    pages.filters |= {"digits": _format_digits, "words": _format_name, "unit": format_plain_unit}
-    scripts = (read_plotly(), (PAGE / "page.js").read_text())
-    style = "\n".join(sheet.read_text() for sheet in (DATASET_PAGE / "report.css", PAGE / "page.css"))
+    heading, lead = _open_page(result)
     train, held_out = predict_runs(outcome)
-    figures = {"runs": make_residual_figures(held_out), "curve": make_brake_curve(train)}
-    told: dict[str, Any] = {"separate": [None] * len(result["rivals"])}
-    template = "joint_fit.html"
-    if isinstance(outcome, JointOutcome):
-        told = {"separate": _find_separations(outcome), "alike": find_alike_numbers(outcome.fitted)}
-    else:
-        template = "explanations.html"
-        figures |= make_spline_figures(outcome) | {"correlation": result["residual_input_correlation"]}
-        told |= {
-            "tried": outcome.verdict.tried,
-            "detectable": [
-                (e.name, e.parameters[0], result["minimum_detectable"].get(e.name))
-                for e in _list_effects(outcome)
-            ],
-            "error_rates": tell_error_rates([effect["name"] for effect in result["effects"]]),
-        }
-    return pages.get_template(template).render(
-        campaign=campaign, result=result, meaning=_tell_meaning(result), steps=find_next_steps(result, campaign),
-        figures=figures, style=style, scripts=scripts, policy=make_policy(scripts=scripts), **told,
+    gains, spline = draw_splines(outcome)
+    correlation = result["residual_input_correlation"]
+    rates = tell_error_rates([effect["name"] for effect in result["effects"]])
+    return write_page(
+        f"{campaign.name}: close-loop",
+        heading,
+        [
+            Section(title="Verdict", parts=_list_verdict(result)),
+            Section(title="Do next", parts=[
+                part for sentence, command in find_next_steps(result, campaign)
+                for part in (sentence, Command(text=command))
+            ]),
+            Section(title="What this rests on", parts=[[
+                *result["reasons"],
+                *(f"left out, because halving the integration step changes its prediction: {name}"
+                  for name in result["runs_left_out"]),
+            ]]),
+            Section(title="Error on held-out runs", parts=[_tabulate_errors(result, len(held_out))]),
+            Section(title="Measured and predicted on held-out runs", parts=[
+                "Measured, the vehicle file's model (frozen), and the model with what was found (after), beside what"
+                " each leaves. A model that is right leaves noise about zero, within the band. Drag over a figure to"
+                " zoom, double-click for the whole; with the keyboard, focus a figure: + and − zoom, arrows move, 0"
+                " shows the whole.",
+                *(draw_run(run, result["noise"], result["residual_rmse"][run.model.run.name]) for run in held_out),
+            ]),
+            Section(title="Deceleration against brake pressure", parts=[
+                "Training runs, medians by pressure; the band holds nine tenths of what was measured. Where the fitted"
+                " line leaves the band, the brake does something else than the model says.",
+                draw_brake_curve(train),
+            ]),
+            Section(title="Explanations and their odds", parts=_list_odds(outcome, result)),
+            Section(title="Where the residual of the training runs lies", parts=[
+                "A spline of each variable at each port, fitted to what the model leaves over: how much it gains,"
+                " before and after.",
+                spline, Table(title="Gains of splines", rows=gains, digits=3),
+            ]),
+            Section(title="Correlation of the held-out residual with brake pressure", parts=[
+                "Both whitened by the channel's noise, over the time by which the residual follows. Inside the band the"
+                " two are compatible with independence. The runs' offsets and smooth disturbances are not removed, so"
+                " that a correct model can leave the band slightly.",
+                draw_correlation(correlation),
+            ] if correlation else []),
+            Section(title="The vehicle's own numbers", parts=[_tabulate_own_numbers(result)]),
+            Section(title="Smallest effects that this campaign can show",
+                    parts=[_tabulate_detectable(outcome, result)]),
+            Section(title="How often this method is right", parts=[list(rates)]),
+            Section(title="Data and split, fixed before any fit", parts=[{
+                "training runs": ", ".join(run.name for run in campaign.train),
+                "held-out runs": ", ".join(run.name for run in campaign.held_out),
+                "earlier readings": f"{result['held_out_readings_before']} of these held-out runs",
+                "campaign": result["content_sha256"], "split": result["split_sha256"],
+                "library": result["library_sha256"], "source": result["made_with"]["source_sha256"],
+            }]),
+        ],
+        lead=[*lead, f"{campaign.name} against {campaign.vehicle}"],
     )  # fmt: skip
+
+
+def _open_page(result: Mapping[str, Any]) -> tuple[str, list[str]]:
+    """Return the sentence that a page opens with, and what follows it."""
+    first, _, rest = re.sub(r"(?<=\w\.) (?=[A-Z])", "\n", result["sentence"], count=1).partition("\n")
+    if len(first.split()) <= MOST_WORDS:
+        return first, [rest] if rest else []
+    meaning = _tell_meaning(result)
+    return f"{meaning[0].upper()}{meaning[1:]}.", [result["sentence"]]
+
+
+def _list_verdict(result: Mapping[str, Any]) -> list[Part]:
+    """Return the verdict's name, what was found, and what it cannot be told from."""
+    found = [
+        {"in words": "" if k else effect["says"], "kind": "" if k else effect["class"], "number": _as_words(name),
+         "value": Cell(value=p["value"], tone="strong"), "95 % interval": _as_range(p),
+         "unit": format_plain_unit(p["unit"])}
+        for effect in result["effects"]
+        for k, (name, p) in enumerate(effect["parameters"].items())
+    ]  # fmt: skip
+    how = (
+        " beside it, and within what the vehicle file and these runs know of it"
+        if found
+        else ", a number of the vehicle file"
+    )
+    calibrated = [
+        f"Fitted{how}: {effect['says']} ({p['value']:.3g}, 95 % interval {_as_interval(p)})."
+        for effect in result["calibrated"]
+        for p in effect["parameters"].values()
+    ]
+    rivals = [
+        f"{_as_words(rival['of'])} and {_as_words(rival['name'])} ({rival['says']}; "
+        + ", ".join(f"{_as_words(name)} {_as_interval(p)}" for name, p in rival["parameters"].items())
+        + ")."
+        for rival in result["rivals"]
+    ]
+    missing = ", ".join(result["not_carried_by_coupled_mode"])
+    return [
+        f"{result['verdict']}: {_tell_meaning(result)}",
+        Table(title="Numbers that were found", rows=found, digits=3,
+              note="With the interval that holds the true one in 95 % of cases; shares, which have no unit, and other"
+              " numbers are on top of the vehicle file's."),
+        *calibrated,
+        *(["These runs cannot tell apart:", rivals] if rivals else []),
+        *([f"No part of the vehicle, so not in the grown one: {missing}."] if missing else []),
+    ]  # fmt: skip
+
+
+def _tabulate_errors(result: Mapping[str, Any], runs: int) -> Table:
+    rows = [
+        {"channel": _as_words(name), "frozen": e["frozen"], "re-tuned": e["retuned"],
+         "after": Cell(value=e["after"], tone="strong"),
+         "after, 95 %": _as_range(e) if e["ci_low"] < e["ci_high"] else "one run",
+         "unit": format_plain_unit(e["unit"]), "runs better": e["runs_better"], "worst run": e["worst_run"]}
+        for errors in (result["error"], result["manoeuvre_error"])
+        for name, e in errors.items()
+    ]  # fmt: skip
+    note = (
+        f"Root mean square over {runs} run{'' if runs == 1 else 's'} to which no number was fitted. Frozen: the vehicle"
+        " file. Re-tuned: no effect, with the tolerances of the vehicle's own numbers widened tenfold. After: with all"
+        " that was found. These runs had no say in what is named."
+    )
+    return Table(rows=rows, note=note, digits=3)
+
+
+def _list_odds(outcome: Outcome, result: Mapping[str, Any]) -> list[Part]:
+    """Return what the training runs leave open, what is named of it, and what is not."""
+    odds = [
+        {"explanation": _as_words(" and ".join(row["names"])) or "nothing",
+         "odds": f"{row['odds']:.3g} : 1"}
+        for row in result["odds"]
+    ]  # fmt: skip
+    named = [
+        {"named": _as_words(effect["name"]), "log odds": effect["score"], "gain": effect["gain"],
+         "scatter of runs": effect["spread"]}
+        for effect in result["effects"]
+    ]  # fmt: skip
+    tried = []
+    for effect in outcome.verdict.tried:
+        first, *_ = effect.parameters
+        value = f"{first.value:.3g} {format_plain_unit(first.unit)}".rstrip()
+        tried.append(
+            {
+                "candidate": _as_words(effect.name),
+                "log odds": effect.score,
+                "gain": effect.gain,
+                "value": value,
+            }
+        )
+    return [
+        Table(rows=odds, note="What the training runs leave open, against the first. A name needs 20 : 1, and 20 : 1"
+              " that it is larger than what matters."),
+        Table(title="What is named", rows=named, digits=3, note="By how much its logarithmic odds and the likelihood"
+              " fall without it, and how far the runs scatter about its size."),
+        Table(title="Candidates that are not named, beside what is", rows=tried, digits=3),
+    ]  # fmt: skip
+
+
+def _tabulate_own_numbers(result: Mapping[str, Any]) -> Table:
+    rows = [
+        {"number": _as_words(name), "moved by": f"{result['numbers'][name]['value']:+.4f}",
+         "standard error": f"{result['numbers'][name]['standard_error']:.4f}", "before": f"{pull['before']:+.1f}",
+         "after": f"{pull['after']:+.1f}"}
+        for name, pull in result["session_pulls_sigma"].items()
+    ]  # fmt: skip
+    note = (
+        "By how much these runs move each from the vehicle file, and how far that is in its tolerances: before and"
+        " after what is named. Beyond 4 the number is wrong, or stands for something that is missing."
+    )
+    return Table(rows=rows, note=note)
+
+
+def _tabulate_detectable(outcome: Outcome, result: Mapping[str, Any]) -> Table:
+    rows = []
+    for effect in _list_effects(outcome):
+        number = effect.parameters[0]
+        smallest = result["minimum_detectable"].get(effect.name)
+        unit = format_plain_unit(number.unit)
+        rows.append(
+            {
+                "effect": _as_words(effect.name),
+                "number": _as_words(number.name),
+                "smallest": smallest,
+                "unit": unit,
+            }
+        )
+    note = "Of each effect's first number; – where no value within its bounds would be named."
+    return Table(rows=rows, note=note, digits=3)
 
 
 def find_next_steps(result: Mapping[str, Any], campaign: Campaign) -> list[tuple[str, str]]:
@@ -128,25 +285,19 @@ def _tell_meaning(result: Mapping[str, Any]) -> str:
     return MISSED if missed else MEANING[result["verdict"]]
 
 
-def _find_separations(outcome: JointOutcome) -> list[str | None]:
-    """Return the run that tells each rival from what is named, in the order of the rivals."""
-    fits = (outcome.fitted, *(substitute.fitted for substitute in outcome.substitutes))
-    numbers = {n.effect.name: n for fitted in fits for n in fitted.numbers}
-    return [
-        find_separating_run([numbers[name] for name in (of, rival.name) if name in numbers])
-        for of, rival in outcome.verdict.rivals
-    ]
-
-
 def _list_effects(outcome: Outcome) -> list[Effect]:
     """Return every effect that was weighed, once."""
     candidates = outcome.finding.grams.columns.candidates
     return list({c.name: c.effect for c in candidates if c.effect is not None}.values())
 
 
-def _format_digits(value: float | None) -> str:
-    return "–" if value is None else f"{value:.3g}"
+def _as_range(numbers: Mapping[str, Any]) -> str:
+    return f"{numbers['ci_low']:.3g} to {numbers['ci_high']:.3g}"
 
 
-def _format_name(name: str) -> str:
+def _as_interval(parameter: Mapping[str, Any]) -> str:
+    return f"{_as_range(parameter)} {format_plain_unit(parameter['unit'])}".rstrip()
+
+
+def _as_words(name: str) -> str:
     return name.replace("_", " ")

@@ -1,12 +1,12 @@
 """How a notebook shows a dataset and a clip: small pictures and the figures that tell them from others."""
 
-import base64
 from collections.abc import Mapping, Sequence
 from math import degrees
 from typing import TYPE_CHECKING, Any
 
 from catalogs.sentences import shorten
 from catalogs.variants import warn_of_variant
+from flows.pages.writer import Part, Picture, encode_picture, write_card
 from tasks.errors import InputError
 
 if TYPE_CHECKING:
@@ -16,19 +16,6 @@ if TYPE_CHECKING:
 THUMBNAIL_WIDTH = 160
 """Of a picture in a card [px]; as JPEG it takes some 5 kB, which a saved notebook holds."""
 MOST_PICTURES = 6
-_CARD = """\
-<div class="musync-card">
-<p><b>{{ title }}</b></p>
-{% if pictures %}<div style="display:flex;flex-wrap:wrap;gap:6px">
-{% for caption, source in pictures %}<figure style="margin:0"><img src="{{ source }}" alt="{{ caption }}">\
-<figcaption style="font-size:smaller;max-width:{{ width }}px;overflow-wrap:anywhere">{{ caption }}</figcaption></figure>
-{% endfor %}</div>
-{% endif %}<table>
-{% for name, value in rows %}<tr><th style="text-align:left">{{ name }}</th>\
-<td style="text-align:left">{{ value }}</td></tr>
-{% endfor %}</table>
-</div>
-"""
 
 
 def dataset_card(data: "Dataset") -> str:
@@ -53,7 +40,7 @@ def dataset_card(data: "Dataset") -> str:
         *([("warning", warning)] if (warning := warn_of_variant(grid.get("variant", "full"))) else []),
         ("run", data.manifest["run_id"]),
     ]
-    return _render_card(f"muSync dataset {grid['name']}: {data.place}", pictures, rows)
+    return write_card(f"muSync dataset {grid['name']}: {data.place}", [*pictures, dict(rows)])
 
 
 def clip_card(clip: "Clip") -> str:
@@ -70,7 +57,7 @@ def clip_card(clip: "Clip") -> str:
         ("clip id", clip.clip_id),
         *([("frames", fault)] if fault else []),
     ]  # fmt: skip
-    return _render_card(clip.label, pictures, rows)
+    return write_card(clip.label, [*pictures, dict(rows)])
 
 
 def _name_verdict(verdict: Mapping[str, Any]) -> str:
@@ -89,29 +76,17 @@ def _format_range(stops: Sequence[float], clips: int) -> str:
     return f"{min(stops):.1f} to {max(stops):.1f} m ({len(stops)} of {clips} clips stop)"
 
 
-def _draw_pictures(
-    data: "Dataset", rows: Sequence[Mapping[str, Any]]
-) -> tuple[list[tuple[str, str]], str | None]:
-    """Caption and data URI of the middle frame of each clip; without frames none, and the reason."""
+def _draw_pictures(data: "Dataset", rows: Sequence[Mapping[str, Any]]) -> tuple[list[Part], str | None]:
+    """Return the middle frame of each clip; without frames none, and the reason."""
     try:
-        return [(row["label"], _encode_thumbnail(data[row["label"]].picture())) for row in rows], None
+        pictures = [
+            Picture(
+                caption=row["label"],
+                sources=[encode_picture(data[row["label"]].picture(), THUMBNAIL_WIDTH)],
+            )
+            for row in rows
+        ]
     except InputError as error:
         # a card is shown unasked: a fault of the pictures must not hide the figures
         return [], shorten("; ".join(error.problems))
-
-
-def _encode_thumbnail(picture: Any) -> str:
-    import cv2
-
-    height, width = picture.shape[:2]
-    size = (THUMBNAIL_WIDTH, max(1, round(height * THUMBNAIL_WIDTH / width)))
-    small = cv2.resize(picture[:, :, ::-1], size, interpolation=cv2.INTER_AREA)
-    content = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, 80])[1].tobytes()
-    return f"data:image/jpeg;base64,{base64.b64encode(content).decode()}"
-
-
-def _render_card(title: str, pictures: list[tuple[str, str]], rows: list[tuple[str, str]]) -> str:
-    from jinja2 import Environment, StrictUndefined
-
-    card = Environment(autoescape=True, undefined=StrictUndefined).from_string(_CARD)
-    return card.render(title=title, pictures=pictures, rows=rows, width=THUMBNAIL_WIDTH)
+    return [pictures], None

@@ -18,7 +18,8 @@ from catalogs.variants import warn_of_variant
 from flows.making.input_changes import refuse_changed_records
 from flows.making.plan import Plan
 from flows.making.seal import pick_evenly
-from flows.pages import DATASET_PAGE, read_plotly
+from flows.pages.figures import STYLE_SHEET, Figure, Panel, as_plotly
+from flows.pages.writer import FILES, fill_template, read_plotly
 from flows.reading.film import write_film
 from flows.reading.previews import select_clips
 from flows.running.progress import progress_bar
@@ -35,6 +36,13 @@ from tasks.errors import InputError
 from tasks.render.traces import TRACES
 
 COMMAND = "report"
+PAGE = Path(__file__).parent / "report_page"
+SCRIPTS = {"page.js": FILES, "traces.js": PAGE, "report.js": PAGE}
+FILTERS = {
+    "weather": "Weather", "hazard": "Road", "verdict": "Pose check", "calibration": "Calibrated range",
+    "split": "Split",
+}  # fmt: skip
+PANEL_PX = 110
 OF_A_CLIP = re.compile(r"clips/\w+\.js|media/\w+\.mp4")
 """Files that go when their clip does."""
 TRACED_CLIPS = 200
@@ -74,10 +82,12 @@ def make_report(dataset: str, *, out: str | None = None, clips: list[str] | None
     pictures = manifest["grid"].get("pictures", True)
     data = page_data(manifest, {row["clip_id"] for row in brought}, pictures)
     data["horizon"] = locate_horizon(layout) if pictures else None
-    fixed = {source.name: source.read_bytes() for source in sorted(DATASET_PAGE.iterdir())} | {
-        "plotly.min.js": read_plotly().encode(),
-        "data.js": f"const REPORT = {_format_script(data)};\n".encode(),
+    scripts = {
+        "plotly.min.js": read_plotly(),
+        "data.js": f"const REPORT = {_format_script(data)};\n",
+        **{name: (source / name).read_text() for name, source in SCRIPTS.items()},
     }
+    fixed = scripts | {"index.html": _write_index(manifest, list(scripts))}
     of_clips = [
         name for row in brought for name in (_traces_name(row), *([_film_name(row)] if pictures else []))
     ]
@@ -96,6 +106,15 @@ def make_report(dataset: str, *, out: str | None = None, clips: list[str] | None
     }
 
 
+def _write_index(manifest: Mapping[str, Any], scripts: Sequence[str]) -> str:
+    name = manifest["grid"]["name"]
+    return fill_template(
+        "explorer.html", folder=PAGE, title=f"{name} – muSync report", heading=name, lead=[_summarise_run(manifest)],
+        above="", tone="", policy="", style=STYLE_SHEET.read_text(), scripts=scripts, filters=FILTERS,
+        run=_list_manifest_facts(manifest),
+    )  # fmt: skip
+
+
 def page_data(manifest: Mapping[str, Any], brought: set[str], pictures: bool) -> dict[str, Any]:
     """Return the page's data of all clips; telemetry is loaded clip by clip.
 
@@ -107,16 +126,11 @@ def page_data(manifest: Mapping[str, Any], brought: set[str], pictures: bool) ->
     """
     grid, rows = manifest["grid"], manifest["clips"]
     settings = recorded_grid(grid, "manifest")
-    warning = warn_of_variant(settings.variant)
     place = {row["clip_id"]: k for k, row in enumerate(rows)}
     kept = (
         "clip_id", "label", "seed", "split", "calibration", "scenario", "figures", "verdict", "content"
     )  # fmt: skip
     return {
-        "name": grid["name"],
-        "summary": f"{len(rows)} clips of {grid['frames']} frames on {grid['scene']}, vehicle {grid['vehicle']}"
-        f" in {grid['vehicle_mode']} mode; run {manifest['run_id']}"
-        + (f". {warning}" if warning else ""),
         "frame_rate_hz": grid["frame_rate_hz"],
         "tick_rate_hz": TICK_RATE_HZ,
         "duration_s": settings.telemetry_s,
@@ -134,7 +148,9 @@ def page_data(manifest: Mapping[str, Any], brought: set[str], pictures: bool) ->
             for row in rows
         ],
         "pairs": [[place[p["clip_id_a"]], place[p["clip_id_b"]], p["control"]] for p in iterate_pairs(rows)],
-        "manifest": _manifest_facts(manifest),
+        "figure": as_plotly(
+            Figure(caption="", panels=[Panel(y="", lines=[]) for _ in TRACES], linked=True, panel_px=PANEL_PX)
+        ),
     }  # fmt: skip
 
 
@@ -234,28 +250,26 @@ def _choose_folder(layout: Layout, out: str | None) -> Path:
     return folder
 
 
-def _manifest_facts(manifest: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Titled rows of name, value, and whether the value is a hash."""
+def _summarise_run(manifest: Mapping[str, Any]) -> str:
+    grid = manifest["grid"]
+    warning = warn_of_variant(recorded_grid(grid, "manifest").variant)
+    return (
+        f"{len(manifest['clips'])} clips of {grid['frames']} frames on {grid['scene']}, vehicle {grid['vehicle']}"
+        f" in {grid['vehicle_mode']} mode; run {manifest['run_id']}{f'. {warning}' if warning else ''}"
+    )
+
+
+def _list_manifest_facts(manifest: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return facts of the run by what they are about."""
     grid, made_with = manifest["grid"], manifest["made_with"]
-    settings = [[key, str(value), False] for key, value in grid.items() if not isinstance(value, dict | list)]
-    return [
-        {"title": "Run", "rows": [
-            ["run_id", manifest["run_id"], True], ["seal", manifest["seal"], True],
-            ["format", manifest["format"], False], ["backend", manifest["backend"], False],
-        ]},
-        {"title": "Grid", "rows": settings},
-        {"title": "Source", "rows": [
-            ["version", made_with["code"]["version"], False],
-            ["source_sha256", made_with["code"]["source_sha256"], True],
-        ]},
-        {"title": "Inputs", "rows": [
-            ["scene", manifest["scene"]["sha256"], True], *([k, v, True] for k, v in manifest["inputs"].items()),
-        ]},
-        {"title": "Tools", "rows": [
-            [k, v, False] for k, v in (made_with["libraries"] | manifest["processor"]).items()
-        ]},
-        {"title": "Files", "rows": [[k, v, True] for k, v in manifest["artifacts"].items()]},
-    ]  # fmt: skip
+    return {
+        "Run": {key: manifest[key] for key in ("run_id", "seal", "format", "backend")},
+        "Grid": {key: str(value) for key, value in grid.items() if not isinstance(value, dict | list)},
+        "Source": {key: made_with["code"][key] for key in ("version", "source_sha256")},
+        "Inputs": {"scene": manifest["scene"]["sha256"]} | manifest["inputs"],
+        "Tools": made_with["libraries"] | manifest["processor"],
+        "Files": manifest["artifacts"],
+    }
 
 
 def _format_script(value: Any) -> str:

@@ -14,13 +14,13 @@ from catalogs.studies.ablation import Ablation, cut_coupling, load_ablation
 from catalogs.surfaces import load_surface
 from catalogs.variants import COUPLINGS, Variant
 from catalogs.vehicles import load_vehicle, vehicle_provenance
-from flows.drawing import as_svg
 from flows.making.driving import simulate_drive
+from flows.pages.static import as_svg
+from flows.pages.writer import Section, Table, write_page
 from flows.store.missing import null_missing
 from flows.store.outputs import Outputs
 from flows.store.telemetry import write_parquet
-from flows.studies.ablation_figure import ablation_figure
-from flows.studies.report import Drawing, StudyTable, write_study_page
+from flows.studies.ablation_figure import draw_ablation
 from tasks.errors import InputError
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.parameters import Vehicle
@@ -81,19 +81,20 @@ def run_ablation(
     results.write_json("ablation.json", result)
     table = {"time": time} | {f"pitch_deg_{name.replace('-', '_')}": c for name, c in curves.items()}
     write_parquet(null_missing(pa.table(table)), results.path("ablation.parquet"))
-    figure = ablation_figure(stops, time, curves, {row["variant"]: row for row in pitch})
-    drawing = as_svg(figure)
-    results.write("ablation.svg", drawing)
-    page = write_study_page(
+    figure = draw_ablation(stops, time, curves, {row["variant"]: row for row in pitch})
+    results.write("ablation.svg", as_svg(figure))
+    page = write_page(
+        "muSync: ablation",
         "What each coupling is for",
-        f"The paper's Section 4.4 with {vehicle}, {chosen} mode: one coupling is cut at a time. The reference is"
-        " an independent simulator's pitch, where traces were given.",
         [
-            StudyTable(title="Pitch against the reference", rows=[reference]),
-            StudyTable(title=f"Pitch, {study.pitch.name}", rows=pitch),
+            Section(title="Stopping distance and pitch", parts=[figure]),
+            Section(title="Pitch", parts=[
+                Table(title="Against the reference", rows=[reference]), Table(title=study.pitch.name, rows=pitch),
+            ]),
         ],
-        [Drawing(caption="Stopping distance and pitch, coupling by coupling", svg=drawing)],
-    )
+        lead=[f"The paper's Section 4.4 with {vehicle}, {chosen} mode: one coupling is cut at a time. The reference is"
+        " an independent simulator's pitch, where traces were given."],
+    )  # fmt: skip
     results.write("ablation.html", page)
     return result
 

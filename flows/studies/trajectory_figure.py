@@ -4,10 +4,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from flows.drawing import escape_formulas
+from flows.pages.figures import Figure, Line, Panel, Style
 from tasks.vehicle.rollout import Rollout
 
 Curves = dict[str, NDArray[np.float64]]
@@ -15,13 +14,13 @@ Curves = dict[str, NDArray[np.float64]]
 QUANTITIES = {
     "speed": "speed [m/s]",
     "pitch": "pitch, nose down [deg]",
-    "slip": "mean braking slip [1]",
+    "slip": "mean braking slip",
     "load": "load of a front wheel [N]",
 }
 """The four quantities of the paper's figure, with their labels."""
 POINTS = 800
 """Points of a curve that a figure of this size can show."""
-COLOURS = ("#1f6fb2", "#b8860b")
+STYLES = (Style("a"), Style("b"))
 
 
 def draw_trajectories(
@@ -39,31 +38,34 @@ def draw_trajectories(
     rides : of the models, by what they are called
     window : time that is scored [s]
     """
-    figure = Figure(figsize=(10, 5.4), layout="constrained")
-    figure.suptitle(f"{escape_formulas(case)}: shaded is what is scored", fontsize=10, x=0.01, ha="left")
-    axes = figure.subplots(4, 2, sharex=True, height_ratios=(2, 1, 2, 1))
     thin = slice(None, None, max(len(reference["time"]) // POINTS, 1))
     time = reference["time"][thin]
     truth = {name: values[thin] for name, values in _read_reference(reference).items()}
-    for place, (name, label) in enumerate(QUANTITIES.items()):
-        row, column = divmod(place, 2)
-        above, below = axes[2 * row][column], axes[2 * row + 1][column]
-        above.plot(time, truth[name], color="#222222", ls=(0, (4, 2)), lw=1.2, label="reference")
-        for colour, (told, ride) in zip(COLOURS, rides.items(), strict=False):
-            model = np.interp(time, ride.columns["t_ns"] * 1e-9, _read_ride(ride)[name], right=np.nan)
-            above.plot(time, model, color=colour, lw=1.2, label=told)
-            below.plot(time, model - truth[name], color=colour, lw=1.0)
-        above.set_ylabel(label, fontsize=8)
-        below.set_ylabel("difference", fontsize=8)
-        below.axhline(0.0, color="#bbbbbb", lw=0.6, zorder=0)
-        for axis in (above, below):
-            axis.axvspan(*window, color="#1f6fb2", alpha=0.06, lw=0)
-            axis.tick_params(labelsize=8)
-            axis.spines[["top", "right"]].set_visible(False)
-    axes[0][0].legend(fontsize=7, frameon=False)
-    for axis in axes[-1]:
-        axis.set_xlabel("time [s]", fontsize=8)
-    return figure
+    models = {
+        told: {
+            name: np.interp(time, ride.columns["t_ns"] * 1e-9, values, right=np.nan)
+            for name, values in _read_ride(ride).items()
+        }
+        for told, ride in rides.items()
+    }
+    above, below = [], []
+    for name, label in QUANTITIES.items():
+        curves = [
+            (told, model[name], style) for style, (told, model) in zip(STYLES, models.items(), strict=False)
+        ]
+        shown = [Line(name=told, x=time, y=y, style=style) for told, y, style in curves]
+        left = [Line(name=told, x=time, y=y - truth[name], style=style) for told, y, style in curves]
+        reference_line = Line(name="reference", x=time, y=truth[name], style=Style("ink", "dashed"))
+        above.append(Panel(y=label, lines=[reference_line, *shown], shaded=[window]))
+        below.append(Panel(y="difference", lines=left, shaded=[window]))
+    pairs = [[*above[k : k + 2], *below[k : k + 2]] for k in (0, 2)]
+    return Figure(
+        caption=f"{case}: reference, models, and what is left of each; shaded is what is scored",
+        panels=[panel for pair in pairs for panel in pair],
+        columns=2,
+        linked=True,
+        panel_px=190,
+    )
 
 
 def _read_reference(trace: Mapping[str, NDArray[Any]]) -> Curves:

@@ -12,9 +12,10 @@ from catalogs.studies import load_sensitivity_study
 from catalogs.studies.agreement import find_printed_name, put_beside_print
 from catalogs.surfaces import load_surface
 from catalogs.vehicles import load_vehicle, vehicle_provenance
-from flows.drawing import as_svg
+from flows.pages.figures import Figure
+from flows.pages.static import as_svg
+from flows.pages.writer import Section, Table, write_page
 from flows.store.outputs import Outputs
-from flows.studies.report import Drawing, StudyTable, write_study_page
 from flows.studies.sensitivity_figure import draw_sensitivity
 from flows.studies.trajectory_figure import draw_trajectories
 from tasks.errors import InputError
@@ -46,18 +47,18 @@ def run_sensitivity(*, out: str | None = None) -> dict[str, Any]:
     result = sensitivity_study(vehicle, surface, protocol)
     result |= {"cpu_s": time.process_time() - started, "beside_print": beside_print(result, printed)}
     results.write_json("sensitivity.json", result)
-    drawing = as_svg(draw_sensitivity(result["curves"], result["beside_print"]))
-    results.write("sensitivity.svg", drawing)
-    page = write_study_page(
+    figure = draw_sensitivity(result["curves"], result["beside_print"])
+    results.write("sensitivity.svg", as_svg(figure))
+    page = write_page(
+        "muSync: sensitivity",
         "Sensitivity to the surface parameters",
-        "The paper's Appendix E: the numbers of the surface mapping are drawn within their bounds, and every draw is"
-        " driven to the stop. Printed figures agree if they are met to their last digit.",
-        [StudyTable(title="Beside the printed figures", rows=result["beside_print"])],
         [
-            Drawing(
-                caption="Friction and stopping distance over the rate, 5th to 95th percentile; crosses: printed.",
-                svg=drawing,
-            )
+            Section(title="Bands", parts=[figure]),
+            Section(title="Beside the printed figures", parts=[Table(rows=result["beside_print"])]),
+        ],
+        lead=[
+            "The paper's Appendix E: the numbers of the surface mapping are drawn within their bounds, and every draw"
+            " is driven to the stop. Printed figures agree if they are met to their last digit."
         ],
     )
     results.write("sensitivity.html", page)
@@ -88,17 +89,14 @@ def measure_agreement(
     chosen: Mode = mode or (provenance.mode if provenance else "paper")
     result = {"vehicle": vehicle, "mode": chosen} | agreement_of(model, reference, chosen)
     results.write_json("agreement.json", result)
-    drawings = []
+    figures = []
     for (case, columns), row in zip(reference, result["cases"] if out else (), strict=False):
         rides = {f"{vehicle}, {chosen} mode": simulate_case(model, case, columns, chosen)}
         if (vehicle, chosen) != PAPER:
             rides[", ".join(PAPER) + " mode"] = simulate_case(load_vehicle(PAPER[0]), case, columns, "paper")
-        drawing = as_svg(draw_trajectories(case.case, columns, rides, row["window"]))
-        results.write(f"{case.case}.svg", drawing)
-        drawings.append(
-            Drawing(caption=f"{case.case}: reference, models, and what is left of each", svg=drawing)
-        )
-    results.write("agreement.html", _write_agreement_page(result, drawings))
+        figures.append(draw_trajectories(case.case, columns, rides, row["window"]))
+        results.write(f"{case.case}.svg", as_svg(figures[-1]))
+    results.write("agreement.html", _write_agreement_page(result, figures))
     return result
 
 
@@ -154,30 +152,29 @@ def agreement_of(model: Vehicle, reference: list[tuple[ReferenceCase, Traces]], 
     }
 
 
-def _write_agreement_page(result: Mapping[str, Any], drawings: Sequence[Drawing]) -> str:
+def _write_agreement_page(result: Mapping[str, Any], figures: Sequence[Figure]) -> str:
     groups = [
         {"split": group["split"], "by": group["by"], "group": group["name"], "cases": group["cases"]}
         | group["mean"]
         | {f"largest {name}": value for name, value in group["maximum"].items()}
         for group in result["groups"]
     ]
-    return write_study_page(
+    cases = [row | {"window": "{:.2f} to {:.2f} s".format(*row["window"])} for row in result["cases"]]
+    return write_page(
+        "muSync: agreement",
         "Agreement with reference traces",
-        f"Vehicle {result['vehicle']}, {result['mode']} mode, by the paper's Appendix A.2: on the reference's own time"
-        " stamps, with the static pitch, without shift or fit. The paper's reference is CarSim; another one answers the"
-        " same question of other data, so figures beside each other are no ranking.",
         [
-            StudyTable(title="Beside the paper's figures", rows=result["beside_print"]),
-            StudyTable(title="Groups: mean and largest", rows=groups),
-            StudyTable(
-                title="Cases",
-                rows=[
-                    row | {"window": "{:.2f} to {:.2f} s".format(*row["window"])} for row in result["cases"]
-                ],
-            ),
+            Section(title="Figures of agreement", parts=[
+                Table(title="Beside the paper's figures", rows=result["beside_print"]),
+                Table(title="Groups: mean and largest", rows=groups),
+                Table(title="Cases", rows=cases),
+            ]),
+            Section(title="Trajectories", parts=figures),
         ],
-        drawings,
-    )
+        lead=[f"Vehicle {result['vehicle']}, {result['mode']} mode, by the paper's Appendix A.2: on the reference's own"
+        " time stamps, with the static pitch, without shift or fit. The paper's reference is CarSim; another one"
+        " answers the same question of other data, so figures beside each other are no ranking."],
+    )  # fmt: skip
 
 
 def simulate_case(model: Vehicle, case: ReferenceCase, columns: Traces, mode: Mode) -> Rollout:

@@ -22,7 +22,6 @@ from flows.exporting.export import export_dataset
 from flows.making.generate import generate_dataset
 from flows.measured import closing
 from flows.measured.importing import import_measurements
-from flows.measured.searches import judge_campaign
 from flows.reading.report import make_report
 from flows.scheduled.retention import remove_oldest
 from flows.scheduled.run_record import FORMAT, record_name
@@ -31,6 +30,7 @@ from flows.store.sealed import read_manifest
 from studies.crashes.kills import files_of
 from studies.store_faults.clips import cheap_clips, write_grid
 from studies.store_faults.disk import KILLED, FaultyDisk, Killed
+from tasks.identification.decision.verdict import judge_runs
 
 MAP = """\
 campaign: killed
@@ -122,7 +122,7 @@ def close_campaign(place: Path) -> object:
     The ledger is left out: a call that is killed while it writes results counts as a reading, because they may be read.
     """
     with (
-        mock.patch.object(closing, "judge_campaign", _judge_once),
+        mock.patch.object(closing, "judge_runs", _judge_once),
         mock.patch.object(closing, "count_readings", lambda *_: 0),
         mock.patch.object(closing, "record_reading", lambda *_: 0),
     ):
@@ -131,7 +131,7 @@ def close_campaign(place: Path) -> object:
 
 def _judge_once(*asked: Any) -> Any:
     if not _OUTCOMES:
-        _OUTCOMES.append(judge_campaign(*asked))
+        _OUTCOMES.append(judge_runs(*asked))
     return _OUTCOMES[0]
 
 

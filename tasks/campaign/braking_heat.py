@@ -8,12 +8,13 @@ from numpy.typing import NDArray
 
 from tasks.campaign.campaign import Campaign
 from tasks.campaign.channels import BRAKE_SIGNALS, GRAVITY
-from tasks.campaign.held_inputs import take_samples
 from tasks.campaign.segments import find_brake_rule
 from tasks.campaign.signals import ChannelRule, Signal, average_sources
-from tasks.campaign.torque_validation import RELEASED_PRESSURE
+from tasks.campaign.slow_channels import take_samples
 from tasks.vehicle.effects.brake_line import DISC_CAPACITY_F, DISC_CAPACITY_R, DISC_COOLING
 
+RELEASED_PRESSURE = 0.1
+"""Brake pressure, or what stands for it, up to which the brake is released [MPa]: it gives 0.2 m/s^2."""
 APPLIED = 0.05
 """Share of the range of a brake signal, above its rest, from which the brake is applied [1]."""
 RESTING = 0.05

@@ -14,6 +14,8 @@ CHANNELS = (
 CHANNEL_UNITS = ("m/s", "m/s^2", "rad/s", "rad/s", "deg", "deg/s", "m/s^2")
 SESSION = ("pressure_gain", "mass", "pitch_gain", "wheel_radius", "damping", "stiffness", "slope")
 """Session nuisances, by the name of the parameter that carries them."""
+FILE_NUMBERS = (*SESSION, "friction")
+"""Numbers of the vehicle file that every fit moves: those of the session, and the grip that all runs share."""
 
 
 LEAST_SAMPLES = 20
@@ -51,6 +53,7 @@ class Tolerances:
     friction : relative [1]
     acceleration_bias : [m/s^2]
     pitch_offset : [deg]
+    grip : relative, of the grip that all runs share; no file is off there unless an effect says so [1]
     """
 
     session: tuple[float, ...]
@@ -58,6 +61,12 @@ class Tolerances:
     friction: float
     acceleration_bias: float
     pitch_offset: float
+    grip: float = 1e-6
+
+    @property
+    def file_numbers(self) -> tuple[float, ...]:
+        """Return one sigma of each of `FILE_NUMBERS` [1]."""
+        return (*self.session, self.grip)
 
     def with_session(self, known: Mapping[str, float]) -> "Tolerances":
         """Return the tolerances with some of the session's replaced.
@@ -94,6 +103,7 @@ class Run:
     braking_heat : of the discs at the start, by the drive before it, per mass of the car [J/kg]
     felt_slope : of the road by what the accelerometer reads, uphill positive; counts where none was measured [rad]
     sampled : bool [N, 7] instants at which each channel has a sample; None where all have one at every instant
+    speed_before : float64 [M] speed at the same rate before the first sample, which is no part of the run [m/s]
     """
 
     name: str
@@ -116,6 +126,7 @@ class Run:
     braking_heat: float = 0.0
     felt_slope: float = 0.0
     sampled: NDArray[np.bool_] | None = None
+    speed_before: NDArray[np.float64] | None = None
 
     @property
     def speed(self) -> NDArray[np.float64]:
@@ -162,20 +173,22 @@ class Run:
             self if self.throttle is None else replace(self, throttle=np.maximum(self.throttle - rest, 0.0))
         )
 
-    def begin_at(self, first: int) -> "Run":
+    def begin_at(self, first: int, end: int | None = None) -> "Run":
         """Return a run on a flat road from a sample on.
 
         Parameters
         ----------
         first : sample that becomes the first
+        end : sample behind the last; None for that of the run
         """
         drive, slope, throttle = (
-            None if trace is None else trace[first:]
+            None if trace is None else trace[first:end]
             for trace in (self.drive_torque, self.road_slope, self.throttle)
         )
+        sampled = None if self.sampled is None else self.sampled[first:end]
         return replace(
-            self, pressure=self.pressure[first:], response=self.response[first:], drive_torque=drive, road_slope=slope,
-            throttle=throttle, sampled=None if self.sampled is None else self.sampled[first:],
+            self, pressure=self.pressure[first:end], response=self.response[first:end], drive_torque=drive,
+            road_slope=slope, throttle=throttle, sampled=sampled,
         )  # fmt: skip
 
     def group_channels(self) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:

@@ -45,76 +45,55 @@ ALIASES = {
 """Spellings of the units that this project knows, as files have them."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class MeasuredChannel:
     """One column of a campaign's runs.
 
     Parameters
     ----------
     name, unit : as in the run's file
-    limit : magnitude that no road car exceeds [the channel's unit]
-    lowest : value that no road car goes below, with room for noise and offset of a sensor [the channel's unit]
-    moves : in a moving car the sensor never holds one value for long
     description : for people
     """
 
     name: str
     unit: str
-    limit: float
-    lowest: float
-    moves: bool
     description: str
 
 
-def _make_channel(
-    name: str, unit: str, limit: float, description: str, moves: bool = True, lowest: float | None = None
-) -> MeasuredChannel:
-    lowest = -limit if lowest is None else lowest
-    return MeasuredChannel(
-        name=name, unit=unit, limit=limit, lowest=lowest, moves=moves, description=description
-    )
-
-
 MAIN_CHANNELS = (
-    _make_channel(
-        "brake_pressure", "MPa", 25.0, "brake pressure at the caliper line", moves=False, lowest=-0.5
-    ),
-    _make_channel("speed", "m/s", 90.0, "speed over ground", lowest=-15.0),
-    _make_channel("longitudinal_acceleration", "m/s^2", 20.0, "accelerometer, forward positive"),
-    _make_channel("wheel_speed_front", "rad/s", 400.0, "mean of the front wheels"),
-    _make_channel("wheel_speed_rear", "rad/s", 400.0, "mean of the rear wheels"),
-    _make_channel("pitch", "deg", 25.0, "nose-down positive"),
-    _make_channel("pitch_rate", "deg/s", 150.0, "nose-down positive"),
-    _make_channel("vertical_acceleration", "m/s^2", 60.0, "of the body, up positive, without gravity"),
+    MeasuredChannel("brake_pressure", "MPa", "brake pressure at the caliper line"),
+    MeasuredChannel("speed", "m/s", "speed over ground"),
+    MeasuredChannel("longitudinal_acceleration", "m/s^2", "accelerometer, forward positive"),
+    MeasuredChannel("wheel_speed_front", "rad/s", "mean of the front wheels"),
+    MeasuredChannel("wheel_speed_rear", "rad/s", "mean of the rear wheels"),
+    MeasuredChannel("pitch", "deg", "nose-down positive"),
+    MeasuredChannel("pitch_rate", "deg/s", "nose-down positive"),
+    MeasuredChannel("vertical_acceleration", "m/s^2", "of the body, up positive, without gravity"),
 )
 """Channels that closing the loop compares; a map must give the source of each or state that it was not measured."""
 
 SIDE_CHANNELS = (
-    _make_channel("steering_angle", "deg", 900.0, "at the steering wheel, left positive", moves=False),
-    _make_channel("yaw_rate", "deg/s", 150.0, "left positive", moves=False),
-    _make_channel("roll_rate", "deg/s", 150.0, "right side down positive", moves=False),
-    _make_channel("lateral_acceleration", "m/s^2", 20.0, "left positive", moves=False),
-    _make_channel("brake_torque", "N m", 40000.0, "all wheels together, braking positive", moves=False),
-    _make_channel(
-        "brake_command",
-        "1",
-        1.2,
-        "share of the full brake: pedal travel or a controller's command",
-        moves=False,
-        lowest=-0.2,
-    ),
-    _make_channel("pedal_force", "N", 3000.0, "of the foot on the brake pedal", moves=False, lowest=-100.0),
-    _make_channel("engine_torque", "N m", 40000.0, "at the wheels, driving positive", moves=False),
-    _make_channel("road_slope", "deg", 30.0, "of the road, uphill positive", moves=False),
-    _make_channel("throttle", "1", 1.2, "share of the full throttle", moves=False, lowest=-0.2),
+    MeasuredChannel("steering_angle", "deg", "at the steering wheel, left positive"),
+    MeasuredChannel("yaw_rate", "deg/s", "left positive"),
+    MeasuredChannel("roll_rate", "deg/s", "right side down positive"),
+    MeasuredChannel("lateral_acceleration", "m/s^2", "left positive"),
+    MeasuredChannel("brake_torque", "N m", "all wheels together, braking positive"),
+    MeasuredChannel("brake_command", "1", "share of the full brake: pedal travel or a controller's command"),
+    MeasuredChannel("pedal_force", "N", "of the foot on the brake pedal"),
+    MeasuredChannel("engine_torque", "N m", "at the wheels, driving positive"),
+    MeasuredChannel("road_slope", "deg", "of the road, uphill positive"),
+    MeasuredChannel("throttle", "1", "share of the full throttle"),
 )
 """Channels that selection rules, residual plots and the closing of the loop use where they were measured."""
 
+WHEELS = ("wheel_speed_front", "wheel_speed_rear")
 BRAKE_SIGNALS = {"brake_pressure": 1.0, "brake_command": 10.0, "brake_torque": 0.001, "pedal_force": 0.02}
 """Signals that say how hard the driver brakes, the best first, and the pressure that a unit of each stands for [MPa].
 
 Only for a pressure is this a measurement; for the others the brake's gain is unknown, and a fit finds it."""
 CHANNELS_BY_NAME = {channel.name: channel for channel in (*MAIN_CHANNELS, *SIDE_CHANNELS)}
+COLUMN_UNITS = {"time": "s", **{name: channel.unit for name, channel in CHANNELS_BY_NAME.items()}}
+"""Units of the columns of a run's file."""
 
 
 def unit_factor(unit: str, target: str) -> float:
@@ -136,13 +115,29 @@ def unit_factor(unit: str, target: str) -> float:
     return size / wanted_size
 
 
-def guess_unit(taken: str, ratio: float) -> str | None:
+def describe_wheel_gain(channel: str, unit: str) -> str:
+    """Return the end of a sentence with the gain of a wheel that is logged as a speed of the car; empty for others.
+
+    Parameters
+    ----------
+    channel : name
+    unit : of the logged signal
+    """
+    dimension, size = UNITS.get(unit, ("", 0.0))
+    if channel not in WHEELS or dimension != "speed":
+        return ""
+    over = "1/(3.6 x radius)" if unit == "km/h" else f"{size:.3g}/radius"
+    return f", here of the value {over}, the tyre's rolling radius in m, and the unit rad/s"
+
+
+def guess_unit(taken: str, ratio: float, within: float = 1.25) -> str | None:
     """Return the likely unit of values that are ``ratio`` times too large in the assumed unit; None if none fits.
 
     Parameters
     ----------
     taken : the assumed unit
     ratio : size found over size expected [1]
+    within : ratio to the expected size up to which a unit fits [1]
     """
     dimension, size = UNITS[taken]
     apart = {
@@ -151,4 +146,4 @@ def guess_unit(taken: str, ratio: float) -> str | None:
         if kind == dimension and unit != taken
     }
     near = min(apart, key=apart.__getitem__, default=None)
-    return near if near is not None and apart[near] < log(1.25) else None
+    return near if near is not None and apart[near] < log(within) else None

@@ -1,106 +1,102 @@
-"""Clocks of recordings: those that begin again, and those in another unit than the map says."""
-
-from collections.abc import Sequence
+"""Clocks of loggers in seconds, also of the digits of a time of day: 73059.95 is 7:30:59.95; falls of a speed."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.channels import UNITS
-from tasks.campaign.signals import Signal
+from tasks.campaign.channels import unit_factor
 
-RESTART = 1.0
-"""Step back from which a clock has begun again, and does not merely stumble [s]."""
-LEAST_FALL = 5.0
-"""Of a speed from which its rate tells of its unit, and of the clock's [m/s]."""
-RARE = 50
-"""Samples of which one must belong to such a fall [1]."""
-LIKE_UNITS_OF_SPEED = 4.0
-"""Ratio of rates that two units of speed explain at most; more is a clock's [1]."""
-SLOWEST_FALL = 0.02
-"""Rate of a speed that falls so far: a fifth of what the rolling resistance of a car gives [m/s^2]."""
-USUAL_FALL, LIKE = 4.0, 8.0
-"""Deceleration of a stop [m/s^2], and the ratio to it within which a unit of time is likely [1]."""
+TIME_OF_DAY = "HHMMSS"
+"""Unit of such a clock in a channel map."""
+DAY = 86400.0
+"""Length of a day [s]."""
 
 
-def describe_restarts(time: NDArray[np.float64], table_row: int | None = None) -> str:
-    """Return the problem of a clock that begins again, so that its times stand for several stretches; empty without.
+def convert_to_seconds(stamps: NDArray[np.float64], unit: str) -> NDArray[np.float64]:
+    """Return the times of a logger in seconds, float64 [N] [s].
+
+    Parameters
+    ----------
+    stamps : float64 [N] [``unit``]
+    unit : of time, or `TIME_OF_DAY`; days, as of a spreadsheet or MATLAB's datenum, count from the first one's midnight
+    """
+    if unit == "d":
+        told = stamps[np.isfinite(stamps)]
+        return (stamps - np.floor(told[0] if told.size else 0.0)) * DAY
+    return read_time_of_day(stamps) if unit == TIME_OF_DAY else stamps * unit_factor(unit, "s")
+
+
+def read_time_of_day(stamps: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the time since the midnight before the first stamp, float64 [N] [s].
+
+    Parameters
+    ----------
+    stamps : float64 [N] digits of hours, minutes and seconds [1]; NaN where a row holds no time
+    """
+    hours, minutes = np.floor(stamps / 1e4), np.floor(stamps / 1e2) % 100.0
+    return pass_midnight(np.asarray(3600.0 * hours + 60.0 * minutes + stamps % 100.0))
+
+
+def pass_midnight(time: NDArray[np.float64], period: float = DAY) -> NDArray[np.float64]:
+    """Return times of a clock that begins again after each period, as they go on, float64 [N] [s].
 
     Parameters
     ----------
     time : float64 [N]; NaN where a row holds no time [s]
-    table_row : number of the first row below the names; None where samples are counted
+    period : [s]
     """
-    told = np.flatnonzero(np.isfinite(time))
-    back = np.flatnonzero(np.diff(time[told]) < -RESTART)
-    if not back.size:
-        return ""
-    kind, first = ("sample", 1) if table_row is None else ("row", table_row)
-    numbers = [str(told[k + 1] + first) for k in back]
-    shown = ", ".join(numbers[:5]) + (f" and {len(numbers) - 5} more" if len(numbers) > 5 else "")
-    return (
-        f"begins again at {kind}{'s' if len(numbers) > 1 else ''} {shown}{' below the names' if table_row else ''},"
-        f" first from {time[told[back[0]]]:.3f} to {time[told[back[0] + 1]]:.3f} s: the same times stand for several"
-        f" stretches, so cut the file before {'that' if len(numbers) == 1 else 'each such'} {kind}"
-        " into files of their own"
-    )
+    passed = time.copy()
+    told = np.isfinite(time)
+    passed[told] += period * np.cumsum(np.diff(time[told], prepend=time[told][:1]) < -0.5 * period)
+    return passed
 
 
-def measure_fall(time: NDArray[np.float64], speed: NDArray[np.float64]) -> float | None:
-    """Return how fast the speed falls in its falls, over `LEAST_FALL` each [m/s^2]; None where there are none.
+def has_digits_of_day(stamps: NDArray[np.float64]) -> bool:
+    """Return whether all stamps can be times of day: no minute and no second reaches 60, no hour 24.
 
-    A lost sample, or a few, makes no fall: one samples in `RARE` falls so far in the least number of steps that is
+    Parameters
+    ----------
+    stamps : float64 [N] [1]
+    """
+    told = stamps[np.isfinite(stamps)]
+    below = (told >= 0.0) & (told < 24e4) & (told % 1e4 < 6e3) & (told % 1e2 < 60.0)
+    return bool(below.all())
+
+
+def looks_like_time_of_day(time: NDArray[np.float64]) -> bool:
+    """Return whether a clock that is taken for seconds jumps by 40 at a minute, and goes on as usual there.
+
+    Parameters
+    ----------
+    time : float64 [N], N at least 2, ascending [s]
+    """
+    crossings = np.diff(np.floor(time / 1e2)) != 0.0
+    if not crossings.any() or not has_digits_of_day(time):
+        return False
+    steps = np.diff(read_time_of_day(time))
+    return bool(np.any(steps[crossings] < 2.0 * np.median(steps)))
+
+
+def measure_fall(
+    time: NDArray[np.float64], speed: NDArray[np.float64], *, least_fall: float, rare: float
+) -> float | None:
+    """Return how fast the speed falls in its far falls [m/s^2]; None where there are none.
+
+    A lost sample, or a few, makes no fall: a share of the samples falls so far in the least number of steps that is
     looked at.
 
     Parameters
     ----------
     time : float64 [N] ascending [s]
     speed : float64 [N] [m/s]
+    least_fall : of the speed from which its rate tells of its unit, and of the clock's [m/s]
+    rare : share of the samples that must belong to such a fall [1]
     """
     step = 1
     while step < len(speed):
         fallen = speed[:-step] - speed[step:]
-        far = fallen > LEAST_FALL
-        if np.count_nonzero(far) * RARE > len(speed):
+        far = fallen > least_fall
+        if np.count_nonzero(far) > rare * len(speed):
             rates = fallen[far] / np.maximum(time[step:] - time[:-step], 1e-12)[far]
             return float(np.median(rates))
         step *= 2
     return None
-
-
-def describe_clock_scale(
-    signals: Sequence[Signal], speed: Signal | None, taken: str, *, deceleration: float, shortest: float
-) -> str:
-    """Return the problem of a clock in another unit than it is taken to be in; empty where none is seen.
-
-    Parameters
-    ----------
-    signals : of a recording
-    speed : of the car [m/s]; None where it was not measured
-    taken : unit of the clock in the map
-    deceleration : that no road car exceeds [m/s^2]
-    shortest : time between samples of a recording [s]
-    """
-    steps = [float(np.median(np.diff(signal.time))) for signal in signals if len(signal.time) > 1]
-    step = min((step for step in steps if step > 0.0), default=0.0)
-    fall = None if speed is None else measure_fall(speed.time, speed.values)
-    fast = fall is not None and fall > LIKE_UNITS_OF_SPEED * deceleration
-    slow = fall is not None and fall < SLOWEST_FALL
-    if not step or not (step < shortest or fast or slow):
-        return ""
-    fits = {
-        unit: abs(np.log(fall * UNITS[taken][1] / factor / USUAL_FALL))
-        for unit, (kind, factor) in UNITS.items()
-        if fall is not None and kind == "time" and unit != taken
-    }
-    near = min(fits, key=fits.__getitem__, default="")
-    hint = f", it looks like {near}" if near and fits[near] < np.log(LIKE) else ""
-    falls = f" and the speed falls by {fall:.2g} m/s^2" if fast or slow else ""
-    return (
-        f"samples come every {_write_time(step)}{falls}: the clock is not in {taken}{hint}: correct the unit of time in"
-        " the map"
-    )
-
-
-def _write_time(seconds: float) -> str:
-    """Return a time with a unit that makes it easy to read."""
-    return f"{seconds:.3g} s" if seconds >= 0.1 else f"{1e3 * seconds:.3g} ms"

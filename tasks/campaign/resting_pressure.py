@@ -1,17 +1,20 @@
-"""The brake signal at rest: a gauge that reads more than 0 while nobody brakes, or a command that idles above 0.
+"""Brake signal and throttle at rest: a gauge that reads more than 0 while nobody brakes, a command that idles above 0.
 
 The model would brake with that pressure, and a fit would find a brake that does nothing below it. A run that seems to
 brake from its first sample on does not tell what drove it before.
+
+Throttle plates and pedals of many cars idle at 0.1 to 0.2 while the driver's foot is on the brake. Taken as logged, the
+engine would drive the car through every stop, and a fit would find an engine that holds it back.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.brake_validation import MOVING
-from tasks.campaign.channel_validation import smooth_channel
+from tasks.campaign.campaign import MASKED_SPEED, Run
 from tasks.campaign.gauge import RESTING_PRESSURE
+from tasks.campaign.measured import smooth_channel
 
 RELEASED = 0.1
 """Share of the run's range of pressure, from its lowest, within which the brake is taken to be released [1]."""
@@ -27,6 +30,17 @@ DRIFT = 0.04
 """Pressure at rest from which a gauge that drifts is told [MPa]: the model brakes by 0.1 m/s^2; gauges resolve 0.03."""
 FEWEST_RUNS = 2
 """Runs that rest at one level from which it is the gauge's and not the driver's [1]."""
+BRAKED = 0.5
+"""Share of a run's range of pressure, from its lowest, above which its brake is applied [1]."""
+LEAST_RANGE = 0.1
+"""Range of pressure from which a run brakes at all [MPa]."""
+LEAST_THROTTLE, MOST_THROTTLE = 0.02, 0.3
+"""Throttle from which and up to which it may rest: sensors are off by less, a foot on both pedals reads more [1]."""
+HIGHEST_REST = (
+    "channel brake_pressure rests at {level:.3f} ({low}) to {value:.3f} MPa ({high}) while the car does not brake: the"
+    " model brakes with it; set the gauge to zero before every run"
+)
+"""As of the check ``highest_rest``, for a verdict."""
 
 
 def measure_resting_levels(
@@ -60,25 +74,16 @@ def find_brake_rest(levels: Mapping[str, float]) -> float:
 
 
 def describe_rest(levels: Mapping[str, float]) -> str | None:
-    """Return a warning of a gauge that rests above 0; None if it does not.
+    """Return the sentence of a gauge that rests above 0 in some run; None if it does not.
 
     Parameters
     ----------
     levels : pressure at rest by run [MPa]
     """
-    if zero := find_brake_rest(levels):
-        return (
-            f"channel brake_pressure rests at {zero:.3f} MPa while the car does not brake, in {len(levels)} runs alike:"
-            f" close-loop takes that for the gauge's zero; lower its offset by {zero:.3f} (offset: {-zero:.3f} where"
-            " the map gives none)"
-        )
     if not levels or max(levels.values()) < DRIFT:
         return None
     low, high = min(levels, key=lambda run: levels[run]), max(levels, key=lambda run: levels[run])
-    return (
-        f"channel brake_pressure rests at {levels[low]:.3f} ({low}) to {levels[high]:.3f} MPa ({high}) while the car"
-        " does not brake: the model brakes with it; set the gauge to zero before every run"
-    )
+    return HIGHEST_REST.format(value=levels[high], level=levels[low], low=low, high=high)
 
 
 def _measure_level(columns: Mapping[str, NDArray[np.float64]], interval: float) -> float | None:
@@ -87,7 +92,7 @@ def _measure_level(columns: Mapping[str, NDArray[np.float64]], interval: float) 
         return None
     pressure = smooth_channel(columns["brake_pressure"], interval)
     speed = smooth_channel(columns["speed"], interval)
-    moving = np.flatnonzero(speed > MOVING)
+    moving = np.flatnonzero(speed > MASKED_SPEED)
     if not moving.size:
         return None
     lowest, highest = float(np.quantile(pressure[moving], LOWEST)), float(np.max(pressure[moving]))
@@ -100,3 +105,19 @@ def _measure_level(columns: Mapping[str, NDArray[np.float64]], interval: float) 
         return None
     slower = float(speed[before[0]] - speed[before[-1]]) / (len(before) * interval)
     return float(level) if slower < ROLLING else None
+
+
+def find_throttle_rest(runs: Sequence[Run]) -> float:
+    """Return what the throttle reads while the brake is applied, the median over runs; 0 if it does not rest [1].
+
+    Parameters
+    ----------
+    runs : that may be looked at
+    """
+    read = []
+    for run in runs:
+        lowest, span = float(np.min(run.pressure)), float(np.ptp(run.pressure))
+        if run.throttle is not None and span > LEAST_RANGE:
+            read.append(float(np.median(run.throttle[run.pressure > lowest + BRAKED * span])))
+    rest = float(np.median(read)) if read else 0.0
+    return rest if LEAST_THROTTLE < rest <= MOST_THROTTLE else 0.0

@@ -5,12 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tasks.campaign.brake_validation import MOVING
-from tasks.campaign.channel_validation import find_clock_problems
+from tasks.campaign.campaign import MASKED_SPEED
 from tasks.campaign.channels import BRAKE_SIGNALS
-from tasks.campaign.episodes import Episode, find_pressure_episodes
-from tasks.campaign.held_inputs import take_samples
+from tasks.campaign.checks import CheckTable, apply_checks
+from tasks.campaign.events import Episode, find_pressure_episodes
+from tasks.campaign.measured import LoggedSignal
 from tasks.campaign.signals import ChannelRule, Signal, average_sources, convert_to_channel
+from tasks.campaign.slow_channels import take_samples
 
 IDLING = 0.1
 """Share of the range of a brake signal, from its lowest, in which it is for a quarter of a drive if it idles [1]."""
@@ -62,7 +63,11 @@ def find_brake_rule(rules: Sequence[ChannelRule]) -> ChannelRule | None:
 
 
 def cut_segments(
-    signals: Mapping[str, Signal], rules: Sequence[ChannelRule], brake: ChannelRule, cut: SegmentRule
+    signals: Mapping[str, Signal],
+    rules: Sequence[ChannelRule],
+    brake: ChannelRule,
+    cut: SegmentRule,
+    table: CheckTable,
 ) -> list[Segment]:
     """Return the segments of one recording, none of which begins before the end of the one before it.
 
@@ -72,6 +77,7 @@ def cut_segments(
     rules : the channel map
     brake : of the signal at which the drive is cut
     cut : how
+    table : of checks
     """
     applied = average_sources(signals, brake)
     if not len(applied.time):
@@ -80,8 +86,8 @@ def cut_segments(
     lowest, low, highest = np.nanquantile(pressure, (0.0, 0.25, 1.0))
     if lowest >= cut.threshold and low <= lowest + IDLING * (highest - lowest):
         fault = (
-            f"channel {brake.channel} never falls below {lowest:.3g} MPa, or what stands for it: above_mpa must be"
-            f" more than it idles at; it is {cut.threshold:g}"
+            f"channel {brake.channel} never falls below {brake.tell_pressure(lowest)}: above_mpa must be more than it"
+            f" idles at; it is {brake.tell_pressure(cut.threshold)}"
         )
         return [Segment(start=float(applied.time[0]), end=float(applied.time[-1]), fault=fault)]
     episodes = find_pressure_episodes(
@@ -97,20 +103,25 @@ def cut_segments(
         end = min(episode.end_time + cut.after, last)
         if following is not None and end > following.onset_time:
             end = 0.5 * (episode.end_time + following.onset_time)
-        segments.append(_judge_segment(Segment(start=start, end=end), episode, speed, parts))
+        segments.append(_judge_segment(Segment(start=start, end=end), episode, speed, parts, table))
     return segments
 
 
 def _judge_segment(
-    segment: Segment, episode: Episode, speed: Signal | None, parts: Sequence[tuple[str, Signal]]
+    segment: Segment,
+    episode: Episode,
+    speed: Signal | None,
+    parts: Sequence[tuple[str, Signal]],
+    table: CheckTable,
 ) -> Segment:
     """Return a segment from where the car moves, or with its fault."""
     if speed is not None:
         lead = np.flatnonzero((speed.time >= segment.start) & (speed.time <= episode.onset_time))
-        slow = lead[speed.values[lead] < MOVING]
+        slow = lead[speed.values[lead] < MASKED_SPEED]
         if slow.size and slow[-1] == lead[-1]:
             return replace(
-                segment, fault=f"the car stands, or is slower than {MOVING:g} m/s, where the brake is applied"
+                segment,
+                fault=f"the car stands, or is slower than {MASKED_SPEED:g} m/s, where the brake is applied",
             )
         if slow.size:
             segment = replace(segment, start=float(speed.time[slow[-1] + 1]))
@@ -118,8 +129,8 @@ def _judge_segment(
         inside = signal.cut_window(segment.start, segment.end)
         if len(inside.time) < 2:
             return replace(segment, fault=f"channel {channel} has {len(inside.time)} samples in it")
-        if problems := find_clock_problems(inside):
-            return replace(segment, fault=f"channel {channel} {problems[0]}")
+        if told := apply_checks(table.times, LoggedSignal(channel=channel, logged=inside, converted=inside)):
+            return replace(segment, fault=f"channel {channel} {told[0].sentence}")
     return segment
 
 

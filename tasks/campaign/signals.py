@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.channels import CHANNELS_BY_NAME, unit_factor
+from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME, unit_factor
 
 TIME_ROUNDING = 8.0
 """Spacings of a time's floating-point number by which a logged time and the clock's may differ for one instant [1]."""
@@ -87,6 +87,13 @@ class ChannelRule:
             return self.sign * self.scale * unit_factor(self.unit, target)
         inward = unit_factor(self.unit, self.gain.source_unit)
         return self.sign * self.scale * inward * self.gain.value * unit_factor(self.gain.target_unit, target)
+
+    def tell_pressure(self, pressure: float) -> str:
+        """Return a pressure [MPa] as this signal of the brake was logged, such as 15 % (taken for 1.5 MPa)."""
+        if self.channel == "brake_pressure" and self.gain is None:
+            return f"{pressure:.3g} MPa"
+        logged = (pressure / BRAKE_SIGNALS[self.channel] - self.offset) / self.factor
+        return f"{logged:.3g}{'' if self.unit == '1' else f' {self.unit}'} (taken for {pressure:.3g} MPa)"
 
 
 def convert_to_channel(signal: Signal, rule: ChannelRule) -> Signal:

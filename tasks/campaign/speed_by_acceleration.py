@@ -1,7 +1,10 @@
 """Speed as the integral of what an accelerometer reads: scale, delay and zeros of the two, whatever drives the car.
 
 The accelerometer reads gravity along the dive of the body too, about 3 % of the deceleration, which counts as its
-scale; along a slope of the road it reads more by g times the sine, which counts as its zero in that run.
+scale; along a slope of the road it reads more by g times the sine, which counts as its zero in that run. Scale, dive
+and delay of the two are the same in all runs, and a slope is not. The median over the runs of what the accelerometer
+reads too much is its zero, and what a run reads beyond it is the slope of that run, as far as runs scatter more than a
+zero drifts.
 """
 
 from collections.abc import Sequence
@@ -9,6 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from tasks.campaign.campaign import MASKED_SPEED
+from tasks.campaign.channels import GRAVITY
+from tasks.campaign.measured import MeasuredRun
 
 FEWEST_SAMPLES = 5
 """Samples of the speed that a run needs beside its own two numbers [1]."""
@@ -102,3 +109,59 @@ def _measure_noise(missed: Sequence[NDArray[np.float64]]) -> float:
     products = np.concatenate([e[1:] * e[:-1] for e in missed])
     kept = float(np.clip(np.mean(products) / max(power, 1e-12), 0.0, LONGEST_MEMORY))
     return power * (1.0 + kept) / (1.0 - kept)
+
+
+def estimate_slopes(
+    runs: Sequence[MeasuredRun], *, drift: float, fewest_runs: float, steepest: float, shortest: float
+) -> dict[str, float]:
+    """Return the slope of the road in each run by its name, uphill positive, by what its accelerometer reads [rad].
+
+    The zeros of the runs scatter by slopes, by drift and by their errors; only the share of the slopes in that counts
+    (James and Stein 1961). No run has a slope where there are too few, or where they scatter no more than drift and
+    errors explain.
+
+    Parameters
+    ----------
+    runs : whose acceleration is measured, and not computed from the speed
+    drift : standard deviation over the runs of a session of an accelerometer's zero [m/s^2]
+    fewest_runs : of which a deviation is told [1]
+    steepest : sine beyond which no slope is believed: the accelerometer is off by something else [1]
+    shortest : time in motion that a run needs to tell its mean [s]
+    """
+    apart = measure_apart(runs, shortest)
+    if len(apart) < fewest_runs:
+        return {}
+    zeros, errors = np.array(list(apart.values())).T
+    share = 1.0 - (drift**2 + float(np.mean(errors**2))) / max(float(np.var(zeros)), drift**2)
+    if share <= 0.0:
+        return {}
+    sines = share * (zeros - np.median(zeros)) / GRAVITY
+    return dict(zip(apart, np.arcsin(np.clip(sines, -steepest, steepest)).tolist(), strict=True))
+
+
+def measure_apart(runs: Sequence[MeasuredRun], shortest: float) -> dict[str, tuple[float, float]]:
+    """Return by how much the acceleration of each run differs from the rate of speed, and how surely [m/s^2].
+
+    The road's slope is positive uphill. Runs without both channels, without motion, or with a mapped slope are left
+    out.
+
+    Parameters
+    ----------
+    runs, shortest : as of `estimate_slopes`
+    """
+    pairs = {}
+    for run in runs:
+        if {"speed", "longitudinal_acceleration"} <= run.columns.keys() and "road_slope" not in run.columns:
+            speed, felt = run.columns["speed"], run.columns["longitudinal_acceleration"]
+            slow = np.flatnonzero(speed <= MASKED_SPEED)
+            pair = pair_samples(speed, felt, run.interval)[: slow[0] if slow.size else None]
+            if len(pair) * run.interval >= shortest:
+                pairs[run.name] = pair
+    found = relate_speed_to_acceleration(list(pairs.values()))
+    if found is None:
+        return {}
+    return {
+        run: (float(zero), float(error))
+        for run, zero, error in zip(pairs, found.zeros, found.errors, strict=True)
+        if np.isfinite(zero)
+    }

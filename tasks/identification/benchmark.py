@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import betaincinv
 
-from tasks.campaign.campaign import Campaign, Run, Tolerances
+from tasks.campaign.campaign import SESSION, Campaign, Run, Tolerances
 from tasks.campaign.planned_runs import RICH, TRAINING, RunPlan, make_planned_run
 from tasks.identification.decision.answer import Verdict
-from tasks.identification.inference.evidence import SESSION_INDEX
 from tasks.identification.inference.forward import compute_instrument_readings, prepare_run, simulate_run
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.slots import Slot
@@ -62,7 +61,8 @@ def make_synthetic_campaign(
     """
     rng = np.random.Generator(np.random.Philox(seed))
     theta = build_parameter_vector(truth)
-    theta[list(SESSION_INDEX)] += rng.standard_normal(len(SESSION_INDEX)) * TOLERANCES.session
+    session = [PARAMETER_INDEX[name] for name in SESSION]
+    theta[session] += rng.standard_normal(len(session)) * TOLERANCES.session
     theta[PARAMETER_INDEX["wheel_inertia"]] += 0.05 * rng.random()
     runs = tuple(
         _measure_run(drive, i, 1 if rng.random() < 0.5 else -1, vehicle, surface, theta, slots, rng)

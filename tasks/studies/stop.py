@@ -7,8 +7,7 @@ from math import nan
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.episodes import find_pressure_episodes
-from tasks.campaign.events import RecordedRun
+from tasks.campaign.events import RecordedRun, find_pressure_episodes
 
 ACTIVE = 0.12
 """Pressure from which the brake is on, as in the paper's Appendix C.5 [MPa]."""

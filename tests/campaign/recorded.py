@@ -60,3 +60,9 @@ def log_signal(columns: dict[str, NDArray[np.float64]]) -> dict[str, NDArray[np.
         "w_r": columns["wheel_speed_rear"], "pitch_up": -np.radians(columns["pitch"]),
         "pitch_rate_up": -np.radians(late), "az": columns["vertical_acceleration"] + 9.81,
     }  # fmt: skip
+
+
+def write_digits(seconds: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The time since midnight as HHMMSS.ss."""
+    seconds = np.round(seconds, 2) % 86400.0
+    return np.round(seconds // 3600 * 1e4 + seconds // 60 % 60 * 1e2 + seconds % 60, 2)

@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 
 from tasks.campaign.assembly import assemble_run
-from tasks.campaign.held_inputs import describe_held_inputs, take_input_updates
+from tasks.campaign.checks import apply_checks
+from tasks.campaign.measured import Recordings
 from tasks.campaign.signals import ChannelRule, Signal
+from tasks.campaign.slow_channels import take_input_updates
+from tests.campaign.telling import TABLE
 
 CLOCK = np.arange(900) * 0.01
 PRESSURE = np.interp(CLOCK, [0.0, 2.02, 3.41, 5.0, 6.13, 6.7], [0.0, 0.0, 1.7, 1.7, 2.3, 0.0])
@@ -72,10 +75,10 @@ def test_a_run_brakes_with_the_pressure_between_the_updates_of_its_bus() -> None
         ChannelRule(channel="brake_pressure", sources=("p",), unit="MPa"),
         ChannelRule(channel="speed", sources=("v",), unit="m/s"),
     ]
-    found = assemble_run(signals, rules, 0.0, np.inf, 100.0)
+    found = assemble_run(signals, rules, 0.0, np.inf, 100.0, TABLE)
     assert found.problems == ()
     pressure = found.columns["brake_pressure"]
     true = np.interp(found.start + 0.01 * np.arange(len(pressure)), CLOCK, PRESSURE)
     assert np.sqrt(np.mean((pressure - true) ** 2)) < 0.02
-    (told,) = describe_held_inputs([signals], rules)
-    assert told.startswith("channel brake_pressure holds each value until the next update of 10 Hz")
+    (told,) = apply_checks(TABLE.recordings, Recordings(signals=[signals], rules=rules))
+    assert told.sentence.startswith("channel brake_pressure holds each value until the next update of 10 Hz")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tasks.campaign.campaign import Run
-from tasks.campaign.resting_throttle import HIGHEST, LOWEST, find_throttle_rest
+from tasks.campaign.resting_pressure import LEAST_THROTTLE, MOST_THROTTLE, find_throttle_rest
 from tests.identification.synthetic import plain_run
 
 
@@ -35,7 +35,8 @@ def test_a_run_without_a_brake_or_a_throttle_tells_nothing():
 
 
 @pytest.mark.parametrize(
-    ("reads", "rests"), [(LOWEST, False), (LOWEST + 0.01, True), (HIGHEST + 0.01, False)]
+    ("reads", "rests"),
+    [(LEAST_THROTTLE, False), (LEAST_THROTTLE + 0.01, True), (MOST_THROTTLE + 0.01, False)],
 )
 def test_less_is_a_sensors_error_and_more_a_foot_on_both_pedals(reads: float, rests: bool):
     assert bool(find_throttle_rest([drive(reads)])) is rests

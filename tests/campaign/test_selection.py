@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from catalogs.protocols import load_protocol
-from tasks.campaign.attrition import tabulate_attrition
 from tasks.campaign.events import Event, RecordedRun
-from tasks.campaign.selection import QUANTITIES, judge_event, select_events
+from tasks.campaign.selection import QUANTITIES, judge_event, select_events, tabulate_attrition
 
 PROTOCOL = load_protocol("brake-dive")
 INTERVAL = 0.01

@@ -5,7 +5,7 @@ import pytest
 
 from tasks.campaign.assembly import assemble_run
 from tasks.campaign.channels import UNITS, guess_unit, unit_factor
-from tasks.campaign.episodes import find_pressure_episodes
+from tasks.campaign.events import find_pressure_episodes
 from tasks.campaign.signals import (
     ChannelRule,
     Gain,
@@ -15,6 +15,7 @@ from tasks.campaign.signals import (
     resample_on_clock,
 )
 from tasks.errors import InputError
+from tests.campaign.telling import TABLE
 
 
 @pytest.mark.parametrize(
@@ -97,10 +98,24 @@ def test_the_common_clock_covers_only_what_all_signals_have() -> None:
 def test_a_run_with_a_problem_gives_no_columns() -> None:
     t = np.arange(300) / 100
     rule = ChannelRule(channel="pitch", sources=("x",), unit="deg")
-    sound = assemble_run({"x": Signal(time=t, values=np.sin(t))}, [rule], -np.inf, np.inf, 100.0)
+    sound = assemble_run({"x": Signal(time=t, values=np.sin(t))}, [rule], -np.inf, np.inf, 100.0, TABLE)
     assert list(sound.columns) == ["pitch"] and not sound.problems
-    broken = assemble_run({"x": Signal(time=t, values=90 * np.sin(t))}, [rule], -np.inf, np.inf, 100.0)
+    broken = assemble_run({"x": Signal(time=t, values=90 * np.sin(t))}, [rule], -np.inf, np.inf, 100.0, TABLE)
     assert broken.problems and not broken.columns
+
+
+@pytest.mark.parametrize("delay", [0.05, -0.12])
+def test_the_delay_of_one_channel_shifts_it_and_no_other(delay: float) -> None:
+    t = np.arange(400) / 100
+    signals = {"x": Signal(time=t, values=np.sin(t)), "late": Signal(time=t, values=np.sin(t - delay))}
+    rules = [
+        ChannelRule(channel="yaw_rate", sources=("x",), unit="deg/s"),
+        ChannelRule(channel="roll_rate", sources=("late",), unit="deg/s", delay=delay),
+    ]
+    found = assemble_run(signals, rules, 1.0, 3.0, 100.0, TABLE)
+    truth = np.sin(found.start + 0.01 * np.arange(len(found.columns["yaw_rate"])))
+    for values in found.columns.values():
+        np.testing.assert_allclose(values, truth, atol=1e-4)
 
 
 def test_active_samples_up_to_the_gap_apart_are_one_episode() -> None:

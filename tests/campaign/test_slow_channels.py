@@ -13,6 +13,7 @@ from tasks.campaign.slow_channels import (
     measure_slow_rates,
     take_updates,
 )
+from tests.campaign.telling import TABLE
 
 CLOCK = np.arange(600) * 0.01
 SPEED = 30.0 - 6.0 * np.clip(CLOCK - 1.0, 0.0, 4.0) - 0.3 * CLOCK
@@ -94,7 +95,7 @@ def test_a_run_is_empty_between_the_samples_of_a_slow_signal_and_inputs_are_not(
         ChannelRule(channel="brake_pressure", sources=("brake",), unit="MPa"),
         ChannelRule(channel="longitudinal_acceleration", sources=("imu",), unit="m/s^2"),
     ]
-    found = assemble_run(signals, rules, 0.0, np.inf, 100.0)
+    found = assemble_run(signals, rules, 0.0, np.inf, 100.0, TABLE)
     assert found.problems == ()
     rows = np.flatnonzero(np.isfinite(found.columns["speed"]))
     assert set(np.diff(rows)) == {10} and found.start + 0.01 * rows[1] == pytest.approx(0.142, abs=0.005)
@@ -116,5 +117,5 @@ def test_a_slow_channel_covers_its_run_up_to_one_of_its_own_steps(
         ChannelRule(channel="speed", sources=("gps",), unit="m/s"),
         ChannelRule(channel="lateral_acceleration", sources=("imu",), unit="m/s^2", scale=0.01),
     ]
-    problems = assemble_run(signals, rules, 0.0, np.inf, 100.0).problems
+    problems = assemble_run(signals, rules, 0.0, np.inf, 100.0, TABLE).problems
     assert not problems if sound else "speed: has samples from 0.000 to 4.000 s of a run" in problems[0]

@@ -45,18 +45,6 @@ Change = Callable[[Any], None]
         ("decision_rules.yaml", load_decision_rules, lambda c: c.pop("named_odds"), "named_odds is missing"),
         ("decision_rules.yaml", load_decision_rules, lambda c: c["spike_width"].update(value=2), "spike_width"),
         ("decision_rules.yaml", load_decision_rules, lambda c: c["longest_lag"].update(unit="ms"), "longest_lag"),
-        (
-            "decision_rules.yaml",
-            load_decision_rules,
-            lambda c: c["joint"].pop("coasted_share"),
-            "joint.coasted_share is missing",
-        ),
-        (
-            "decision_rules.yaml",
-            load_decision_rules,
-            lambda c: c["joint"]["delay_interval"].update(unit="ms"),
-            "joint.delay_interval: unit must be s",
-        ),
         ("effects/truths.yaml", load_truths, lambda c: c.pop("outside"), "outside is missing"),
         ("effects/truths.yaml", load_truths, lambda c: c["library"].update(magic={"a": 1}), "magic: the library"),
         ("effects/truths.yaml", load_sizes, lambda c: c["sizes"].update(idle_creep=[1]), "sizes.idle_creep: must be"),

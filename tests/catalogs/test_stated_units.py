@@ -15,7 +15,7 @@ import yaml
 from catalogs.drives import read_drives
 from catalogs.references import TRACE_UNITS, read_reference
 from flows.judging.claims import read_claim
-from tasks.campaign.run_validation import COLUMN_UNITS
+from tasks.campaign.channels import COLUMN_UNITS
 from tasks.errors import InputError
 
 DRIVE = {

@@ -12,7 +12,7 @@ from tasks.identification.decision.candidates import Candidate, Columns
 from tasks.identification.decision.odds import RunGrams
 
 EFFECTS = {effect.name: effect for effect in load_effects()}
-SESSION = 7
+SESSION = 8
 """Numbers of the session, which stand last among the columns."""
 
 

@@ -85,7 +85,7 @@ def test_a_benchmark_goes_on_where_it_was_stopped_and_starts_anew_with_another_e
     monkeypatch.setattr(
         closing_benchmark, "make_synthetic_campaign", lambda model, road, truth, seed, slots, design: seed
     )
-    monkeypatch.setattr(closing_benchmark, "judge_campaign", judge)
+    monkeypatch.setattr(closing_benchmark, "judge_runs", judge)
     monkeypatch.setattr(closing_benchmark, "measure_interval_miss", lambda *_: None)
     with pytest.raises(KeyboardInterrupt):
         closing_benchmark.close_loop_benchmark(out=str(tmp_path), seeds=2, nulls=4, harder=1)
@@ -209,7 +209,8 @@ NO_JUDGE = (
 def test_every_source_that_a_verdict_imports_counts_in_its_hash_or_is_known_to_decide_nothing() -> None:
     """Readers of the rules and of the grip in the weather stood in no hash: two engines shared one table."""
     program = (
-        "import sys, flows.measured.searches, catalogs.vehicles, catalogs.surfaces, catalogs.effects\n"
+        "import sys, catalogs.decision_rules, catalogs.vehicles, catalogs.surfaces, catalogs.effects\n"
+        "import tasks.identification.decision.verdict\n"
         "print(*(module.__file__ for module in list(sys.modules.values()) if getattr(module, '__file__', None)))"
     )
     out = subprocess.run(

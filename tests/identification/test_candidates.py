@@ -8,7 +8,7 @@ import pytest
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
-from tasks.campaign.campaign import CHANNELS, SESSION
+from tasks.campaign.campaign import CHANNELS, FILE_NUMBERS, SESSION
 from tasks.identification.decision.candidates import CLASSES, can_show, list_columns, tell_limit
 from tasks.identification.inference.forward import prepare_run
 from tests.identification.synthetic import SURFACE, TOLERANCES, VEHICLE, plain_run
@@ -17,7 +17,7 @@ RULES = load_decision_rules()
 EFFECTS = load_effects()
 OWN = tuple(e for e in EFFECTS if e.parameters[0].name not in SESSION)
 RETUNED = [e for e in EFFECTS if e.parameters[0].name in SESSION]
-COLUMNS = list_columns(OWN, RETUNED, np.array(TOLERANCES.session), RULES)
+COLUMNS = list_columns(OWN, RETUNED, np.array(TOLERANCES.file_numbers), RULES)
 
 
 def test_each_class_is_as_likely_as_another_and_its_effects_share_that_however_they_are_tried() -> None:
@@ -40,7 +40,7 @@ def test_what_is_not_named_stays_within_a_tenth_of_what_matters_or_the_tolerance
     matters = next(e.matters for e in OWN if e.name == "brake_lag")
     assert (lag.slab, COLUMNS.spike[lag.base]) == (RULES.slab_width * matters, RULES.spike_width * matters)
     assert COLUMNS.spike[gain.base] == TOLERANCES.session[SESSION.index("pressure_gain")]
-    assert COLUMNS.base[gain.base] == COLUMNS.count - len(SESSION) + SESSION.index("pressure_gain")
+    assert COLUMNS.base[gain.base] == COLUMNS.count - len(FILE_NUMBERS) + SESSION.index("pressure_gain")
     assert all(COLUMNS.base[c.base] == c.columns[0] for c in named.values() if c.base >= 0)
 
 
@@ -87,5 +87,5 @@ def test_the_friction_of_a_weather_is_told_by_a_run_of_it_that_reaches_the_limit
     run = plain_run(25.0, peak, seconds=2.5)
     rain = {"weather": weather, "precipitation_mm_h": 8.0 if weather == "rain" else 0.0}
     model = prepare_run(replace(run, **rain), VEHICLE, SURFACE)
-    assert tell_limit(wet, [model], RULES.joint) is shown
-    assert tell_limit(lag, [model], RULES.joint)
+    assert tell_limit(wet, [model], 0.0, RULES) is shown
+    assert tell_limit(lag, [model], 0.0, RULES)

@@ -18,7 +18,7 @@ from tasks.vehicle.effects.table import EFFECT_TABLE, build_parameter_vector
 from tests.identification.synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, plain_run
 
 RULES = load_decision_rules()
-SHARE = RULES.joint.brake_onset_share
+SHARE = RULES.brake_onset_share
 RESISTANCE = {"drag_area": 0.8, "rolling_coefficient": 0.012}
 KNOWN = apply_effects(VEHICLE, RESISTANCE)
 """The car of a file that knows its resistance."""

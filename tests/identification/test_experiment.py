@@ -21,6 +21,7 @@ from tasks.identification.inference.linearisation import compute_step_misfit
 from tasks.vehicle.effects.table import EFFECT_TABLE, build_parameter_vector
 from tests.identification.synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
+NOTHING = np.zeros(len(EFFECT_TABLE))
 QUIET = Disturbance(scale=(5.0, 0.001, 5.0), time=(1.0, 0.3, 0.3))
 LIBRARY = {e.name: e for e in load_effects()}
 BETWEEN = ("brake_fade", "the model as it stands")
@@ -53,7 +54,7 @@ def test_a_run_that_depends_on_the_step_is_told_from_sound_ones() -> None:
     hard = replace(RICH[2], speed=12.0, peak=12.0)
     narrow = replace(VEHICLE, abs_release_width=0.05, wheel_inertia_f=0.3 * VEHICLE.wheel_inertia_f)
     sound, coarse = (
-        [compute_step_misfit(prepare_run(make_planned_run(drive, "run"), car, SURFACE), np.zeros(7), NOISE)
+        [compute_step_misfit(prepare_run(make_planned_run(drive, "run"), car, SURFACE), NOTHING, np.zeros(7), NOISE)
          for drive in drives]
         for car, drives in ((VEHICLE, (RICH[0], RICH[2], RICH[11], RICH[19], hard)), (narrow, (hard,)))
     )  # fmt: skip

@@ -35,7 +35,7 @@ from tasks.identification.inference.forward import (
 from tasks.identification.inference.hypothesis import Hypothesis, make_library_hypothesis
 from tasks.identification.inference.linearisation import (
     compute_whitened_residuals,
-    differentiate_at,
+    differentiate_about_offsets,
     fit_disturbance,
 )
 from tasks.vehicle.effects.forms import SHAPES, Form, count_coefficients, name_form
@@ -236,10 +236,9 @@ def test_what_a_stop_at_the_limit_of_friction_tells_of_the_brake_does_not_hang_o
         first = fit_hypotheses(
             evidence.train, (make_library_hypothesis(curve, 0.04),), evidence.session_sigma
         )
-        here = differentiate_at(evidence, first)
         fitted = fit_hypotheses(
-            here.train, first.parts, here.session_sigma, values=first.values, session=first.session,
-            offsets=first.offsets,
+            differentiate_about_offsets(evidence, first), first.parts, evidence.session_sigma, values=first.values,
+            session=first.session, offsets=first.offsets,
         )  # fmt: skip
         widths.append(np.sqrt(fitted.covariance[0, 0]))
         assert abs(fitted.values[0] - 0.04) < 3.0 * widths[-1]

@@ -12,6 +12,7 @@ from tasks.identification.decision.odds import (
     can_stand_for,
     compare_explanations,
     estimate_spread,
+    is_one_size,
     search_explanations,
     temper_odds,
     weigh_explanation,
@@ -107,23 +108,19 @@ def test_of_two_explanations_of_one_gain_the_one_about_which_the_runs_agree_has_
     assert disputed.log_odds < agreed.log_odds - 20.0
 
 
-def test_a_comparison_reads_the_same_from_either_side_but_for_the_run_that_speaks_most_for_the_first() -> (
-    None
-):
+@pytest.mark.parametrize("signature_error", [0.0, 0.1])
+def test_a_comparison_reads_the_same_from_either_side(signature_error: float) -> None:
     pulls = ((5.0, 4.0), (6.0, 4.5), (5.0, 5.0), (7.0, 3.0), (5.0, 5.0))
-    for signature_error in (0.0, 0.1):
-        whole, few = [], []
-        for compared, runs in ((whole, pulls), (few, pulls[:2])):
-            grams = balance(*runs)
-            one, other = (weigh_explanation(grams, [c]) for c in grams.columns.candidates)
-            assert one is not None and other is not None
-            compared += [
-                compare_explanations(grams, one, other, signature_error),
-                -compare_explanations(grams, other, one, signature_error),
-            ]
-        # of two runs none can be left out
-        assert few[0] > 0.5 and few[0] == pytest.approx(few[1], rel=1e-9)
-        assert 0.5 < whole[0] < whole[1]
+    compared = []
+    for runs in (pulls, pulls[:2]):
+        grams = balance(*runs)
+        one, other = (weigh_explanation(grams, [c]) for c in grams.columns.candidates)
+        assert one is not None and other is not None
+        compared.append(compare_explanations(grams, one, other, signature_error))
+        assert compare_explanations(grams, other, one, signature_error) == pytest.approx(
+            -compared[-1], rel=1e-9
+        )
+    assert all(odds > 0.5 for odds in compared)
 
 
 def test_no_comparison_hangs_on_one_run() -> None:
@@ -157,9 +154,23 @@ def test_what_the_runs_disagree_about_does_not_gain_by_that() -> None:
 
 
 def test_what_an_error_of_the_signature_may_make_is_no_evidence() -> None:
-    assert temper_odds(10.0, 100.0, 0.1) == pytest.approx(5.0)
-    assert temper_odds(-10.0, 100.0, 0.1) == pytest.approx(-5.0)
-    assert temper_odds(10.0, -3.0, 0.1) == temper_odds(10.0, 100.0, 0.0) == 10.0
+    assert temper_odds(10.0, 100.0, 0.0, 0.1) == pytest.approx(5.0)
+    assert temper_odds(-10.0, 100.0, 0.0, 0.1) == pytest.approx(-5.0)
+    assert temper_odds(10.0, -3.0, 0.0, 0.1) == temper_odds(10.0, 100.0, 50.0, 0.0) == 10.0
+    # a small second effect beside a large one, and what a tenth of the large one would make
+    assert temper_odds(100.0, 2100.0, 2000.0, 0.1) == pytest.approx(40.0)
+    assert temper_odds(19.0, 2019.0, 2000.0, 0.1) == 0.0
+
+
+@pytest.mark.parametrize(("sizes", "one"), [((1.0, 1.1, 0.9, 1.0), True), ((0.2, 0.5, 1.0, 2.0), False)])
+def test_an_effect_has_one_size_in_all_runs(sizes: tuple[float, ...], one: bool) -> None:
+    """Errors of a tenth are no other size, however well each run tells its own."""
+    designs = [np.eye(2) * 50.0 for _ in sizes]
+    grams = grams_of((LAG, DRAG), designs, [x @ (size, 0.0) for x, size in zip(designs, sizes, strict=True)])
+    weighed = weigh_explanation(grams, [LAG])
+    assert weighed is not None
+    assert is_one_size(grams, weighed, LAG, 0.2) is one
+    assert not is_one_size(grams, weighed, LAG, 0.0)
 
 
 def test_the_search_finds_a_set_that_no_single_candidate_explains_and_none_beyond_its_bounds() -> None:

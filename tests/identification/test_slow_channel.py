@@ -7,15 +7,12 @@ import pytest
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
-from catalogs.joint_numbers import load_joint_numbers
 from tasks.campaign.campaign import CHANNELS, Campaign
 from tasks.identification.decision.forms import differentiate_by_splines
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.discrepancy import RunNoise, set_run_noise
 from tasks.identification.inference.fit import Fit
 from tasks.identification.inference.linearisation import prepare_evidence
-from tasks.identification.joint.fit import fit_jointly
-from tasks.identification.joint.stops import make_stop
 from tasks.vehicle.effects.table import EFFECT_TABLE
 from tests.identification.synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
@@ -76,12 +73,3 @@ def test_a_model_without_fault_leaves_the_noise_of_its_samples(
         left = run.compute_residual(NOTHING).reshape(-1, len(CHANNELS))[:, SPEED]
         assert float(np.sum(left**2)) == pytest.approx(len(run.model.find_samples(SPEED)), rel=0.8)
     assert evidence.sensors[1][SPEED] == pytest.approx(NOISE[SPEED], rel=0.6)
-
-
-def test_a_joint_fit_compares_a_slow_channel_at_its_samples(slow_campaign: Campaign) -> None:
-    rules = load_decision_rules().joint
-    stop = make_stop(slow_campaign.runs[0], VEHICLE, SURFACE, ("speed", "longitudinal_acceleration"), rules)
-    numbers = tuple(n for n in load_joint_numbers() if n.name == "pressure_gain")
-    (fitted,) = fit_jointly([stop], numbers, [{}])
-    assert len(fitted.residuals[0]) == stop.model.samples + len(stop.model.find_samples(SPEED))
-    assert fitted.by_name["pressure_gain"] == pytest.approx(0.0, abs=0.01)

@@ -86,6 +86,18 @@ def test_a_form_is_told_where_no_effect_of_the_library_is_as_likely(
     assert names(opened) == [told], "nor is the form the rival of what it is without its law"
 
 
+def test_of_laws_that_explain_as_much_as_a_form_the_simplest_is_told() -> None:
+    """One run of four asks for a second member: the pair is as good as the form, and the first alone as the pair."""
+    curve, push = effect_of("pressure_nonlinearity", 0), effect_of("push_out_pressure", 1)
+    form = form_of("brake_torque", "pressure", (2, 3), log_prior=1.0)
+    designs = [np.array([[10.0, 0.0, 10.0, 0.0], [0.0, size, 0.0, size]]) for size in (0.1, 0.1, 0.1, 5.0)]
+    residuals = [design @ (3.0, 1.6, 0.0, 0.0) for design in designs]
+    grams = grams_of([curve, push, form], designs, residuals)
+    found = search_explanations(grams, most=2, width=8)
+    assert [e.names for e in found[:2]] == [(form.name,), (curve.name, push.name)]
+    assert names(list_open_explanations(grams, found, RULES)) == [{"pressure_nonlinearity"}]
+
+
 def test_a_form_of_another_port_stands_beside_the_effect_that_it_cannot_be() -> None:
     lag, form = replace(LAG, log_prior=-4.0), form_of("friction", "speed", (1,), log_prior=-3.5)
     opened = open_explanations([lag, form], np.array([[10.0, 10.0]]), [3.0, 0.0])

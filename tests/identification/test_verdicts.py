@@ -126,7 +126,7 @@ def test_held_out_runs_do_not_decide() -> None:
 def test_where_nothing_is_missing_nothing_is_named_and_the_verdict_says_why() -> None:
     verdict = judged({}, change=lambda campaign: replace(campaign, brake_rest=0.05))
     assert (verdict.verdict, verdict.effects, verdict.rivals) == ("NOTHING", (), ())
-    refusal, gauge = verdict.reasons
+    refusal, *_, gauge = verdict.reasons
     assert "has odds of" in refusal and "a name needs 20 : 1" in refusal
     assert "rests at 0.050 MPa" in gauge
     assert 0.0 < verdict.detectable["brake_lag"] < 0.08
@@ -185,11 +185,22 @@ def test_what_speed_alone_cannot_tell_apart_is_a_set_with_its_odds_and_the_run_t
     assert verdict.odds[0].odds == 1.0 and 1.0 / RULES.named_odds < verdict.odds[1].odds < RULES.named_odds
 
 
+def test_a_set_holds_the_run_that_tells_its_explanations_apart() -> None:
+    library = ("pad_drag", "rolling_resistance", "brake_lag")
+    verdict = judged({"pad_drag": 45.0}, library=library, first_experiment=0)
+    assert verdict.verdict == "SET"
+    assert [o.names for o in verdict.odds] == [("pad_drag",), ("rolling_resistance",)]
+    planned = verdict.experiment
+    assert planned is not None and planned.between == ("pad_drag", "rolling_resistance")
+    assert planned.plan.startswith("coast down from 36 m/s") and planned.expected_d2 > 10.0
+
+
 def test_wheels_that_are_too_small_and_a_sensor_that_counts_too_much_are_rivals() -> None:
     library = ("retuned_wheel_radius", "sensor_wheel_speed_scale", "brake_lag")
     verdict = judged({"wheel_radius": -0.04}, library=library)
     assert verdict.verdict == "SET"
     assert {*names(verdict), *(rival for _, rival in rivals(verdict))} == set(library[:2])
+    assert verdict.experiment is None or set(verdict.experiment.between) == set(library[:2])
 
 
 class TestACarThatIsGrown:

@@ -2,15 +2,26 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
-from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter
+from tasks.identification.decision import words
+from tasks.identification.decision.answer import (
+    ChannelError,
+    NamedEffect,
+    OpenOdds,
+    Parameter,
+    Verdict,
+    find_kind,
+)
 from tasks.identification.decision.odds import Explanation, search_explanations
 from tasks.identification.decision.told import OpenExplanation
-from tasks.identification.decision.words import say_not_named, tell_open_explanations, tell_verdict
+from tasks.identification.decision.words import say_not_named, tell_open_explanations
+from tasks.identification.inference.disturbance import Disturbance
+from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.tyres.burckhardt import compute_burckhardt_friction, scale_burckhardt
 from tests.identification.explained import effect_of, grams_of
 
@@ -25,6 +36,34 @@ ERROR = ChannelError(
 )  # fmt: skip
 """Of the speed on held-out runs."""
 LATE = Parameter(name="dead_time", value=0.021, ci_low=0.01, ci_high=0.03, lower=0.0, upper=0.5, unit="s")
+
+
+def tell_verdict(
+    effects: Sequence[NamedEffect],
+    library: Sequence[Effect],
+    error: dict[str, ChannelError],
+    manoeuvres: dict[str, ChannelError],
+    *,
+    rivals: Sequence[NamedEffect] = (),
+    opened: Sequence[OpenOdds] = (),
+    misses: bool = False,
+    **said: Any,
+) -> str:
+    """What the words make of a verdict; explanations of a set have odds of 1 unless they are given."""
+    named = tuple(effect.name for effect in effects)
+    pairs = tuple((named[0], rival) for rival in rivals)
+    each = opened or [
+        OpenOdds(names=tuple(words._find_name(e) for e in own), odds=1.0)
+        for own in (effects, *([r] for r in rivals))
+    ]
+    verdict = Verdict(
+        verdict=find_kind(effects, pairs), effects=tuple(effects), rivals=pairs, odds=tuple(each), tried=(),
+        error=error, manoeuvre_error=manoeuvres, correlation={}, session_pulls={}, noise={},
+        disturbance=Disturbance(), detectable={},
+        campaign="", content_hash="", split_hash="", theta=np.zeros(0), slots=(), experiment=None, step_sensitive=(),
+        reasons=(), misses=misses,
+    )  # fmt: skip
+    return words.tell_verdict(verdict, library, **said)
 
 
 def weigh_lag(values: Sequence[float], matters: float = 1.0) -> list[Explanation]:
@@ -65,19 +104,19 @@ def test_what_is_open_is_told_with_its_odds_and_one_explanation_alone_is_not() -
 
 
 def test_what_has_too_small_odds_for_a_name_is_suggested_and_not_named() -> None:
-    told = tell_verdict((), (), (), {}, {}, FORM)
+    told = tell_verdict((), (), {}, {}, suggested=FORM)
     assert told.startswith("These runs prove nothing")
     assert "the pitch moment depends on speed" in told
-    assert tell_verdict((), (), (), {}, {}) == "These runs show nothing that the model lacks."
+    assert tell_verdict((), (), {}, {}) == "These runs show nothing that the model lacks."
 
 
 def test_where_nothing_is_missing_the_verdict_says_what_the_vehicles_own_numbers_do() -> None:
     speed = replace(ERROR, frozen=0.394, retuned=0.081, after=0.08, change_low=-0.6, change_high=-0.1)
     stop = replace(speed, frozen=3.14, after=0.36, unit="m")
     own = "most: the brakes give 5.1 % above the torque of the vehicle file"
-    told = tell_verdict((), (), (), {"speed": speed}, {"stopping_distance": stop}, own=own)
+    told = tell_verdict((), (), {"speed": speed}, {"stopping_distance": stop}, own=own)
     assert told == (
-        "These runs show nothing that the model lacks; its own numbers, fitted to these runs (most: the brakes give"
+        "These runs show nothing that the model lacks. Its own numbers, fitted to these runs (most: the brakes give"
         " 5.1 % above the torque of the vehicle file), take the error of the speed from 0.39 to 0.08 m/s and of the"
         " stopping distance from 3.1 to 0.36 m, on runs to which no number was fitted."
     )
@@ -89,14 +128,14 @@ def test_own_numbers_are_told_where_resamples_agree_or_the_error_is_halved() -> 
     for speed, is_said in (
         (unsure, False), (replace(unsure, after=0.6), True), (replace(unsure, change_high=-0.01), True),
     ):  # fmt: skip
-        told = tell_verdict((), (), (), {"speed": speed}, {}, own="the brakes give more")
-        assert ("; its own numbers" in told) is is_said
+        told = tell_verdict((), (), {"speed": speed}, {}, own="the brakes give more")
+        assert (". Its own numbers" in told) is is_said
 
 
 def test_own_numbers_are_told_with_a_stop_that_they_miss_by_more() -> None:
     speed = replace(ERROR, frozen=0.4, retuned=0.27, after=0.27, change_low=-0.3, change_high=-0.1)
     stop = replace(ERROR, frozen=3.31, retuned=4.0, after=4.0, unit="m")
-    told = tell_verdict((), (), (), {"speed": speed}, {"stopping_distance": stop}, own="the brakes give more")
+    told = tell_verdict((), (), {"speed": speed}, {"stopping_distance": stop}, own="the brakes give more")
     assert "of the speed from 0.4 to 0.27 m/s and of the stopping distance from 3.3 to 4 m" in told
 
 
@@ -105,32 +144,75 @@ def test_a_name_is_not_credited_with_what_the_vehicles_own_numbers_do() -> None:
     effect = next(e for e in load_effects() if e.name == "brake_dead_time")
     late = replace(FORM, name=effect.name, effect_class="effect", parameters=(LATE,))
     error = replace(ERROR, frozen=0.86, retuned=1.04, after=0.092)
-    told = tell_verdict((late,), (), (effect,), {"speed": error}, {}, own="the brakes give 9.9 % below")
+    told = tell_verdict((late,), (effect,), {"speed": error}, {}, own="the brakes give 9.9 % below")
     assert told == (
-        "The brakes answer 0.021 s late. With the vehicle's own numbers fitted too (the brakes give 9.9 % below), that"
-        " lowers the error of the speed from 0.86 (re-tuned 1) to 0.092 m/s, on runs to which no number was fitted."
+        "The brakes answer 0.021 [0.01, 0.03] s late. With the vehicle's own numbers fitted too (the brakes give 9.9 %"
+        " below), that lowers the error of the speed from 0.86 (re-tuned 1) to 0.092 m/s, on runs to which no number"
+        " was fitted."
     )
 
 
-def test_rivals_of_one_of_several_names_are_no_rivals_of_all() -> None:
-    library = load_effects()
-    late, engine, rolling = (
-        replace(
-            FORM, name=name, effect_class="effect",
-            parameters=tuple(replace(LATE, name=p.name) for p in next(e for e in library if e.name == name).parameters),
-        )
-        for name in ("brake_dead_time", "engine_braking", "rolling_resistance")
+def name(effect: str, *numbers: tuple[float, float, float]) -> NamedEffect:
+    """An effect of the library with the values and intervals of its numbers."""
+    known = next(e for e in load_effects() if e.name == effect)
+    parameters = tuple(
+        replace(LATE, name=p.name, value=value, ci_low=low, ci_high=high, unit=p.unit)
+        for p, (value, low, high) in zip(known.parameters, numbers, strict=True)
+    )
+    return replace(
+        FORM, name=effect, effect_class=known.effect_class, port=known.port, variable=known.variable,
+        parameters=parameters,
     )  # fmt: skip
-    told = tell_verdict((late, engine), (rolling, rolling), library, {"speed": replace(ERROR, after=0.1)}, {})
-    assert "in the place of one of these, which these runs cannot tell apart. That lowers" in told
-    assert "2 other explanations" not in told, "one effect may be the rival of both"
+
+
+def test_a_set_says_first_what_its_explanations_share_and_then_each_with_its_odds() -> None:
+    lag, pads = name("brake_lag", (0.079, 0.077, 0.081)), name("pad_drag", (46.0, 41.4, 50.6))
+    rolling = name("rolling_resistance", (0.011, 0.01, 0.012))
+    opened = [
+        OpenOdds(names=("brake_lag", "pad_drag"), odds=1.0),
+        OpenOdds(names=("brake_lag", "rolling_resistance"), odds=0.49),
+    ]
+    error = {"speed": replace(ERROR, after=0.1)}
+    told = tell_verdict((lag, pads), load_effects(), error, {}, rivals=[rolling], opened=opened, force=0.1)
+    first, apart, *_ = told.split(". ")
+    assert first == (
+        "The brakes follow the pressure with a lag of 0.079 [0.077, 0.081] s and a further 0.1 [0.09, 0.11] m/s2 on"
+        " average holds the car back, whatever its law"
+    )
+    assert apart == (
+        "They cannot tell apart: pads that rub hold the wheels back with 46 [41, 51] N m (1 : 1); or the wheels roll"
+        " with a further resistance of 1.1 % [1, 1.2] of the weight (0.49 : 1)"
+    )
+    late = tell_verdict(
+        (lag,), load_effects(), error, {}, rivals=[name("brake_dead_time", (0.08, 0.07, 0.09))]
+    )
+    assert late.startswith(
+        "The brakes answer late, whatever the law. They cannot tell apart: the brakes follow"
+    )
+    mass = name("retuned_mass", (-0.1, -0.12, -0.08))
+    told = tell_verdict((lag,), load_effects(), error, {}, rivals=[mass])
+    assert told.startswith(
+        "These runs show something that the model lacks, and leave 2 explanations open. They"
+    )
+    assert "the car's mass is 10 % [8, 12] below that of the vehicle file (1 : 1)" in told
+
+
+def test_a_first_sentence_has_at_most_thirty_words() -> None:
+    three = [
+        name("brake_lag", (0.079, 0.077, 0.081)), name("anti_dive", (0.2, 0.1, 0.3)),
+        name("rolling_resistance", (0.011, 0.01, 0.012)),
+    ]  # fmt: skip
+    told = tell_verdict(three, load_effects(), {"speed": replace(ERROR, after=0.1)}, {})
+    first, second, third = told.split(". ")
+    assert len(first.split()) <= words.MOST_WORDS and "lag" in first
+    assert "resistance" in second and third.startswith("That lowers")
 
 
 def test_an_error_that_reads_the_same_before_and_after_is_not_told_as_taken_from_one_to_the_other() -> None:
     speed = replace(ERROR, frozen=2.145, retuned=2.082, after=2.082, change_low=-0.1, change_high=-0.01)
     stop = replace(speed, frozen=7.668, after=7.426, unit="m")
     own = "most: braking pitches the body by a moment 37 % below the vehicle file's"
-    told = tell_verdict((), (), (), {"speed": speed}, {"stopping_distance": stop}, misses=True, own=own)
+    told = tell_verdict((), (), {"speed": speed}, {"stopping_distance": stop}, misses=True, own=own)
     assert (
         told
         == "The model misses these runs by more than their noise, and nothing that can be named explains it."
@@ -138,7 +220,7 @@ def test_an_error_that_reads_the_same_before_and_after_is_not_told_as_taken_from
 
 
 def test_no_name_beside_runs_that_the_model_misses_is_no_claim_that_nothing_is_missing() -> None:
-    told = tell_verdict((), (), (), {}, {}, misses=True)
+    told = tell_verdict((), (), {}, {}, misses=True)
     assert (
         told
         == "The model misses these runs by more than their noise, and nothing that can be named explains it."
@@ -147,7 +229,7 @@ def test_no_name_beside_runs_that_the_model_misses_is_no_claim_that_nothing_is_m
 
 def test_an_error_is_said_without_an_exponent() -> None:
     error = replace(ERROR, frozen=121.4, retuned=99.7, after=0.056, change_low=-1.0, change_high=0.0)
-    told = tell_verdict((FORM,), (), (), {"speed": error}, {"stopping_distance": replace(error, unit="m")})
+    told = tell_verdict((FORM,), (), {"speed": error}, {"stopping_distance": replace(error, unit="m")})
     assert "of the speed from 121 (re-tuned 100) to 0.056 m/s and of the stopping distance from 121" in told
 
 
@@ -158,10 +240,10 @@ def test_an_instruments_error_is_told_by_its_own_channel_and_not_by_the_speed() 
         "longitudinal_acceleration": replace(speed, frozen=0.46, after=0.073, unit="m/s^2"),
     }
     tilt = replace(FORM, name="sensor_mount_tilt", effect_class="sensor", variable="mount")
-    told = tell_verdict((tilt,), (), (), error, {"stopping_distance": speed})
+    told = tell_verdict((tilt,), (), error, {"stopping_distance": speed})
     assert "the error of the longitudinal acceleration from 0.46 (re-tuned 0.44) to 0.073 m/s^2" in told
     assert "speed from" not in told and "stopping" not in told
-    assert "of the speed from" in tell_verdict((replace(tilt, variable="speed"),), (), (), error, {})
+    assert "of the speed from" in tell_verdict((replace(tilt, variable="speed"),), (), error, {})
 
 
 def test_a_name_that_the_speed_does_not_show_is_told_by_the_channel_that_does() -> None:
@@ -169,24 +251,22 @@ def test_a_name_that_the_speed_does_not_show_is_told_by_the_channel_that_does() 
     speed = replace(ERROR, frozen=0.22, retuned=0.22, after=0.25, change_low=0.0, change_high=1.0)
     felt = replace(speed, frozen=0.79, retuned=0.78, after=0.29, unit="m/s^2")
     error = {"speed": speed, "longitudinal_acceleration": felt}
-    told = tell_verdict((FORM,), (), (), error, {})
+    told = tell_verdict((FORM,), (), error, {})
     assert (
         "lowers the error of the longitudinal acceleration from 0.79 (re-tuned 0.78) to 0.29 m/s^2 and raises that of"
         in told
     )
     assert "of the speed from 0.22 (re-tuned 0.22) to 0.25 m/s" in told
-    assert "acceleration" not in tell_verdict(
-        (FORM,), (), (), {**error, "speed": replace(speed, after=0.1)}, {}
-    )
+    assert "acceleration" not in tell_verdict((FORM,), (), {**error, "speed": replace(speed, after=0.1)}, {})
 
 
 def test_a_form_of_another_shape_is_not_told_as_the_same_words_again() -> None:
     speed = replace(ERROR, frozen=0.42, retuned=0.41, after=0.07, change_low=-1.0, change_high=0.0)
     drag = replace(FORM, name="drag_form", port="longitudinal_force")
-    told = tell_verdict((FORM,), (replace(FORM, name="other_shape"),), (), {"speed": speed}, {})
+    told = tell_verdict((FORM,), (), {"speed": speed}, {}, rivals=[replace(FORM, name="other_shape")])
     assert told.count("itch moment depends on speed") == 1
     assert "cannot tell apart" not in told
-    both = tell_verdict((FORM,), (replace(FORM, name="other_shape"), drag), (), {"speed": speed}, {})
+    both = tell_verdict((FORM,), (), {"speed": speed}, {}, rivals=[replace(FORM, name="other_shape"), drag])
     assert "or the longitudinal force depends on speed" in both and both.count("itch moment depends") == 1
 
 

@@ -9,7 +9,7 @@ from catalogs.effects import LIBRARY_FILE
 from reference_pages.markdown import format_cell
 from reference_pages.pages import ASKED, TABLES, insert_tables
 from reference_pages.verdict_rules import read_meanings
-from tasks.identification.rules import DecisionRules, JointRules
+from tasks.identification.rules import DecisionRules
 from tests.documents import DOCS
 
 PAGE = insert_tables((DOCS / "reference" / "verdict-rules.md").read_text())
@@ -24,18 +24,14 @@ def rows_of(heading: str) -> dict[str, list[str]]:
 
 
 def test_every_number_of_a_decision_stands_on_the_page_with_meaning_and_reason() -> None:
-    content = yaml.safe_load(DECISION_RULES.read_text())
-    for heading, numbers, rules in (
-        ("Joint fit", content.pop("joint"), JointRules),
-        ("Numbers of the decision", content, DecisionRules),
-    ):
-        rows = rows_of(heading)
-        assert rows.keys() == numbers.keys() and read_meanings(rules).keys() >= rows.keys()
-        for name, entry in numbers.items():
-            value, unit, meaning, reason = rows[name]
-            assert [value, unit] == [format_cell(entry["value"]), entry["unit"]]
-            assert meaning == format_cell(read_meanings(rules)[name]) and not meaning.endswith("]")
-            assert reason == format_cell(entry["source"])
+    numbers, meanings = yaml.safe_load(DECISION_RULES.read_text()), read_meanings(DecisionRules)
+    rows = rows_of("Numbers of the decision")
+    assert rows.keys() == numbers.keys() == meanings.keys() and len(numbers) <= 30
+    for name, entry in numbers.items():
+        value, unit, meaning, reason = rows[name]
+        assert [value, unit] == [format_cell(entry["value"]), entry["unit"]]
+        assert meaning == format_cell(meanings[name]) and not meaning.endswith("]")
+        assert reason == format_cell(entry["source"])
 
 
 def test_every_effect_has_the_size_that_matters_and_why() -> None:

@@ -5,7 +5,6 @@ import pytest
 
 from catalogs.bump_studies import load_bump_study
 from catalogs.vehicles import load_vehicle
-from tasks.campaign.sensor_agreement import measure_sensor_agreement
 from tasks.studies.brake_dive import pitch_mode
 from tasks.studies.road_bump import (
     Passage,
@@ -15,6 +14,7 @@ from tasks.studies.road_bump import (
     ride_over,
     with_factors,
 )
+from tasks.studies.sensor_agreement import measure_sensor_agreement
 from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
 from tasks.vehicle.parameters import Vehicle
 

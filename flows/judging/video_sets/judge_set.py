@@ -9,7 +9,6 @@ import numpy as np
 from catalogs.learned_judges import load_judges
 from catalogs.sentences import cap_problems
 from catalogs.video_protocols import VideoProtocol, load_video_protocol
-from flows.drawing import as_svg
 from flows.judging.claims import read_claim
 from flows.judging.evaluation_means import average_within_seeds
 from flows.judging.foreign_sources import read_camera
@@ -20,6 +19,7 @@ from flows.judging.video_sets.motion import JudgedSet, Key, SetMotion, look_at_c
 from flows.judging.video_sets.motion_panels import list_set_panels
 from flows.judging.video_sets.picture_rows import PIXELS
 from flows.judging.video_sets.rows import set_rows
+from flows.pages.static import as_svg
 from flows.running.orchestration import run_as_stage
 from flows.running.progress import progress_bar
 from flows.store.outputs import Outputs

@@ -1,8 +1,9 @@
 /* global REPORT, Traces, Player, telemetryOf, asCsv */
 "use strict";
-// The page: filters, the table of clips, the chosen clip with its sibling, and the facts of the run.
+// The page: filters, the table of clips, and the chosen clip with its sibling.
 
 const MOST_ROWS = 500;
+const HASH = /^[0-9a-f]{16,}$/;
 const $ = (id) => document.getElementById(id);
 const clips = REPORT.clips;
 
@@ -20,6 +21,8 @@ const degrees = (radians) => (radians === null || radians === undefined ? null :
 
 const roadOf = ({ scenario: s }) => (s.hazard_height_m > 0 ? "hump" : s.hazard_height_m < 0 ? "depression" : "flat");
 const verdictOf = ({ verdict: v }) => (v.passed === null ? "unjudged" : v.passed ? "passed" : "failed");
+
+const TONES = { passed: "good", failed: "bad", unjudged: "unjudged" };
 
 const COLUMNS = [
   { head: "clip", unit: "", key: (c) => c.label, text: (c) => c.label },
@@ -112,7 +115,8 @@ function drawRows() {
   $("clips").tBodies[0].replaceChildren(...list.slice(0, MOST_ROWS).map((clip) => {
     const row = el("tr", { tabIndex: 0, dataset: { clip: clip.clip_id } },
       ...COLUMNS.map(({ text }, k) => el("td", {}, k === 0 ? linkTo(clip) : text(clip))));
-    row.lastChild.className = row.lastChild.ariaLabel = verdictOf(clip);
+    row.lastChild.className = TONES[verdictOf(clip)];
+    row.lastChild.ariaLabel = verdictOf(clip);
     row.onclick = () => select(clip);
     row.onkeydown = (event) => {
       const next = { ArrowDown: row.nextSibling, ArrowUp: row.previousSibling, Enter: row }[event.key];
@@ -165,7 +169,7 @@ async function beside(clip, sibling) {
   Object.assign(current, { clip, sibling });
   $("sibling").value = sibling?.clip_id ?? "";
   $("label").textContent = clip.label;
-  $("badge").className = `badge ${verdictOf(clip)}`;
+  $("badge").className = `badge ${TONES[verdictOf(clip)]}`;
   $("badge").textContent = { passed: "pose check passed", failed: "pose check failed", unjudged: "not judged: no frames" }[verdictOf(clip)];
   $("labels").replaceChildren([...LABELS.map((label) => ranged(clip, ...label)), stopMissing(clip)].filter(Boolean).join(" · "),
     " ", el("small", { textContent: "in brackets p05 to p95" }));
@@ -224,22 +228,17 @@ function changes(clip, sibling) {
 
 // ---- facts
 
-const facts = (rows) => el("dl", {}, ...rows.flatMap(([key, value, hash]) =>
-  [el("dt", { textContent: key }), el("dd", { textContent: value ?? "–", className: hash ? "hash" : "" })]));
+const facts = (values) => el("table", { className: "facts" }, ...Object.entries(values).map(([name, value]) =>
+  el("tr", {}, el("th", { scope: "row", textContent: name }), el("td", { className: HASH.test(value) ? "hash" : "", textContent: value ?? "–" }))));
 
 function drawClipFacts(clip) {
-  const rows = (values) => Object.entries(values).map(([key, value]) => [key, typeof value === "number" ? String(value) : value]);
-  $("clip-facts").lastElementChild.replaceChildren(
-    facts([["clip_id", clip.clip_id, true], ["seed", clip.seed, true], ["split", clip.split || "none"], ["calibration", clip.calibration]]),
-    el("h3", { textContent: "Scenario" }), facts(rows(clip.scenario)),
-    el("h3", { textContent: "Outcome" }), facts(rows(clip.figures)),
-    el("h3", { textContent: "Pose check" }), facts(rows({ ...clip.verdict, reasons: clip.verdict.reasons.join("; ") || "none" })),
-    el("h3", { textContent: "SHA-256 of the content" }), facts(Object.entries(clip.content).map(([k, v]) => [k, v, true])));
-}
-
-function drawRunFacts() {
-  $("run-facts").lastElementChild.replaceChildren(...REPORT.manifest.flatMap(({ title, rows }) =>
-    [el("h3", { textContent: title }), facts(rows)]));
+  const { clip_id, seed, split, calibration } = clip;
+  const parts = {
+    "": { clip_id, seed, split: split || "none", calibration }, "Scenario": clip.scenario, "Outcome": clip.figures,
+    "Pose check": { ...clip.verdict, reasons: clip.verdict.reasons.join("; ") || "none" }, "SHA-256 of the content": clip.content,
+  };
+  $("clip-facts").lastElementChild.replaceChildren(...Object.entries(parts).flatMap(([title, values]) =>
+    [...(title ? [el("h3", { textContent: title })] : []), facts(values)]));
 }
 
 // ---- the horizon, exaggerated
@@ -289,16 +288,12 @@ async function saveCsv() {
 
 // ---- start
 
-document.title = `${REPORT.name} – muSync report`;
-$("title").textContent = REPORT.name;
-$("facts").textContent = REPORT.summary;
 $("time").max = REPORT.duration_s;
 const speeds = clips.map((c) => c.scenario.initial_speed_km_h);
 $("speed-from").placeholder = Math.floor(Math.min(...speeds));
 $("speed-to").placeholder = Math.ceil(Math.max(...speeds));
 drawChips();
 drawHead();
-drawRunFacts();
 $("filters").addEventListener("input", drawRows);
 $("reset").onclick = clearFilters;
 $("sibling").onchange = () => beside(current.clip, clips.find((c) => c.clip_id === $("sibling").value) ?? null);

@@ -1,10 +1,6 @@
-/* global Plotly, REPORT */
+/* global REPORT, draw, dark */
 "use strict";
 // A clip's telemetry beside a sibling's: unpacking, plotting, and one time that films, cursor and slider share.
-
-const PANEL_PX = 108;
-const HEAD_PX = 22;
-const MARGIN = { l: 46, r: 10, t: 14, b: 38 };
 
 const waiting = new Map();
 
@@ -69,78 +65,58 @@ class Traces {
     this.onScrub = onScrub;
     this.shown = [];
     this.time = 0;
-    this.heads = REPORT.panels.map((panel, k) => {
+    this.heads = REPORT.panels.map((panel) => {
       const head = document.createElement("div");
       head.className = "panel-head";
-      head.style.top = `${MARGIN.t + k * PANEL_PX}px`;
       head.append(`${panel.caption}${panel.unit ? ` [${panel.unit}]` : ""}`,
         ...["a", "b"].map((side) => Object.assign(document.createElement("output"), { className: side })));
       box.append(head);
       return head;
     });
     box.addEventListener("pointerdown", (event) => this.grab(event), { capture: true });
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
+    dark.addEventListener("change", () => this.draw());
   }
 
   /** Show one or two clips' telemetry, [{label, columns}]. */
-  async show(shown) {
+  show(shown) {
     this.shown = shown;
     this.box.hidden = shown.length === 0;
-    await this.draw();
+    this.draw();
   }
 
-  async draw() {
+  draw() {
     if (this.shown.length === 0) return;
-    const style = getComputedStyle(document.documentElement);
-    const [ink, soft, line, ...colours] = ["--ink", "--soft", "--line", "--a", "--b"].map((n) => style.getPropertyValue(n).trim());
-    const height = PANEL_PX * REPORT.panels.length;
-    const layout = {
-      height: height + MARGIN.t + MARGIN.b, margin: MARGIN, showlegend: false, dragmode: this.plot.layout?.dragmode ?? false,
-      paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", hovermode: false,
-      font: { family: "system-ui, sans-serif", size: 11, color: soft },
-      modebar: { bgcolor: "rgba(0,0,0,0)", color: soft, activecolor: ink, orientation: "h" },
-      xaxis: { title: { text: "time [s]", standoff: 6 }, gridcolor: line, zeroline: false, anchor: axis(REPORT.panels.length - 1),
-        range: this.plot.layout?.xaxis?.range ?? [0, REPORT.duration_s] },
-    };
-    const lines = [];
-    REPORT.panels.forEach((panel, k) => {
-      const from = k * PANEL_PX + HEAD_PX;
-      layout[`yaxis${k === 0 ? "" : k + 1}`] = {
-        domain: [1 - ((k + 1) * PANEL_PX - 6) / height, 1 - from / height], anchor: "x", fixedrange: true, nticks: 4,
-        gridcolor: line, zeroline: true, zerolinecolor: line, rangemode: "normal",
-      };
-      this.shown.forEach(({ label, columns }, side) => lines.push({
-        type: "scatter", mode: "lines", name: label, xaxis: "x", yaxis: axis(k),
-        x: columns.get("t_ns").map((t) => t / 1e9), y: columns.get(panel.column).map((v) => v * panel.factor),
-        line: { color: colours[side], width: 1.4 },
-      }));
-    });
     // the sibling first, so that the clip itself lies on top
-    lines.reverse();
-    await Plotly.react(this.plot, lines, layout, {
-      responsive: true, displaylogo: false, doubleClick: "reset",
-      modeBarButtons: [["zoom2d", "pan2d", "resetScale2d", "toImage"]],
-    });
-    if (!this.listening) {
-      this.plot.on("plotly_relayout", () => this.point(this.time));
-      this.plot.on("plotly_afterplot", () => this.point(this.time));
-      this.listening = true;
-    }
+    const data = this.shown.flatMap(({ columns }, side) => {
+      const x = columns.get("t_ns").map((t) => t / 1e9);
+      return REPORT.panels.map(({ column, factor }, k) => ({
+        type: "scatter", mode: "lines", xaxis: axis("x", k), yaxis: axis("y", k), x, y: columns.get(column).map((v) => v * factor),
+        line: { color: ["--a", "--b"][side], width: 1.4 },
+      }));
+    }).reverse();
+    this.plot.drawn = { ...REPORT.figure, data };
+    this.plot.own = { hovermode: false, dragmode: this.plot.layout?.dragmode ?? false };
+    this.plot.config = { displayModeBar: "hover", modeBarButtons: [["zoom2d", "pan2d", "resetScale2d", "toImage"]], doubleClick: "reset" };
+    draw(this.plot);
+    if (!this.listening) this.plot.on("plotly_afterplot", () => this.point(this.time));
+    this.listening = true;
     this.point(this.time);
   }
 
   /** Put the cursor and the read-outs at a time [s]. */
   point(time) {
     this.time = time;
-    const axis = this.plot._fullLayout?.xaxis;
-    if (!axis || this.shown.length === 0) return;
-    const [from, to] = axis.range;
+    const full = this.plot._fullLayout;
+    if (!full?.xaxis || this.shown.length === 0) return;
+    const [from, to] = full.xaxis.range;
+    const bottom = full[axisKey(this.heads.length - 1)];
     this.cursor.hidden = time < from || time > to;
-    this.cursor.style.left = `${axis._offset + axis.l2p(time)}px`;
-    this.cursor.style.top = `${MARGIN.t}px`;
-    this.cursor.style.height = `${PANEL_PX * REPORT.panels.length}px`;
+    this.cursor.style.left = `${full.xaxis._offset + full.xaxis.l2p(time)}px`;
+    this.cursor.style.top = `${full.yaxis._offset}px`;
+    this.cursor.style.height = `${bottom._offset + bottom._length - full.yaxis._offset}px`;
     this.heads.forEach((head, k) => {
       const panel = REPORT.panels[k];
+      head.style.top = `${full[axisKey(k)]._offset - 20}px`;
       head.querySelectorAll("output").forEach((output, side) => {
         const values = this.shown[side]?.columns.get(panel.column);
         output.hidden = !values;
@@ -175,7 +151,8 @@ class Traces {
   }
 }
 
-const axis = (k) => `y${k === 0 ? "" : k + 1}`;
+const axis = (letter, k) => `${letter}${k === 0 ? "" : k + 1}`;
+const axisKey = (k) => axis("yaxis", k);
 
 /** One clock for two films, or for none; `onTime` is told what moment is on show. */
 class Player {

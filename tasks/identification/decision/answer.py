@@ -1,6 +1,6 @@
 """The verdict and its parts: named effects with their parameters, and errors by channel."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -176,19 +176,3 @@ def make_estimate(effect: Effect, parameter: Parameter, error: float) -> NamedEf
         name=effect.name, effect_class=effect.effect_class, port=effect.port, variable=effect.variable,
         parameters=(parameter,), score=half_square, gain=half_square,
     )  # fmt: skip
-
-
-def is_within_tolerance(effect: NamedEffect, tolerances: Mapping[str, float], limit: float) -> bool:
-    """Whether a number of the file is off by no more than its tolerance and half of its interval allow.
-
-    Parameters
-    ----------
-    effect : the number
-    tolerances : by number [its unit]; an effect that is no number of the file has none
-    limit : tolerances from which a number is wrong [1]
-    """
-    number = effect.parameters[0]
-    if number.name not in tolerances:
-        return False
-    reach = 0.5 * (number.ci_high - number.ci_low)
-    return abs(number.value) < float(np.hypot(limit * tolerances[number.name], reach))

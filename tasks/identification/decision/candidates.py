@@ -13,18 +13,26 @@ from math import log, nan
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.campaign import SESSION
+from tasks.campaign.campaign import FILE_NUMBERS, SESSION
 from tasks.identification.decision.forms import FORM_BOUND, FORM_MATTERS, KEYS, KNOTS, PORT_STEP
 from tasks.identification.inference.derivatives import list_second_values
 from tasks.identification.inference.forward import RunModel
-from tasks.identification.joint.numbers import reaches_limit, saturates_tyres
-from tasks.identification.rules import DecisionRules, JointRules
+from tasks.identification.inference.tyre_limit import (
+    measure_peak_deceleration,
+    reaches_limit,
+    saturates_tyres,
+)
+from tasks.identification.rules import DecisionRules
 from tasks.vehicle.effects.grown import FAMILY, find_family_tables
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.parameters import Vehicle
 
 CLASSES = 3
 """Classes of what may be lacking: physics, a number of the vehicle's file, an instrument [1]."""
+UNKNOWN = ("front_bias", "wet_friction", "snow_friction")
+"""Numbers that a file knows no better than the brake's gain: how brakes are shared, and what wet tyres hold."""
+BRAKED, FEWEST_STOPS = 1.5, 2
+"""Deceleration of a stop, more than an engine's overrun [m/s2], and stops that show the curve of a brake [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,20 +105,33 @@ def can_show(effect: Effect, vehicle: Vehicle, channels: Sequence[str]) -> bool:
     return not has_already and (effect.variable != "slip" or sees_slip) and (not pitches or sees_pitch)
 
 
-def tell_limit(effect: Effect, models: Sequence[RunModel], rules: JointRules) -> bool:
+def tell_limit(effect: Effect, models: Sequence[RunModel], gain: float, rules: DecisionRules) -> bool:
     """Return whether runs tell the tyres' limit, if an effect is a number of that: one of its weather must reach it.
 
     Parameters
     ----------
     effect : of the library
     models : training runs
+    gain : of the brakes beside the file's [1]
     rules : when a run reaches the limit of its tyres
     """
     fields = effect.parameters[0].fields
     if not any(field.startswith(FAMILY) and field.endswith("efficiency") for field in fields):
         return True
     own = [m for m in models if any(find_family_tables(field, (m.run.weather,))[0] for field in fields)]
-    return any(saturates_tyres(model, rules) or reaches_limit(model, rules, 0.0) for model in own)
+    return any(saturates_tyres(model, rules) or reaches_limit(model, gain, rules) for model in own)
+
+
+def tell_curve(effect: Effect, models: Sequence[RunModel]) -> bool:
+    """Return whether runs tell the curve of the brake, if an effect is one: one stop shows a gain and a delay alone.
+
+    Parameters
+    ----------
+    effect : of the library
+    models : training runs
+    """
+    braked = sum(measure_peak_deceleration(model) > BRAKED for model in models)
+    return effect.variable != "pressure" or braked >= FEWEST_STOPS
 
 
 def list_columns(
@@ -121,15 +142,19 @@ def list_columns(
 ) -> Columns:
     """Return the columns of the derivatives and what may be named.
 
+    Where a file hardly knows its brakes, `UNKNOWN` numbers are as free without a name as with one.
+
     Parameters
     ----------
     effects : of the library that the runs are differentiated by
     retuned : effects whose number is one of the session's
-    session_sigma : float64 [7] tolerances of the session's numbers
+    session_sigma : float64 [8] tolerances of the session's numbers
     rules : widths of spike and slab, and the odds of a form
     """
     numbers = list(dict.fromkeys(e.parameters[0].name for e in effects))
     first = {n: next(j for j, e in enumerate(effects) if e.parameters[0].name == n) for n in numbers}
+    hardly_known = session_sigma[FILE_NUMBERS.index("pressure_gain")] >= rules.hardly_known_tolerance
+    unknown = UNKNOWN if hardly_known else ()
     seconds = list_second_values(effects)
     splines = len(effects) + max(len(seconds), 1)
     session = splines + KNOTS * len(KEYS)
@@ -165,10 +190,12 @@ def list_columns(
         )
         for i, (port, variable) in enumerate(KEYS)
     ]  # fmt: skip
-    small = [rules.spike_width * effects[first[n]].matters for n in numbers]
+    small = [
+        (rules.slab_width if n in unknown else rules.spike_width) * effects[first[n]].matters for n in numbers
+    ]
     return Columns(
-        base=np.array([*(first[n] for n in numbers), *range(session, session + len(SESSION))]),
+        base=np.array([*(first[n] for n in numbers), *range(session, session + len(FILE_NUMBERS))]),
         spike=np.concatenate((small, session_sigma)),
-        count=session + len(SESSION),
+        count=session + len(FILE_NUMBERS),
         candidates=tuple(candidates),
     )

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from tasks.identification.inference.forward import RunModel, simulate_run
 from tasks.vehicle.effects.slots import Slot
+from tasks.vehicle.model.simulation import Simulation
 
 
 def find_reached_range(
@@ -21,17 +22,22 @@ def find_reached_range(
     slots : forms that were found
     variable : one of `VARIABLES`
     """
-    values = [_simulate_variable(model, theta, slots, variable) for model in models]
+    values = [read_variable(model, simulate_run(model, theta, slots=slots), variable) for model in models]
     return float(min(v.min() for v in values)), float(max(v.max() for v in values))
 
 
-def _simulate_variable(
-    model: RunModel, theta: NDArray[np.float64], slots: tuple[Slot, ...], variable: str
-) -> NDArray[np.float64]:
-    """Return the simulated values of a variable in one run, float64 [N] [unit of the variable]."""
+def read_variable(model: RunModel, simulated: Simulation, variable: str) -> NDArray[np.float64]:
+    """Return the values of a variable in one run, of both axles if it is an axle's own, float64 [N] or [2, N].
+
+    Parameters
+    ----------
+    model : the run
+    simulated : its simulation
+    variable : one of `VARIABLES` [its unit]
+    """
+    column = simulated.column
     if variable == "time":
         return np.arange(model.samples, dtype=np.float64) * model.run.interval
-    column = simulate_run(model, theta, slots=slots).column
     if variable == "speed":
         return column("speed")
     if variable == "deceleration":
@@ -39,9 +45,10 @@ def _simulate_variable(
     if variable == "pressure":
         return column("acting_pressure")
     if variable == "pressure_rate":
-        return np.asarray(np.gradient(column("acting_pressure"), model.run.interval), dtype=np.float64)
+        pressure = column("acting_pressure")
+        return np.diff(pressure, append=pressure[-1]) / model.run.interval
     if variable == "load_ratio":
         rest_f, rest_r = model.vehicle.static_axle_loads
-        return np.concatenate((column("tyre_load_f") / rest_f, column("tyre_load_r") / rest_r))
+        return np.stack((column("tyre_load_f") / rest_f, column("tyre_load_r") / rest_r))
     name = {"disc_temperature": "disc_rise", "suspension_speed": "suspension_rate"}.get(variable, variable)
-    return np.concatenate([column(f"{name}_{axle}") for axle in "fr"])
+    return np.stack([column(f"{name}_{axle}") for axle in "fr"])

@@ -7,16 +7,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.campaign import CHANNELS
+from tasks.identification.decision.excitation import read_variable
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.evidence import RunEvidence
 from tasks.identification.inference.fit import Fit
-from tasks.identification.inference.forward import predict_channels
+from tasks.identification.inference.forward import (
+    RunModel,
+    compute_instrument_readings,
+    equip_vehicle,
+    simulate_run,
+)
 from tasks.identification.inference.hypothesis import Hypothesis
 from tasks.identification.inference.noise import rewhiten_channels, whiten_channels
 from tasks.vehicle.effects.forms import SHAPES, Form, name_form, read_form_name
 from tasks.vehicle.effects.ports import PORT_UNITS
 from tasks.vehicle.effects.slots import Slot
 from tasks.vehicle.effects.table import EFFECT_TABLE
+from tasks.vehicle.model.simulation import Simulation
 
 KNOTS = 5
 PORT_STEP = {
@@ -58,6 +65,8 @@ SHAPES_TRIED = 2
 """Shapes of the grammar that are fitted through the simulation for a spline [1]."""
 
 
+AROUND, WIDER = 3, 0.1
+"""Samples about an instant, and share of the spacing of knots beside their range, in which a knot may be felt [1]."""
 KEYS = tuple((port, variable) for port, variables in SCANNED.items() for variable in variables)
 RIDGE = np.repeat([(20.0 * PORT_STEP[port]) ** -2 for port, _ in KEYS], KNOTS)
 """Precision of the broad priors of all knots, in the order of `KEYS`."""
@@ -121,20 +130,44 @@ def _differentiate_run(
     slots: tuple[Slot, ...],
     ranges: Mapping[str, tuple[float, float]],
 ) -> NDArray[np.float64]:
-    """Return the whitened derivatives of one run by all knots, float64 [M, K]."""
-    y = predict_channels(run.model, theta, slots=slots)
-    columns = []
-    for port, variable in KEYS:
+    """Return the whitened derivatives of one run by all knots, float64 [M, K]; 0 by those that it never reaches."""
+    model = run.model
+    equipped = equip_vehicle(model, theta)
+    plain = simulate_run(model, theta, slots=slots, keep_states=True, equipped=equipped)
+    y = compute_instrument_readings(model, theta, plain)
+    columns = np.zeros((*y.shape, KNOTS * len(KEYS)))
+    for i, (port, variable) in enumerate(KEYS):
         low, high = ranges[variable]
-        for k in range(KNOTS):
+        spacing = (high - low) / (KNOTS - 1)
+        for k, first in enumerate(_find_first_samples(model, plain, variable, low, spacing)):
+            if first is None:
+                continue
             hat = np.zeros(KNOTS)
             hat[k] = PORT_STEP[port]
-            extra = Slot(
-                port=port, variable=variable, origin=low, spacing=(high - low) / (KNOTS - 1), values=hat
+            extra = Slot(port=port, variable=variable, origin=low, spacing=spacing, values=hat)
+            moved = simulate_run(
+                model, theta, slots=(*slots, extra), branch=(first, plain), equipped=equipped
             )
-            moved = predict_channels(run.model, theta, slots=(*slots, extra))
-            columns.append((moved - y) / PORT_STEP[port])
-    return whiten_channels(np.stack(columns, axis=-1), run.rho, run.sigma, run.model.sampled)
+            readings = compute_instrument_readings(model, theta, moved)
+            columns[:, :, KNOTS * i + k] = (readings - y) / PORT_STEP[port]
+    return whiten_channels(columns, run.rho, run.sigma, model.sampled)
+
+
+def _find_first_samples(
+    model: RunModel, simulated: Simulation, variable: str, low: float, spacing: float
+) -> list[int | None]:
+    """Return by knot the sample from which a run may feel it; None where it never does."""
+    values = np.atleast_2d(read_variable(model, simulated, variable))
+    place = (values - low) / spacing
+    around = np.pad(place, ((0, 0), (AROUND, AROUND)), mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(around, 2 * AROUND + 1, axis=1)
+    least, most = windows.min(axis=(0, 2)) - WIDER, windows.max(axis=(0, 2)) + WIDER
+    firsts: list[int | None] = []
+    for k in range(KNOTS):
+        above = most > (k - 1 if k else -np.inf)
+        felt = np.flatnonzero(above & (least < (k + 1 if k < KNOTS - 1 else np.inf)))
+        firsts.append(int(felt[0]) if felt.size else None)
+    return firsts
 
 
 def make_spline_hypothesis(

@@ -92,20 +92,6 @@ def summarise_errors(
     return errors
 
 
-def is_noticed(error: Mapping[str, ChannelError], without: Mapping[str, ChannelError], share: float) -> bool:
-    """Whether any channel of the held-out runs is predicted noticeably better with an effect than without it.
-
-    The equations of another car differ a little everywhere: what the likelihood finds there, but no prediction feels,
-    is no discovery.
-
-    Parameters
-    ----------
-    error, without : by channel or figure, of the model with the effect and without it
-    share : of the error without the effect below which the error is noticeably smaller [1]
-    """
-    return any(error[name].after < share * e.after for name, e in without.items())
-
-
 def is_lowered(error: ChannelError) -> bool:
     """Whether an error of held-out runs is smaller than under the vehicle file: in 95 % of resamples, or by half.
 
@@ -116,21 +102,3 @@ def is_lowered(error: ChannelError) -> bool:
     error : of a channel or figure
     """
     return error.change_high < 0.0 or error.after < HALF * error.frozen
-
-
-def find_worse_channels(
-    error: Mapping[str, ChannelError], limit: float, *, speed_decides: bool = True
-) -> list[str]:
-    """Return the channels that effects predict worse than the frozen model, if that outweighs what they predict better.
-
-    One channel must not veto what the others prove; the speed, which a stop is made of, may.
-
-    Parameters
-    ----------
-    error : by channel
-    limit : ratio of errors from which a channel is worse, if its resampled change also says so [1]
-    speed_decides : whether the effects move the speed; an error of the accelerometer leaves it to the session's numbers
-    """
-    worse = [name for name, e in error.items() if e.after > limit * e.frozen and e.change_low > 0.0]
-    change = np.mean([np.log(e.after / e.frozen) for e in error.values() if e.frozen > 0.0 and e.after > 0.0])
-    return worse if (speed_decides and "speed" in worse) or change > 0.0 else []

@@ -1,12 +1,15 @@
-"""Faults of a log that look exactly like a named effect, so that no search can tell them from it."""
+"""What a verdict rests on: inputs and range of a log, and its faults that look exactly like a named effect."""
 
 from collections.abc import Collection, Sequence
 from math import sin
+
+import numpy as np
 
 from tasks.campaign.campaign import Campaign
 from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME
 from tasks.campaign.resting_pressure import describe_rest, measure_resting_levels
 from tasks.identification.decision.answer import NamedEffect
+from tasks.identification.inference.evidence import RunEvidence
 
 
 def tell_log_faults(campaign: Campaign, named: Sequence[NamedEffect], rivals: Collection[str]) -> list[str]:
@@ -53,3 +56,36 @@ def tell_log_faults(campaign: Campaign, named: Sequence[NamedEffect], rivals: Co
         rest = describe_rest(measure_resting_levels(runs, campaign.runs[0].interval))
         told += [] if rest is None else [rest]
     return told
+
+
+def tell_inputs(campaign: Campaign, train: Sequence[RunEvidence]) -> list[str]:
+    """Return sentences on the inputs of a log, the channels that were compared, and how far the training runs reach.
+
+    Parameters
+    ----------
+    campaign : measured runs
+    train : training runs
+    """
+    brake = campaign.brake_signal.replace("_", " ")
+    inputs = [brake]
+    inputs += ["engine torque"] if any(run.drive_torque is not None for run in campaign.runs) else []
+    inputs += ["throttle"] if any(run.throttle is not None for run in campaign.runs) else []
+    inputs += ["road slope"] if any(run.road_slope is not None for run in campaign.runs) else []
+    compared = [name.replace("_", " ") for name in campaign.channels]
+    if any(run.speed_of_wheels for run in campaign.runs):
+        compared[0] = "speed of the wheels"
+    speed = np.concatenate([run.model.measured[:, 0] for run in train])
+    pressure = max(float(run.model.pressure.max()) for run in train)
+    told = [
+        f"inputs that were measured: {', '.join(inputs)}; compared: {', '.join(compared)}",
+        f"the training runs reach {speed.min():.3g} to {speed.max():.3g} m/s and {pressure:.3g} MPa: beyond that"
+        " nothing is claimed",
+    ]
+    if BRAKE_SIGNALS.get(campaign.brake_signal, 1.0) == 1.0:
+        return told
+    signal = CHANNELS_BY_NAME[campaign.brake_signal]
+    unit = "" if signal.unit == "1" else f" {signal.unit}"
+    stands_for = (
+        f"a {brake} of 1{unit} is taken for {BRAKE_SIGNALS[signal.name]:g} MPa, and the gain is fitted"
+    )
+    return [stands_for, *told]

@@ -1,26 +1,34 @@
 """Named effects of an explanation, fitted alone through the simulation, with their intervals."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from math import log
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtri
 
-from tasks.campaign.campaign import SESSION
-from tasks.identification.decision.answer import NamedEffect, Parameter
+from tasks.campaign.campaign import CHANNELS, FILE_NUMBERS, SESSION
+from tasks.identification.decision.answer import NamedEffect, Parameter, make_estimate
 from tasks.identification.decision.candidates import Candidate
 from tasks.identification.decision.forms import KNOTS, find_scanned_ranges, make_form_hypotheses
 from tasks.identification.decision.odds import Explanation, RunGrams, keep_members, weigh_explanation
 from tasks.identification.decision.search import Finding, make_hypotheses, widen_session
 from tasks.identification.decision.told import OpenExplanation
-from tasks.identification.inference.fit import Fit, fit_hypotheses
-from tasks.identification.inference.hypothesis import Hypothesis
+from tasks.identification.inference.fit import SETTLED, Fit, fit_hypotheses
+from tasks.identification.inference.forward import predict_channels
+from tasks.identification.inference.hypothesis import Hypothesis, compose_parameters
+from tasks.identification.inference.linearisation import differentiate_about_offsets
 from tasks.identification.inference.quantiles import NORMAL_QUANTILE
 from tasks.identification.rules import DecisionRules
+from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.ports import PORT_UNITS
 
+FELT = CHANNELS.index("longitudinal_acceleration")
 STEPS = 8
 """Gauss-Newton steps of a last fit [1]."""
+MOST_REFINED = 4
+"""Times that a last fit is taken about its own offsets [1]."""
 
 
 def fit_told(finding: Finding, opened: OpenExplanation) -> Fit:
@@ -56,6 +64,74 @@ def fit_told(finding: Finding, opened: OpenExplanation) -> Fit:
     return min((fit(trial) for trial in trials), key=lambda fitted: fitted.objective)
 
 
+def settle_told(
+    finding: Finding, opened: Sequence[OpenExplanation], rules: DecisionRules
+) -> tuple[list[OpenExplanation], Fit]:
+    """Return the open explanations and the fit of the first, whose members are surely large when fitted alone too.
+
+    Parameters
+    ----------
+    finding : the runs and what was fitted to them
+    opened : the explanations that are open, the first being the one that is told
+    rules : the odds of a name
+    """
+    first, *others = opened
+    reach = float(ndtri(rules.named_odds / (1.0 + rules.named_odds)))
+    while True:
+        fitted = refine_fit(finding, fit_told(finding, first))
+        large = []
+        for member in first.told:
+            if member.effect is not None:
+                value, error = _find_first_number(member, member.effect, first.explanation, fitted)
+                if abs(value) - reach * error <= member.matters:
+                    continue
+            large.append(member)
+        if len(large) == len(first.told):
+            return [first, *(other for other in others if not other.numbers >= first.numbers)], fitted
+        first = replace(first, told=tuple(large))
+
+
+def refine_fit(finding: Finding, fitted: Fit) -> Fit:
+    """Return a fit again with the derivatives taken about it and about each run's own offsets, until it settles.
+
+    Parameters
+    ----------
+    finding : the runs
+    fitted : fit of what an explanation tells
+    """
+    for _ in range(MOST_REFINED):
+        runs = differentiate_about_offsets(finding.evidence, fitted)
+        before, fitted = fitted, fit_hypotheses(
+            runs, fitted.parts, fitted.session_sigma, values=fitted.values, session=fitted.session,
+            offsets=fitted.offsets, iterations=STEPS,
+        )  # fmt: skip
+        if before.objective - fitted.objective < SETTLED:
+            break
+    return fitted
+
+
+def measure_force(finding: Finding, fitted: Fit, names: Sequence[str]) -> float:
+    """Return the mean deceleration that some parts of a fit make over the training runs [m/s2].
+
+    Parameters
+    ----------
+    finding : the runs
+    fitted : the fit
+    names : of its parts
+    """
+    values, at = fitted.values.copy(), 0
+    for part in fitted.parts:
+        values[at : at + len(part.names)] *= part.name not in names
+        at += len(part.names)
+    felt, free = (
+        np.concatenate(
+            [predict_channels(run.model, theta, slots=slots)[:, FELT] for run in finding.evidence.train]
+        )
+        for theta, slots in (fitted.compose(), compose_parameters(fitted.parts, values, fitted.session))
+    )
+    return float(np.mean(free - felt))
+
+
 def name_members(opened: OpenExplanation, grams: RunGrams, fitted: Fit | None) -> list[NamedEffect]:
     """Return what an explanation tells in the form in which the verdict reports it, what gains most first.
 
@@ -88,26 +164,70 @@ def name_members(opened: OpenExplanation, grams: RunGrams, fitted: Fit | None) -
     return sorted(named, key=lambda effect: -effect.gain)
 
 
+def list_calibrated(
+    fitted: Fit, named: Sequence[NamedEffect], library: Sequence[Effect], least: float
+) -> list[NamedEffect]:
+    """Return the vehicle's own numbers that a prediction rests on where its file hardly knows the brake's gain.
+
+    They are no discovery: those whose 95 % interval does not hold the file's value, without what is named.
+
+    Parameters
+    ----------
+    fitted : fit of what is named
+    named : effects that are named
+    library : effects, of which the numbers are
+    least : tolerance of the gain from which the file hardly knows it [1]
+    """
+    if fitted.session_sigma[FILE_NUMBERS.index("pressure_gain")] < least:
+        return []
+    told = {effect.parameters[0].name for effect in named}
+    numbers = {e.parameters[0].name: e for e in library if e.effect_class == "retune"}
+    calibrated = []
+    for name, value, error in zip(FILE_NUMBERS, fitted.session, fitted.session_error, strict=True):
+        if name in numbers and name not in told and abs(value) > NORMAL_QUANTILE * error:
+            row = numbers[name].parameters[0]
+            estimate = _make_parameter(name, value, error, row.lower, row.upper, row.unit)
+            calibrated.append(make_estimate(numbers[name], estimate, float(error)))
+    return calibrated
+
+
 def _list_parameters(
     member: Candidate, explanation: Explanation, fitted: Fit | None
 ) -> tuple[str, tuple[Parameter, ...]]:
-    """Return the name and the parameters of a member: of the last fit, with the errors of the explanation."""
+    """Return the name and the parameters of a member: of the last fit, if there is one."""
     places = explanation.find_places(member)
     value, error = explanation.values[places], explanation.errors[places]
     if member.effect is None:
         return _list_form_parameters(member, value, error, fitted)
-    first = member.effect.parameters[0]
-    values, errors = np.array([value[0]]), np.array([error[0]])
-    if fitted is not None and first.name not in SESSION:
-        values, errors = _find_part(member.name, fitted)
-        errors = np.concatenate((error, errors[1:]))
-    if fitted is not None and first.name in SESSION:
-        values = np.array([fitted.session[SESSION.index(first.name)]])
+    values, errors = value, error
+    if fitted is not None:
+        number = member.effect.parameters[0].name
+        values, errors = (
+            _find_part(member.name, fitted) if number not in SESSION else (value.copy(), error.copy())
+        )
+        values[0], errors[0] = _find_first_number(member, member.effect, explanation, fitted)
     rows = member.effect.parameters[: len(values)]
     return member.name, tuple(
         _make_parameter(row.name, v, e, row.lower, row.upper, row.unit)
         for row, v, e in zip(rows, values, errors, strict=True)
     )
+
+
+def _find_first_number(
+    member: Candidate, effect: Effect, explanation: Explanation, fitted: Fit
+) -> tuple[float, float]:
+    """Return the first number of a member by the last fit, and its error: the fit's or the explanation's.
+
+    That of the explanation knows what every other number may be off, and what differs from run to run; that of the fit
+    is about each run's own offsets. The larger holds.
+    """
+    error = float(explanation.errors[explanation.find_places(member)][0])
+    name = effect.parameters[0].name
+    if name in SESSION:
+        place = SESSION.index(name)
+        return float(fitted.session[place]), max(error, float(fitted.session_error[place]))
+    values, errors = _find_part(member.name, fitted)
+    return float(values[0]), max(error, float(errors[0]))
 
 
 def _list_form_parameters(

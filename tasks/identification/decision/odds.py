@@ -8,12 +8,15 @@ variance is that of DerSimonian and Laird (1986, doi:10.1016/0197-2456(86)90046-
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import inf, log
+from functools import cached_property
+from math import copysign, inf, log, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_solve, cholesky, solve_triangular
+from scipy.linalg import solve_triangular
+from scipy.linalg.lapack import dpotrf, dpotrs
 
+from tasks.campaign.campaign import FILE_NUMBERS
 from tasks.identification.decision.candidates import Candidate, Columns
 
 ALONG_ROAD = {"longitudinal_force", "brake_torque"}
@@ -31,6 +34,8 @@ FEWEST = 3
 """Runs that must inform a direction for their scatter to say something [1]."""
 TOLD = 0.5
 """Square of the smallest size that matters, over its variance by one run, from which the run tells a number [1]."""
+SURE = 3.0
+"""Standard errors by which a scatter of the runs is more than noise [1]."""
 INFORMED = 1e-6
 """Share of the best informed run's information from which a run informs a direction [1]."""
 
@@ -52,6 +57,27 @@ class RunGrams:
     centre: NDArray[np.float64]
     columns: Columns
 
+    @cached_property
+    def total(self) -> NDArray[np.float64]:
+        """Return the information of all runs, float64 [C, C]."""
+        return np.asarray(self.information.sum(axis=0))
+
+    @cached_property
+    def total_score(self) -> NDArray[np.float64]:
+        """Return the score of all runs, float64 [C]."""
+        return np.asarray(self.score.sum(axis=0))
+
+    @cached_property
+    def nobody(self) -> "_Prior":
+        """Return the prior of the numbers that belong to every explanation, none of them named."""
+        return _arrange(self, ())
+
+    @cached_property
+    def plain(self) -> float:
+        """Return the log evidence of the explanation without a member [1]."""
+        own = self.nobody.columns
+        return _integrate(self.total[np.ix_(own, own)], self.total_score[own], self.nobody)[2]
+
 
 @dataclass(frozen=True, kw_only=True)
 class Explanation:
@@ -65,7 +91,7 @@ class Explanation:
     values : float64 [K] of each member's columns, one after the other [their units]
     errors : float64 [K] their standard deviations
     spreads : standard deviation from run to run of each member, over its size [1]
-    session : float64 [7] numbers of the session
+    session : float64 [8] numbers of the session
     everything : float64 [C] mean of every column's number where the gain is taken, without spread of the runs; 0 where
         it takes no part
     """
@@ -120,40 +146,39 @@ def weigh_explanation(
     members : of the explanation
     spread : count what differs from run to run
     """
-    prior, nobody = _arrange(grams, members), _arrange(grams, ())
-    information = grams.information[:, prior.columns[:, None], prior.columns[None, :]]
-    score = grams.score[:, prior.columns]
-    total, right = information.sum(axis=0), score.sum(axis=0)
+    prior, nobody = _arrange(grams, members), grams.nobody
+    total, right = grams.total[np.ix_(prior.columns, prior.columns)], grams.total_score[prior.columns]
     mean, factor, evidence = _integrate(total, right, prior)
     everything = np.zeros(grams.columns.count)
     everything[prior.columns] = mean + prior.centre
-    plain = _integrate(*_take(grams, nobody), nobody)[2]
-    gain, spreads = evidence - plain, [0.0] * len(members)
+    gain, spreads = evidence - grams.plain, [0.0] * len(members)
+    gain_with_spread = gain
     if spread and members:
-        left = score - information @ mean
-        directions = []
+        seen, pulls = [], []
         for i, places in enumerate(prior.places):
-            along = np.zeros(len(mean))
-            along[places] = mean[places] + prior.centre[places]
-            size = np.einsum("i,rij,j->r", along, information, along)
-            spreads[i] = float(np.sqrt(estimate_spread(size, left @ along)))
-            directions.append(along * spreads[i])
-        total, right = _admit_spread(information, score, np.array(directions).T)
-        mean, factor, evidence = _integrate(total, right, prior)
-        kept = np.arange(len(nobody.columns))
-        gain_with_spread = evidence - _integrate(total[np.ix_(kept, kept)], right[kept], nobody)[2]
-    else:
-        gain_with_spread = gain
+            own, along = prior.columns[places], mean[places] + prior.centre[places]
+            information = along @ grams.information[:, own[:, None], prior.columns]
+            pull = grams.score[:, own] @ along
+            size = information[:, places] @ along
+            spreads[i] = float(np.sqrt(estimate_spread(size, pull - information @ mean)))
+            if spreads[i] > 0.0:
+                seen.append((places, along * spreads[i], information * spreads[i]))
+                pulls.append(pull * spreads[i])
+        if seen:
+            total, right = _admit_spread(total, right, seen, np.array(pulls).T)
+            mean, factor, evidence = _integrate(total, right, prior)
+            kept = len(nobody.columns)
+            gain_with_spread = evidence - _integrate(total[:kept, :kept], right[:kept], nobody)[2]
     at = np.concatenate([np.empty(0, dtype=np.int64), *prior.places]).astype(np.int64)
     values = (mean + prior.centre)[at]
     bounds = [(m.lower, m.upper) for m in members for _ in m.columns]
     if any(not low - 1e-12 <= x <= high + 1e-12 for x, (low, high) in zip(values, bounds, strict=True)):
         return None
-    inverse = solve_triangular(factor, np.eye(len(mean)), lower=True, check_finite=False)
+    inverse = solve_triangular(factor, np.eye(len(mean))[:, at], lower=True, check_finite=False)
     return Explanation(
         members=tuple(members), log_odds=gain_with_spread + sum(m.log_prior for m in members), gain=gain, values=values,
-        errors=np.sqrt(np.einsum("ij,ij->j", inverse, inverse))[at], spreads=tuple(spreads),
-        session=(mean + prior.centre)[len(nobody.columns) - 7 : len(nobody.columns)], everything=everything,
+        errors=np.sqrt(np.einsum("ij,ij->j", inverse, inverse)), spreads=tuple(spreads),
+        session=(mean + prior.centre)[: len(nobody.columns)][-len(FILE_NUMBERS) :], everything=everything,
     )  # fmt: skip
 
 
@@ -229,8 +254,9 @@ def compare_explanations(
 
     What the runs disagree about on the line from one to the other counts as a random effect there: two explanations
     that half of the runs decide either way are not told apart, however much each run gains. The run that speaks most
-    for the first does not count. No model has the signature of an effect exactly as the car does; what its relative
-    error leaves over is no evidence (model discrepancy, Kennedy and O'Hagan 2001, doi:10.1111/1467-9868.00294).
+    for the better one does not count. No model has the signature of an effect exactly as the car does; what its
+    relative error leaves over is no evidence (model discrepancy, Kennedy and O'Hagan 2001,
+    doi:10.1111/1467-9868.00294).
 
     Parameters
     ----------
@@ -250,23 +276,71 @@ def compare_explanations(
     weight[informed] = 1.0 / (1.0 / size[informed] + spread)
     place = np.divide(pull, size, out=np.zeros(len(size)), where=informed)
     by_run = weight * (0.5 - place)
-    # no comparison hangs on one run
-    robust = float(by_run.sum() - max(by_run.max(), 0.0)) if len(by_run) >= FEWEST else float(by_run.sum())
+    total = float(by_run.sum())
+    if len(by_run) >= FEWEST and total:
+        # no comparison hangs on one run
+        side = float(np.sign(total))
+        total = side * max(abs(total) - max(float((side * by_run).max()), 0.0), 0.0)
     prior = sum(m.log_prior for m in one.members) - sum(m.log_prior for m in other.members)
-    odds = one.gain - other.gain + prior - plain + robust
-    return temper_odds(odds, max(one.gain, other.gain), signature_error)
+    whole = one.gain - other.gain + prior
+    odds = whole - plain + total
+    if odds * whole <= 0.0:
+        # of two that the runs do not tell apart neither is the better for its fewer numbers
+        return 0.0
+    return temper_odds(odds, max(one.gain, other.gain), find_shared_gain(grams, one, other), signature_error)
 
 
-def temper_odds(log_odds: float, gain: float, signature_error: float) -> float:
-    """Return the logarithm of odds without what an error of the signature alone may make [1].
+def find_shared_gain(grams: RunGrams, one: Explanation, other: Explanation) -> float:
+    """Return what the members that two explanations share gain alone [1].
+
+    Parameters
+    ----------
+    grams : of the runs
+    one, other : the explanations
+    """
+    shared = weigh_explanation(grams, [m for m in one.members if m in other.members], spread=False)
+    return 0.0 if shared is None else shared.gain
+
+
+def temper_odds(log_odds: float, gain: float, shared: float, signature_error: float) -> float:
+    """Return the logarithm of odds without what errors of the signatures alone may make [1].
+
+    What the error of a shared signature leaves over either explanation may take up. That of their own signatures moves
+    the car along the line between them, and the odds are those of two normal distributions with that variance too.
 
     Parameters
     ----------
     log_odds : by the runs' noise alone [1]
-    gain : rise of the log likelihood by the signature [1]
-    signature_error : its relative error in a model of the car [1]
+    gain : rise of the log likelihood by the better explanation [1]
+    shared : by the members that both have [1]
+    signature_error : relative error of a signature in a model of the car [1]
     """
-    return log_odds / (1.0 + signature_error**2 * max(gain, 0.0))
+    square = signature_error**2
+    left = max(abs(log_odds) - square * max(shared, 0.0), 0.0)
+    return copysign(left / (1.0 + square * max(gain - max(shared, 0.0), 0.0)), log_odds)
+
+
+def is_one_size(grams: RunGrams, explanation: Explanation, member: Candidate, scatter: float) -> bool:
+    """Return whether a member has one size in all runs, but for a scatter and for noise (Cochran's Q at three sigma).
+
+    Parameters
+    ----------
+    grams : of the runs
+    explanation : that it belongs to
+    member : one of its members
+    scatter : standard deviation from run to run that the signature of an effect may have, over its size [1]
+    """
+    used = np.flatnonzero(explanation.everything != 0.0)
+    own = np.array(member.columns)
+    along = explanation.everything[own]
+    information = along @ grams.information[:, own[:, None], used]
+    size = grams.information[:, own[:, None], own] @ along @ along
+    pull = grams.score[:, own] @ along - information @ (explanation.everything - grams.centre)[used]
+    informed = size > INFORMED * max(float(size.max()), 1e-300)
+    weight, place = 1.0 / (1.0 / size[informed] + scatter**2), pull[informed] / size[informed]
+    left = place - float(weight @ place) / float(weight.sum())
+    freedom = len(left) - 1
+    return freedom < FEWEST - 1 or float(weight @ left**2) <= freedom + SURE * sqrt(2.0 * freedom)
 
 
 def keep_members(explanation: Explanation, members: Sequence[Candidate]) -> Explanation:
@@ -373,37 +447,38 @@ def _arrange(grams: RunGrams, members: Sequence[Candidate]) -> _Prior:
     )
 
 
-def _take(grams: RunGrams, prior: _Prior) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return information and score of all runs for the columns of an explanation."""
-    total = grams.information[:, prior.columns[:, None], prior.columns[None, :]].sum(axis=0)
-    return total, grams.score[:, prior.columns].sum(axis=0)
-
-
 def _integrate(
     information: NDArray[np.float64], score: NDArray[np.float64], prior: _Prior
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
     """Return mean about the linearisation point, Cholesky factor of the precision, and log evidence."""
-    k = len(score)
-    precision, centre = prior.precision[:k], prior.centre[:k]
-    inner = information + np.diag(precision)
-    factor = cholesky(0.5 * (inner + inner.T), lower=True, check_finite=False)
+    precision, centre = prior.precision, prior.centre
+    factor, failed = dpotrf(information + np.diag(precision), lower=True, clean=True)
+    if failed:
+        raise np.linalg.LinAlgError("the information of the runs must be positive")
     right = score - precision * centre
-    mean = cho_solve((factor, True), right, check_finite=False)
+    mean = np.asarray(dpotrs(factor, right, lower=True)[0])
     evidence = 0.5 * float(right @ mean) - float(np.log(np.diag(factor)).sum())
     evidence += 0.5 * float(np.log(precision).sum()) - 0.5 * float(precision @ centre**2)
     return mean, factor, evidence
 
 
 def _admit_spread(
-    information: NDArray[np.float64], score: NDArray[np.float64], directions: NDArray[np.float64]
+    total: NDArray[np.float64],
+    right: NDArray[np.float64],
+    seen: Sequence[tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]],
+    pulls: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return information and score of all runs where each may lie off along the directions, float64 [K, D]."""
-    total, right = information.sum(axis=0), score.sum(axis=0)
-    told = directions[:, np.any(directions != 0.0, axis=0)]
-    if not told.size:
-        return total, right
-    seen = information @ told
-    inner = np.linalg.inv(np.eye(told.shape[1]) + told.T @ seen)
-    total = total - np.einsum("rik,rkl,rjl->ij", seen, inner, seen, optimize=True)
-    right = right - np.einsum("rik,rkl,rl->i", seen, inner, score @ told, optimize=True)
-    return total, right
+    """Return information and score of all runs where each may lie off along some directions.
+
+    Parameters
+    ----------
+    total, right : float64 [K, K] and [K] where none does
+    seen : of each direction its places, its values there, and what each run says along it, float64 [R, K]
+    pulls : float64 [R, D] score of each run along it
+    """
+    along = np.stack([information for *_, information in seen], axis=1)  # [R, D, K]
+    inner = np.stack([along[:, :, places] @ values for places, values, _ in seen], axis=2)
+    solved = np.linalg.solve(np.eye(len(seen)) + inner, np.concatenate((along, pulls[:, :, None]), axis=2))
+    run, way, k = along.shape
+    flat, solved = along.reshape(run * way, k), solved.reshape(run * way, k + 1)
+    return total - flat.T @ solved[:, :k], right - flat.T @ solved[:, k]

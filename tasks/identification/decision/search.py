@@ -6,8 +6,15 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.campaign import SESSION, Campaign
-from tasks.identification.decision.candidates import Candidate, Columns, can_show, list_columns, tell_limit
+from tasks.campaign.campaign import FILE_NUMBERS, SESSION, Campaign
+from tasks.identification.decision.candidates import (
+    Candidate,
+    Columns,
+    can_show,
+    list_columns,
+    tell_curve,
+    tell_limit,
+)
 from tasks.identification.decision.forms import (
     KNOTS,
     RIDGE,
@@ -17,6 +24,7 @@ from tasks.identification.decision.forms import (
     rewhiten_splines,
 )
 from tasks.identification.decision.odds import (
+    FEWEST,
     Explanation,
     RunGrams,
     compare_explanations,
@@ -36,6 +44,7 @@ from tasks.identification.inference.linearisation import (
     prepare_evidence,
     rescale_disturbances,
 )
+from tasks.identification.inference.start import GAIN, GRIP, estimate_session, is_grip_free
 from tasks.identification.rules import DecisionRules
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import Effect
@@ -45,6 +54,8 @@ Splines = tuple[NDArray[np.float64], ...]
 """Derivatives of every training run by the knots of all splines, float64 [M, K] each."""
 STEPS = 6
 """Gauss-Newton steps of a fit [1]."""
+REFUTED = 0.75
+"""Share of the fitted explanation's gain that another must lose through the simulation to be refuted [1]."""
 REFINED = 3
 """Single candidates that are tried through the simulation before the first turn [1]."""
 
@@ -76,11 +87,21 @@ class Finding:
 
 @dataclass(frozen=True, kw_only=True)
 class _Place:
-    """Where the search stands: the runs about a fit, and their derivatives by the splines."""
+    """Where the search stands.
+
+    Parameters
+    ----------
+    evidence : the runs about a fit
+    fitted : the fit
+    splines : derivatives by the splines, about ``splined``
+    splined : parts of the fit about which they were taken
+    """
 
     evidence: Evidence
     fitted: Fit
     splines: Splines
+    splined: tuple[Hypothesis, ...] = ()
+    refuted: bool = False
 
 
 def find_explanations(
@@ -104,10 +125,14 @@ def find_explanations(
     rules : of the decision
     """
     models = [prepare_run(run, vehicle, surface) for run in campaign.train]
+    gain = float(estimate_session(campaign, models, rules)[GAIN])
     shown = [
         effect
         for effect in library
-        if can_show(effect, vehicle, campaign.channels) and tell_limit(effect, models, rules.joint)
+        if can_show(effect, vehicle, campaign.channels)
+        and not (effect.parameters[0].name == GRIP and is_grip_free(campaign))
+        and tell_limit(effect, models, gain, rules)
+        and tell_curve(effect, models)
     ]
     retuned = [effect for effect in shown if effect.parameters[0].name in SESSION]
     numbers = tuple(effect for effect in shown if effect.parameters[0].name not in SESSION)
@@ -118,17 +143,21 @@ def find_explanations(
     columns = list_columns(numbers, retuned, evidence.session_sigma, rules)
     null = place.fitted
     grams = gather_grams(place.evidence, place.fitted, place.splines, columns)
-    first = _refine_first(search_explanations(grams, most=1, width=1, spread=False, forms=False), place, null)
+    singles = search_explanations(grams, most=1, width=1, spread=False, forms=False)
+    first = _refine_first(singles, place, null, rules)
     if first is not None:
-        place = _move_to(first, place, null, settle=True)
-    for forms in (False, True):
+        place = _settle_scales(_move_to(first, place, null))
+    # the shape of a form is not told by a run or two
+    for forms in (False, True) if len(models) >= FEWEST else (False,):
         place, grams, found = _settle_explanation(place, null, columns, rules, forms=forms)
     return Finding(
         evidence=place.evidence, null=null, fitted=place.fitted, grams=grams, explanations=tuple(found)
     )
 
 
-def _refine_first(found: list[Explanation], place: _Place, null: Fit) -> Explanation | None:
+def _refine_first(
+    found: list[Explanation], place: _Place, null: Fit, rules: DecisionRules
+) -> Explanation | None:
     """Return the single candidate that explains most through the simulation, of those that seem to; None without one.
 
     A linear estimate of a delay, or of what decides when an anti-lock brake acts, is a hint.
@@ -141,10 +170,12 @@ def _refine_first(found: list[Explanation], place: _Place, null: Fit) -> Explana
         )
         for e in hopeful
     ]  # fmt: skip
-    costs = [
-        0.5 * f.objective - sum(m.log_prior for m in e.members) for f, e in zip(fits, hopeful, strict=True)
+    gains = [
+        0.5 * (null.objective - f.objective) + sum(m.log_prior for m in e.members)
+        for f, e in zip(fits, hopeful, strict=True)
     ]
-    return hopeful[int(np.argmin(costs))] if hopeful else None
+    # the odds of what is fitted are less than its gain
+    return hopeful[int(np.argmax(gains))] if max(gains, default=0.0) > log(rules.named_odds) else None
 
 
 def _settle_explanation(
@@ -155,16 +186,36 @@ def _settle_explanation(
     Forms come after the library: what an effect of the library explains is no form.
     """
     for turn in range(rules.most_turns):
+        if forms and place.splined is not place.fitted.parts:
+            splines = differentiate_by_splines(place.evidence, place.fitted)
+            place = replace(place, splines=splines, splined=place.fitted.parts)
         grams = gather_grams(place.evidence, place.fitted, place.splines, columns)
         found = search_explanations(grams, most=rules.most_effects, width=rules.beam_width, forms=forms)
-        told = keep_members(found[0], tell_members(grams, found[0], rules))
         here = next((e for e in found if _is_fitted(e, place.fitted)), None)
+        if place.refuted and here is not None:
+            # far from a fit without its effect, derivatives about that fit promise what no simulation keeps
+            found = [e for e in found if e.log_odds <= here.log_odds or not _leaves_out(e, here)]
+        told = keep_members(found[0], tell_members(grams, found[0], rules))
         if turn == rules.most_turns - 1 or _is_fitted(told, place.fitted):
             break
         if forms and here is not None and not _is_worth_it(found[0], here, grams, rules):
             break
-        place = _move_to(told, place, null, settle=False)
+        moved = _move_to(told, place, null)
+        lost = _compute_cost(moved.fitted, told) - _compute_cost(place.fitted, told if here is None else here)
+        refuted = here is not None and lost > REFUTED * here.gain + log(rules.named_odds)
+        place = replace(place, refuted=True) if refuted else moved
     return place, grams, found
+
+
+def _compute_cost(fitted: Fit, explanation: Explanation) -> float:
+    """Return half the misfit of a fit, less the logarithm of the prior odds of what it holds [1]."""
+    return 0.5 * fitted.objective - sum(member.log_prior for member in explanation.members)
+
+
+def _leaves_out(explanation: Explanation, here: Explanation) -> bool:
+    """Whether an explanation with effects of the library leaves out a member of the fitted one."""
+    known = any(member.effect is not None for member in explanation.members)
+    return known and not set(here.names) <= set(explanation.names)
 
 
 def _is_worth_it(best: Explanation, here: Explanation, grams: RunGrams, rules: DecisionRules) -> bool:
@@ -215,7 +266,7 @@ def _find_centre(fitted: Fit, columns: Columns) -> NDArray[np.float64]:
             own = [c.columns[0] for c in columns.candidates if part.names[0] == _name_number(c)][:1]
             centre[own] = fitted.values[at]
         at += len(part.names)
-    centre[-len(SESSION) :] = fitted.session
+    centre[-len(FILE_NUMBERS) :] = fitted.session
     return centre
 
 
@@ -271,12 +322,12 @@ def _find_second(name: str, fitted: Fit) -> float:
 
 
 def widen_session(explanation: Explanation, sigma: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the session's prior sigmas, with the slab where an explanation names one of its numbers, float64 [7].
+    """Return the session's prior sigmas, with the slab where an explanation names one of its numbers, float64 [8].
 
     Parameters
     ----------
     explanation : its members
-    sigma : float64 [7] tolerances
+    sigma : float64 [8] tolerances
     """
     wide = sigma.copy()
     for member in explanation.members:
@@ -285,15 +336,13 @@ def widen_session(explanation: Explanation, sigma: NDArray[np.float64]) -> NDArr
     return wide
 
 
-def _move_to(explanation: Explanation, place: _Place, null: Fit, *, settle: bool) -> _Place:
-    """Return the runs about the fit of an explanation, with the scales of noise and disturbances taken anew."""
+def _move_to(explanation: Explanation, place: _Place, null: Fit) -> _Place:
+    """Return the runs about the fit of an explanation."""
     parts = make_hypotheses(explanation, place.evidence, place.fitted)
     sigma = widen_session(explanation, place.evidence.session_sigma)
     fitted = fit_hypotheses(place.evidence.train, parts, sigma, session=null.session, iterations=STEPS)
     evidence = differentiate_at(place.evidence, fitted)
-    fitted = _refit(evidence, fitted)
-    moved = _Place(evidence=evidence, fitted=fitted, splines=differentiate_by_splines(evidence, fitted))
-    return _settle_scales(moved) if settle else moved
+    return replace(place, evidence=evidence, fitted=_refit(evidence, fitted), refuted=False)
 
 
 def _refit(evidence: Evidence, fitted: Fit) -> Fit:
@@ -313,8 +362,10 @@ def _settle_scales(place: _Place) -> _Place:
 
 def _scale_noise(place: _Place) -> _Place:
     evidence = set_run_noise(place.evidence, estimate_run_noise(place.evidence, place.fitted))
+    if all(run is before for run, before in zip(evidence.train, place.evidence.train, strict=True)):
+        return place
     splines = rewhiten_splines(place.splines, place.evidence, evidence)
-    return _Place(evidence=evidence, fitted=_refit(evidence, place.fitted), splines=splines)
+    return replace(place, evidence=evidence, fitted=_refit(evidence, place.fitted), splines=splines)
 
 
 def _scale_disturbances(place: _Place) -> _Place:
@@ -323,5 +374,7 @@ def _scale_disturbances(place: _Place) -> _Place:
     scales = fit_disturbance(
         here.train, residuals, here.tolerances, here.effects, here.disturbance, place.splines, RIDGE
     )
+    if scales == here.disturbance:
+        return place
     evidence = rescale_disturbances(here, scales)
     return replace(place, evidence=evidence, fitted=_refit(evidence, place.fitted))

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from math import log
+from math import inf, log
 
 import numpy as np
 from scipy.special import ndtri
@@ -13,11 +13,15 @@ from tasks.identification.decision.odds import (
     RunGrams,
     can_stand_for,
     compare_explanations,
+    find_shared_gain,
+    is_one_size,
     temper_odds,
     weigh_explanation,
 )
 from tasks.identification.rules import DecisionRules
 
+SIGNATURES = 2.0
+"""Errors of a signature by which the size of an effect may differ from run to run [1]."""
 Told = frozenset[str]
 """Names of the members that an explanation tells."""
 
@@ -59,7 +63,8 @@ def tell_members(grams: RunGrams, explanation: Explanation, rules: DecisionRules
     explanation : its members with values and errors
     rules : the odds
     """
-    return find_large_members(take_away_members(grams, explanation, rules), rules)
+    needed = take_away_members(grams, explanation, rules)
+    return tuple(m for m in needed.members if is_surely_large(needed, m, rules))
 
 
 def take_away_members(grams: RunGrams, explanation: Explanation, rules: DecisionRules) -> Explanation:
@@ -79,28 +84,57 @@ def take_away_members(grams: RunGrams, explanation: Explanation, rules: Decision
             for member in explanation.members
         ]
         best = max((e for e in rest if e is not None), key=lambda e: e.log_odds, default=None)
-        if best is None or explanation.log_odds - best.log_odds > log(rules.named_odds):
+        if best is None:
+            break
+        odds = temper_odds(
+            explanation.log_odds - best.log_odds, explanation.gain, best.gain, rules.signature_error
+        )
+        if odds > log(rules.named_odds):
             break
         explanation = best
     return explanation
 
 
-def find_large_members(explanation: Explanation, rules: DecisionRules) -> tuple[Candidate, ...]:
-    """Return the members that are larger than what matters, at the odds of a name.
+def is_surely_large(
+    explanation: Explanation, member: Candidate, rules: DecisionRules, *, in_any_run: bool = False
+) -> bool:
+    """Return whether a member is larger than what matters at the odds of a name, in the mean or in any run.
 
     Parameters
     ----------
     explanation : its members with values and errors
+    member : one of them
     rules : the odds
+    in_any_run : count what differs from run to run
     """
+    places = explanation.find_places(member)
+    values, errors = explanation.values[places], explanation.errors[places]
+    if in_any_run:
+        errors = np.hypot(errors, explanation.spreads[explanation.members.index(member)] * values)
     reach = float(ndtri(rules.named_odds / (1.0 + rules.named_odds)))
-    large = []
-    for member in explanation.members:
-        places = explanation.find_places(member)
-        certain = np.abs(explanation.values[places]) - reach * explanation.errors[places]
-        if float(certain.max()) > member.matters:
-            large.append(member)
-    return tuple(large)
+    return float((np.abs(values) - reach * errors).max()) > member.matters
+
+
+def find_shared_members(
+    grams: RunGrams, explanation: Explanation, rules: DecisionRules
+) -> tuple[Candidate, ...]:
+    """Return the members that may be named: larger than what matters in any run, and of one size in all runs.
+
+    What differs from run to run by more than errors of signatures explain is no effect that the runs share, but what
+    the model lacks moves it.
+
+    Parameters
+    ----------
+    grams : of the runs
+    explanation : its members with values and errors
+    rules : the odds, and the error of a signature
+    """
+    return tuple(
+        member
+        for member in explanation.members
+        if is_surely_large(explanation, member, rules, in_any_run=True)
+        and is_one_size(grams, explanation, member, SIGNATURES * rules.signature_error)
+    )
 
 
 def list_open_explanations(
@@ -123,31 +157,37 @@ def list_open_explanations(
     # what an effect of the library explains is held against every form
     plain = [e for e in listed if all(m.effect is not None for m in e.members)]
     ranked += [e for e in plain[: rules.most_compared // 2] if not any(e is known for known in ranked)]
-    by_told: dict[Told, OpenExplanation] = {}
     needed = [take_away_members(grams, explanation, rules) for explanation in reversed(ranked)]
     # of the same members the best comes last, and stays
+    by_told: dict[Told, OpenExplanation] = {}
+    most = -inf
     for explanation in {e.names: e for e in needed}.values():
-        told = find_large_members(explanation, rules)
-        # a run that does not count may leave another explanation as good as the best, and no better
+        told = find_shared_members(grams, explanation, rules)
+        # what the runs disagree about may leave another explanation as good as the best, and no better
         against = min(-compare_explanations(grams, ranked[0], explanation, rules.signature_error), 0.0)
+        most = max(most, against)
+        if not told and any(is_surely_large(explanation, m, rules) for m in explanation.members):
+            continue  # it holds something, and nothing that may be named
         known = by_told.get(frozenset(m.name for m in told))
         if known is None or against > known.log_odds:
             found = OpenExplanation(explanation=explanation, told=told, log_odds=against)
             by_told[found.names] = found
-    span = log(rules.named_odds)
-    most = max(found.log_odds for found in by_told.values())
-    within = [found for found in by_told.values() if found.log_odds >= most - span]
+    within = [found for found in by_told.values() if found.log_odds >= most - log(rules.named_odds)]
+    if not within:
+        return [OpenExplanation(explanation=ranked[0], told=(), log_odds=0.0)]
     best = max(within, key=lambda found: (found.log_odds, found.explanation.log_odds))
     # what an effect of the library explains as well is no form
     laws = [
         f
         for f in by_told.values()
-        if f.told and _has_form(best) > _has_form(f) and _explains_as_much(f.explanation, best.explanation, rules)
+        if f.told
+        and _has_form(best) > _has_form(f)
+        and _explains_as_much(grams, f.explanation, best.explanation, rules)
     ]  # fmt: skip
-    simplest = min(
-        [f for f in within if not f.told] or laws or [f for f in within if f.names <= best.names],
-        key=lambda found: (len(found.names), -found.log_odds, -found.explanation.log_odds),
-    )
+    whole = min(laws, key=_rank_simplest) if laws else best
+    # a member whose odds do not speak for it is not told
+    parts = [f for f in within if f.names <= whole.names]
+    simplest = min([f for f in within if not f.told] or parts or [whole], key=_rank_simplest)
     apart = [f for f in within if not f.numbers >= simplest.numbers and not _holds_again(f, simplest)]
     # of explanations that add to one another the simplest stands for all
     others = [f for f in apart if not any(g.names < f.names for g in apart)]
@@ -156,6 +196,11 @@ def list_open_explanations(
         OpenExplanation(explanation=f.explanation, told=f.told, log_odds=f.log_odds - simplest.log_odds)
         for f in (simplest, *others)
     ]
+
+
+def _rank_simplest(opened: OpenExplanation) -> tuple[int, float, float]:
+    """Return by what the simplest of explanations comes first, and of those the best."""
+    return len(opened.names), -opened.log_odds, -opened.explanation.log_odds
 
 
 def _has_form(opened: OpenExplanation) -> bool:
@@ -169,9 +214,9 @@ def _holds_again(other: OpenExplanation, first: OpenExplanation) -> bool:
     return any(can_stand_for(form, member) for form in forms for member in known)
 
 
-def _explains_as_much(plain: Explanation, best: Explanation, rules: DecisionRules) -> bool:
+def _explains_as_much(grams: RunGrams, plain: Explanation, best: Explanation, rules: DecisionRules) -> bool:
     """Whether all runs together leave an explanation open beside the best one, however its size scatters over them."""
     prior = sum(m.log_prior for m in best.members) - sum(m.log_prior for m in plain.members)
-    return temper_odds(best.gain - plain.gain + prior, best.gain, rules.signature_error) <= log(
-        rules.named_odds
-    )
+    shared = find_shared_gain(grams, plain, best)
+    odds = temper_odds(best.gain - plain.gain + prior, best.gain, shared, rules.signature_error)
+    return odds <= log(rules.named_odds)

@@ -6,14 +6,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
+from tasks.campaign.campaign import CHANNELS, FILE_NUMBERS, Campaign
 from tasks.identification.decision.answer import NamedEffect, OpenOdds, Verdict, find_kind
 from tasks.identification.decision.correlation import correlate_residual_with_pressure
 from tasks.identification.decision.experiment import Experiment, plan_next_experiment
 from tasks.identification.decision.held_out import compute_held_out_errors
-from tasks.identification.decision.log_faults import tell_log_faults
+from tasks.identification.decision.log_faults import tell_inputs, tell_log_faults
 from tasks.identification.decision.missed import tell_miss
-from tasks.identification.decision.naming import find_detectable_sizes, fit_told, name_members
+from tasks.identification.decision.naming import (
+    find_detectable_sizes,
+    fit_told,
+    list_calibrated,
+    name_members,
+    settle_told,
+)
 from tasks.identification.decision.odds import find_odds, measure_disagreement
 from tasks.identification.decision.search import Finding, find_explanations
 from tasks.identification.decision.told import OpenExplanation, list_open_explanations, tell_members
@@ -24,14 +30,14 @@ from tasks.identification.decision.words import (
     tell_open_explanations,
     tell_present_effects,
 )
-from tasks.identification.inference.driver import begin_at_brake, measure_drive
+from tasks.identification.inference.driver import leave_out_driving
 from tasks.identification.inference.fit import Fit
-from tasks.identification.inference.forward import RunModel, predict_channels, prepare_run
+from tasks.identification.inference.forward import RunModel, predict_channels
 from tasks.identification.inference.hypothesis import compose_parameters
+from tasks.identification.inference.start import widen_tolerances
 from tasks.identification.rules import DecisionRules
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import Effect
-from tasks.vehicle.effects.table import EFFECT_TABLE
 from tasks.vehicle.parameters import Vehicle
 
 MOST_TRIED = 6
@@ -84,12 +90,9 @@ def judge_runs(
     library : effects that may be named
     rules : by which it is decided
     """
-    drive = measure_drive(
-        [prepare_run(run, vehicle, surface) for run in campaign.train], np.zeros(len(EFFECT_TABLE)), (),
-        rules.joint.brake_onset_share,
-    )  # fmt: skip
-    driven = drive > rules.joint.driven_acceleration
-    runs = begin_at_brake(campaign, vehicle, surface, rules.joint.brake_onset_share) if driven else campaign
+    runs, drive = leave_out_driving(
+        widen_tolerances(campaign, vehicle, surface, rules), vehicle, surface, rules
+    )
     finding = find_explanations(runs, vehicle, surface, library, rules)
     opened = list_open_explanations(finding.grams, finding.explanations, rules)
     disagreement = measure_disagreement(finding.grams, opened[0].explanation)
@@ -97,8 +100,9 @@ def judge_runs(
     if foreign:
         nothing = next(e for e in finding.explanations if not e.members)
         opened = [OpenExplanation(explanation=nothing, told=(), log_odds=0.0)]
+    opened, fitted = settle_told(finding, opened, rules)
     first, *others = opened
-    fitted = fit_told(finding, first)
+    evidence = finding.evidence
     named = name_members(first, finding.grams, fitted)
     rivals = _list_rivals(first, others, finding)
     tried = _list_tried(finding, first)
@@ -108,14 +112,14 @@ def judge_runs(
         reasons.append(why)
     elif not named:
         reasons += say_not_named(tried, finding.best, tell_members(finding.grams, finding.best, rules), rules)
-    reasons += [tell_driven(drive)] if driven else []
+    reasons += tell_inputs(campaign, evidence.train)
+    reasons += [tell_driven(drive)] if drive else []
     reasons += tell_log_faults(campaign, named, [rival.name for _, rival in rivals])
     reasons += tell_present_effects(vehicle)
     error, manoeuvres = compute_held_out_errors(finding, fitted, rules)
-    evidence = finding.evidence
-    theta, slots = compose_parameters(fitted.parts, fitted.values, np.zeros(len(SESSION)))
+    theta, slots = compose_parameters(fitted.parts, fitted.values, np.zeros(len(FILE_NUMBERS)))
     pulls = zip(
-        SESSION,
+        FILE_NUMBERS,
         finding.null.session / evidence.session_sigma,
         fitted.session / evidence.session_sigma,
         strict=True,
@@ -141,13 +145,16 @@ def judge_runs(
         split_hash=campaign.split_hash,
         theta=theta,
         slots=slots,
-        experiment=None if foreign else _plan(finding, fitted, others, vehicle, surface),
+        experiment=None if foreign else _plan(finding, fitted, opened, vehicle, surface),
         step_sensitive=evidence.step_sensitive,
         reasons=tuple(reasons),
         disagreement=why,
     )
-    verdict = tell_miss(verdict, campaign, rules.joint.foreign_misfit)
-    return Outcome(verdict=verdict, finding=finding, opened=tuple(opened), fitted=fitted)
+    verdict = tell_miss(verdict, rules.foreign_misfit)
+    calibrated = list_calibrated(fitted, named, library, rules.hardly_known_tolerance)
+    return Outcome(
+        verdict=verdict, finding=finding, opened=tuple(opened), fitted=fitted, calibrated=tuple(calibrated)
+    )
 
 
 def _list_rivals(
@@ -183,17 +190,16 @@ def _list_tried(finding: Finding, first: OpenExplanation) -> list[NamedEffect]:
 def _plan(
     finding: Finding,
     fitted: Fit,
-    others: Sequence[OpenExplanation],
+    opened: Sequence[OpenExplanation],
     vehicle: Vehicle,
     surface: SurfaceParameters,
 ) -> Experiment | None:
     """Return the run that tells the first explanation from its closest rival, or what is suggested from nothing."""
-    if others:
-        names = frozenset(part.name for part in fitted.parts)
-        told = (sorted(names - others[0].names), sorted(others[0].names - names))
-        between = tuple(" and ".join(own) or "nothing" for own in told)
-        pair = (fitted, fit_told(finding, others[0]))
-    elif fitted.parts:
+    if len(opened) > 1:
+        first, other = (explanation.names for explanation in opened[:2])
+        between = tuple(" and ".join(sorted(own)) or "nothing" for own in (first - other, other - first))
+        pair = (fitted, fit_told(finding, opened[1]))
+    elif opened[0].told:
         return None
     else:
         suggested = _find_suggested(finding)

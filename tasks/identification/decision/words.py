@@ -3,19 +3,30 @@
 from collections.abc import Iterable, Mapping, Sequence
 from math import log
 
-from tasks.identification.decision.answer import ChannelError, NamedEffect
+from tasks.identification.decision.answer import ChannelError, NamedEffect, OpenOdds, Verdict
 from tasks.identification.decision.candidates import Candidate
 from tasks.identification.decision.held_out import is_lowered
-from tasks.identification.decision.odds import Explanation, find_odds
+from tasks.identification.decision.odds import ALONG_ROAD, PORT_OF_NUMBER, Explanation, find_odds
 from tasks.identification.decision.told import OpenExplanation
 from tasks.identification.inference.hypothesis import moves_speed
 from tasks.identification.rules import DecisionRules
-from tasks.vehicle.effects.library import Effect, say_number
+from tasks.vehicle.effects.library import Effect, say_interval, say_number
 from tasks.vehicle.parameters import Vehicle
+
+MOST_WORDS = 30
+"""Words of a first sentence [1]."""
+LATE = {"pressure_rate", "time"}
+"""Variables of a late brake."""
+SAID_OF_PORTS = {
+    frozenset({"friction"}): "the tyres grip otherwise than the model's",
+    frozenset({"suspension_force", "pitch_moment"}): "the body moves otherwise than the model's",
+    frozenset({"sensor"}): "an instrument reads otherwise than the car moves",
+}
+"""What is said of effects that act at the same ports."""
 
 
 def say_effect(effect: NamedEffect, library: Sequence[Effect]) -> str:
-    """Return what a named effect says of the car.
+    """Return what a named effect says of the car, with the intervals of its numbers.
 
     Parameters
     ----------
@@ -24,59 +35,55 @@ def say_effect(effect: NamedEffect, library: Sequence[Effect]) -> str:
     """
     known = next((e for e in library if e.name == effect.name), None)
     if known is not None:
-        return known.say({p.name: p.value for p in effect.parameters})
+        return known.say(
+            {p.name: p.value for p in effect.parameters},
+            {p.name: (p.ci_low, p.ci_high) for p in effect.parameters if p.ci_low < p.ci_high},
+        )
     port, variable = (name.replace("_", " ") for name in (effect.port, effect.variable))
     return f"the {port} depends on {variable} in a way that no effect of the library has"
 
 
 def tell_verdict(
-    effects: Sequence[NamedEffect],
-    rivals: Sequence[NamedEffect],
+    verdict: Verdict,
     library: Sequence[Effect],
-    error: Mapping[str, ChannelError],
-    manoeuvres: Mapping[str, ChannelError],
     suggested: NamedEffect | None = None,
-    misses: bool = False,
     own: str = "",
+    force: float = 0.0,
 ) -> str:
-    """Return the verdict in plain words.
+    """Return the verdict in plain words; the first sentence has at most `MOST_WORDS` words.
 
     Parameters
     ----------
-    effects : that are named
-    rivals : that cannot be told from them
+    verdict : what is named, what stays open, and the errors on runs to which no number was fitted
     library : effects that may be named
-    error, manoeuvres : on runs to which no number was fitted
     suggested : the best candidate, if nothing is named
-    misses : whether the runs disagree with the model, and with what is named, by more than their noise
     own : what the vehicle's own numbers that the runs moved say of the car
+    force : mean deceleration by what not all open explanations name [m/s2]
     """
-    if not effects and suggested is not None:
-        return (
-            "These runs prove nothing that the model lacks. They suggest that"
-            f" {say_effect(suggested, library)}, at odds that are too small for a name."
-        )
+    effects, error, manoeuvres = verdict.effects, verdict.error, verdict.manoeuvre_error
+    misses = verdict.misses or bool(verdict.disagreement and not effects)
     if not effects:
         nothing = (
             "The model misses these runs by more than their noise, and nothing that can be named explains it"
             if misses
             else "These runs show nothing that the model lacks"
         )
+        if suggested is not None:
+            nothing = (
+                "These runs prove nothing that the model lacks. They suggest that"
+                f" {say_effect(suggested, library)}, at odds that are too small for a name"
+            )
         if not own or not is_lowered(error["speed"]) or not _is_told_apart(error["speed"]):
             return f"{nothing}."
         return (
-            f"{nothing}; its own numbers, fitted to these runs ({own}), take the error"
+            f"{nothing}. Its own numbers, fitted to these runs ({own}), take the error"
             f" {_say_errors({'speed': error['speed'], **manoeuvres})}, on runs to which no number was fitted."
         )
-    told = [say_effect(effect, library) for effect in effects]
-    text = join_phrases(told)
-    # a form of another shape at the same port reads the same, and one effect may be the rival of two names
-    said = dict.fromkeys(say_effect(rival, library) for rival in rivals)
-    others = [other for other in said if other not in told]
-    if others:
-        choice = others[0] if len(others) == 1 else f"one of {len(others)} other explanations holds"
-        place = "" if len(told) == 1 else " in the place of one of these"
-        text += f", or {choice}{place}, which these runs cannot tell apart"
+    text = (
+        _tell_open(verdict, library, force)
+        if verdict.rivals
+        else _tell_in_sentences([say_effect(effect, library) for effect in effects])
+    )
     figures = {"speed": error["speed"], **manoeuvres}
     if not any(moves_speed(effect.effect_class, effect.variable) for effect in effects):
         # an instrument's own channel says what its error does; the car moves as before
@@ -90,7 +97,72 @@ def tell_verdict(
     rest = " The speed is still missed by more than its noise: more is lacking than that." if misses else ""
     beside = f"With the vehicle's own numbers fitted too ({own}), that " if own else "That "
     done = f"{beside}{_say_change(figures)}, on runs to which no number was fitted."
-    return f"{text[0].upper()}{text[1:]}. {done}{rest}"
+    return f"{text} {done}{rest}"
+
+
+def list_unshared(effects: Sequence[NamedEffect], opened: Sequence[OpenOdds]) -> list[NamedEffect]:
+    """Return the named effects that not all open explanations name.
+
+    Parameters
+    ----------
+    effects : that are named
+    opened : all explanations that are open
+    """
+    return [effect for effect in effects if not all(_find_name(effect) in other.names for other in opened)]
+
+
+def _find_name(effect: NamedEffect) -> str:
+    """Return the name under which an explanation holds an effect: a form there has no shape."""
+    return f"form {effect.port}({effect.variable})" if effect.effect_class == "form" else effect.name
+
+
+def _tell_open(verdict: Verdict, library: Sequence[Effect], force: float) -> str:
+    """Return sentences on a set: what all its explanations share, then each of them with its odds."""
+    effects, rivals, opened = verdict.effects, [rival for _, rival in verdict.rivals], verdict.odds
+    left = list_unshared(effects, opened)
+    shared = [say_effect(effect, library) for effect in effects if effect not in left]
+    known = {_find_name(effect): effect for effect in (*rivals, *effects)}
+    told = [[known[name] for name in other.names] for other in opened]
+    # a form of another shape at the same port reads the same
+    said: dict[str, float] = {}
+    for own, other in zip(told, opened, strict=True):
+        if rest := [effect for effect in own if effect not in effects or effect in left]:
+            said.setdefault(join_phrases(say_effect(effect, library) for effect in rest), other.odds)
+    if len(said) < 2:
+        return _tell_in_sentences([say_effect(effect, library) for effect in effects])
+    common = _say_common([e for own in told for e in own if e not in effects or e in left], left, force)
+    nothing = f"These runs show something that the model lacks, and leave {len(said)} explanations open."
+    first = _tell_in_sentences([*shared, *common]) or nothing
+    listed = "; or ".join(f"{phrase} ({say_number(odds)} : 1)" for phrase, odds in said.items())
+    return f"{first} They cannot tell apart: {listed}."
+
+
+def _say_common(rest: Sequence[NamedEffect], left: Sequence[NamedEffect], force: float) -> list[str]:
+    """Return what effects that stand in for one another have in common, as at most one phrase."""
+    ports = {PORT_OF_NUMBER.get(effect.name, effect.port) for effect in rest}
+    if ports == {"brake_torque"} and {effect.variable for effect in rest} <= LATE:
+        return ["the brakes answer late, whatever the law"]
+    if ports <= ALONG_ROAD and force:
+        way = "holds the car back" if force > 0.0 else "pushes the car on"
+        interval = None
+        if len(left) == 1 and left[0].effect_class != "form":
+            number = left[0].parameters[0]
+            ends = sorted(abs(force) * end / number.value for end in (number.ci_low, number.ci_high))
+            interval = (ends[0], ends[1])
+        return [f"a further {say_interval(abs(force), interval)} m/s2 on average {way}, whatever its law"]
+    return [
+        f"{phrase}, whatever the law" for group, phrase in SAID_OF_PORTS.items() if ports and ports <= group
+    ]
+
+
+def _tell_in_sentences(phrases: Sequence[str]) -> str:
+    """Return phrases as one sentence, or as two where one would be too long; none is no sentence."""
+    first = list(phrases)
+    while len(first) > 1 and len(join_phrases(first).split()) > MOST_WORDS:
+        first.pop()
+    rest = phrases[len(first) :]
+    said = [join_phrases(part) for part in (first, rest) if part]
+    return " ".join(f"{text[0].upper()}{text[1:]}." for text in said)
 
 
 def _is_told_apart(error: ChannelError) -> bool:

@@ -39,5 +39,5 @@ class Evidence:
 
     @property
     def session_sigma(self) -> NDArray[np.float64]:
-        """Return the prior sigmas of the session, float64 [7]."""
-        return np.array(self.tolerances.session)
+        """Return the prior sigmas of the session, float64 [8]."""
+        return np.array(self.tolerances.file_numbers)

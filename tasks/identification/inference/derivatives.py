@@ -30,8 +30,8 @@ from tasks.vehicle.model.simulation import Simulation
 
 SECOND_SHARES = (0.3, 0.6)
 """Shares of the range of an effect's second parameter at which it is tried, besides its first value."""
-LARGEST_STEP = 0.02
-"""Largest step of a number of the session: a car that stops sooner stands where the other still brakes [1]."""
+STEPS = (5e-4, 0.02)
+"""Smallest and largest step of a number of the file: a car that stops sooner stands where another brakes [1]."""
 KNOT_STEP = (30.0, 0.01, 30.0)
 """Step of a knot at each disturbed port [N, 1, N m]."""
 Quotient = Callable[..., NDArray[np.float64]]
@@ -84,11 +84,10 @@ def differentiate_run(
                 values=np.array([0.0, step, 0.0]),
             )
             columns.append(compute_quotient(base, step, (slot,), branch=(first, simulated)))
+    steps = np.clip(0.5 * np.array(tolerances.file_numbers), *STEPS)
     session = [
         compute_quotient(_shift_parameter(base, i, step), step)
-        for i, step in zip(
-            SESSION_INDEX, np.minimum(0.5 * np.array(tolerances.session), LARGEST_STEP), strict=True
-        )
+        for i, step in zip(SESSION_INDEX, steps, strict=True)
     ]
     nuisance = whiten_channels(np.stack(columns, axis=-1), rho, sigma, model.sampled)
     evidence = RunEvidence(

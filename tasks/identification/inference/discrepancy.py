@@ -22,6 +22,9 @@ from tasks.identification.inference.noise import (
     whiten_channels,
 )
 
+MOST_CORRELATION = 0.98
+"""Correlation from sample to sample beyond which more is not told apart: 99 samples then count as one [1]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class RunNoise:
@@ -87,6 +90,6 @@ def _estimate_noise(run: RunEvidence, point: LinearisedRun, evidence: Evidence) 
         own = slice(None) if run.model.sampled is None else run.model.sampled[:, c]
         if float(np.mean(white[own, c] ** 2)) > evidence.rules.discrepancy_limit:
             e = error[own, c]
-            rho[c] = max(correlate_with_next(e, evidence.rules.joint.most_residual_correlation), rho[c])
+            rho[c] = max(correlate_with_next(e, MOST_CORRELATION), rho[c])
             sigma[c] = max(float(np.sqrt(np.mean(e**2))), sigma[c])
     return RunNoise(rho=rho, sigma=sigma)

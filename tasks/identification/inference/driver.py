@@ -1,24 +1,28 @@
-"""A driver who holds his speed until he brakes: told by the speed before the brake, which is then left out.
+"""What drove the car before the brake, where no engine torque was logged: that part of a run is left out.
 
-Without a throttle or an engine torque in the log nobody knows what drove the car there. Taken for coasting, it hides a
-resistance, or makes it fit the stop alone.
+With a throttle in the log a run begins where it closes. Without one a driver who holds his speed until he brakes is
+told by that speed. Taken for coasting, it hides a resistance, or makes it fit the stop alone.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.campaign import CHANNELS, Campaign, Run
+from tasks.campaign.campaign import CHANNELS, LEAST_SAMPLES, Campaign, Run
 from tasks.identification.inference.forward import RunModel, predict_channels, prepare_run
+from tasks.identification.rules import DecisionRules
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.slots import Slot
+from tasks.vehicle.effects.table import EFFECT_TABLE
 from tasks.vehicle.parameters import Vehicle
 
 LIFT = 0.2
 """Time in which a driver lifts the throttle, centred on the brake where no throttle was measured [s]."""
 SPEED = CHANNELS.index("speed")
+FEWEST_SAMPLES, SURE = 5, 4.0
+"""Samples before the brake whose slope says something, and its standard errors, for noise that remembers [1]."""
 
 
 def find_brake_onset(model: RunModel, share: float) -> int:
@@ -37,7 +41,9 @@ def find_brake_onset(model: RunModel, share: float) -> int:
 def measure_drive(
     models: Sequence[RunModel], theta: NDArray[np.float64], slots: tuple[Slot, ...], share: float
 ) -> float:
-    """Return the acceleration before the brake that a model leaves open, over all runs on a flat road [m/s2].
+    """Return the acceleration before the brake beyond a model's, root mean square over all runs on a flat road [m/s2].
+
+    One that is not surely positive counts as none: what a model lacks slows the car down.
 
     Parameters
     ----------
@@ -46,16 +52,45 @@ def measure_drive(
     slots : forms
     share : of a run's largest pressure from which its driver brakes [1]
     """
-    moment = spread = 0.0
+    drives, spreads = [], []
     for model in models:
         onset = find_brake_onset(model, share)
-        if onset in (0, model.samples) or model.run.hazard_length > 0.0:
+        if onset < FEWEST_SAMPLES or onset == model.samples or model.run.hazard_length > 0.0:
             continue
         before = replace(model, samples=onset)
         residual = before.measured[:, SPEED] - predict_channels(before, theta, slots=slots)[:, SPEED]
         time = (np.arange(onset) - 0.5 * (onset - 1)) * model.run.interval
-        moment, spread = moment + float(time @ residual), spread + float(time @ time)
-    return moment / spread if spread > 0.0 else 0.0
+        spread = float(time @ time)
+        drive = float(time @ residual) / spread
+        error = float(np.std(residual - drive * time)) / np.sqrt(spread)
+        drives.append(drive if drive > SURE * error else 0.0)
+        spreads.append(spread)
+    return float(np.sqrt(np.average(np.square(drives), weights=spreads))) if drives else 0.0
+
+
+def leave_out_driving(
+    campaign: Campaign, vehicle: Vehicle, surface: SurfaceParameters, rules: DecisionRules
+) -> tuple[Campaign, float]:
+    """Return a campaign without the parts of its runs in which an engine drove the car that nobody measured.
+
+    Parameters
+    ----------
+    campaign : measured runs
+    vehicle, surface : the model as it stands
+    rules : when a throttle is closed, a driver brakes, and a car is driven
+
+    Returns
+    -------
+    The campaign, and the acceleration before the brake if a driver without a throttle in the log held his speed, else 0
+    [m/s2].
+    """
+    share = rules.brake_onset_share
+    runs = _keep_parts(campaign.runs, lambda run: _find_closed_throttle(run, vehicle, surface, rules))
+    models = [prepare_run(r, vehicle, surface) for r in runs if not r.held_out and r.throttle is None]
+    drive = measure_drive(models, np.zeros(len(EFFECT_TABLE)), (), share)
+    if drive <= rules.driven_acceleration:
+        return replace(campaign, runs=runs), 0.0
+    return begin_at_brake(replace(campaign, runs=runs), vehicle, surface, share), drive
 
 
 def begin_at_brake(
@@ -70,11 +105,36 @@ def begin_at_brake(
     share : of a run's largest pressure from which its driver brakes [1]
     """
 
-    def begin(run: Run) -> Run:
+    def find_stop(run: Run) -> tuple[int, int]:
         model = prepare_run(run, vehicle, surface)
         onset = find_brake_onset(model, share)
-        if onset == model.samples or run.hazard_length > 0.0:
-            return run
-        return run.begin_at(max(onset - round(0.5 * LIFT / run.interval), 0))
+        if onset == model.samples or run.throttle is not None:
+            return 0, len(run.pressure)
+        return max(onset - round(0.5 * LIFT / run.interval), 0), len(run.pressure)
 
-    return replace(campaign, runs=tuple(begin(run) for run in campaign.runs))
+    return replace(campaign, runs=_keep_parts(campaign.runs, find_stop))
+
+
+def _keep_parts(runs: Sequence[Run], find_part: Callable[[Run], tuple[int, int]]) -> tuple[Run, ...]:
+    """Return runs cut to a part of them; one that is too short then, or crosses a road feature, stays whole."""
+    kept = []
+    for run in runs:
+        first, end = find_part(run) if run.hazard_length == 0.0 else (0, len(run.pressure))
+        whole = (first, end) == (0, len(run.pressure)) or end - first < LEAST_SAMPLES
+        kept.append(run if whole else replace(run.begin_at(first, end), speed_before=run.speed[:first]))
+    return tuple(kept)
+
+
+def _find_closed_throttle(
+    run: Run, vehicle: Vehicle, surface: SurfaceParameters, rules: DecisionRules
+) -> tuple[int, int]:
+    """Return the first sample from which the throttle is closed until the brake, and that behind which it opens again.
+
+    A blip of the throttle while the driver changes down is part of the stop.
+    """
+    if run.throttle is None or run.drive_torque is not None:
+        return 0, len(run.pressure)
+    onset = find_brake_onset(prepare_run(run, vehicle, surface), rules.brake_onset_share)
+    closed = run.throttle <= rules.closed_throttle
+    opened, shut = np.flatnonzero(~closed[:onset]), np.flatnonzero(closed)
+    return int(opened[-1]) + 1 if opened.size else 0, int(shut[-1]) + 1 if shut.size else 0

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 
-from tasks.campaign.campaign import CHANNELS, SESSION, Tolerances
+from tasks.campaign.campaign import CHANNELS, FILE_NUMBERS, Tolerances
 from tasks.identification.inference.disturbance import (
     ACCELERATION_BIAS,
     DISTURBED,
@@ -34,7 +34,7 @@ from tasks.identification.inference.noise import whiten_channels
 from tasks.vehicle.effects.slots import Slot
 from tasks.vehicle.effects.table import PARAMETER_INDEX
 
-SESSION_INDEX = tuple(PARAMETER_INDEX[name] for name in SESSION)
+SESSION_INDEX = tuple(PARAMETER_INDEX[name] for name in FILE_NUMBERS)
 DIVERGED = 1e6
 """Reading beyond which a simulation diverges, in the unit of any channel."""
 BROKEN = 1e4
@@ -105,6 +105,21 @@ class RunEvidence:
         y[:, CHANNELS.index("longitudinal_acceleration")] += offsets[ACCELERATION_BIAS]
         y[:, CHANNELS.index("pitch")] += offsets[PITCH_OFFSET]
         return whiten_channels(self.model.measured - y, self.rho, self.sigma, self.model.sampled)
+
+    def place(
+        self, theta: NDArray[np.float64], slots: tuple[Slot, ...], offsets: NDArray[np.float64]
+    ) -> tuple[RunModel, NDArray[np.float64], tuple[Slot, ...]]:
+        """Return the run, the parameters and the forms that have its own offsets in them.
+
+        Parameters
+        ----------
+        theta : float64 [len(EFFECT_TABLE)] all parameters [units of the table]
+        slots : forms
+        offsets : float64 [D] the run's offsets and disturbance knots
+        """
+        faster = offsets[INITIAL_SPEED] * (1.0 + float(theta[PARAMETER_INDEX["speed_scale"]]))
+        model = replace(self.model, initial_speed=self.model.initial_speed + faster)
+        return model, *move_by_offsets(theta, slots, offsets, self.knots)
 
     def add_offsets(self, residual: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return a residual with the linear part of the run's own offsets and disturbances, float64 [M].

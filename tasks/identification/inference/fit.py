@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.campaign import SESSION
+from tasks.campaign.campaign import FILE_NUMBERS
 from tasks.identification.inference.evidence import SESSION_INDEX, RunEvidence
 from tasks.identification.inference.hypothesis import Hypothesis, compose_parameters
 from tasks.identification.inference.linearisation_points import (
@@ -16,6 +16,7 @@ from tasks.identification.inference.linearisation_points import (
     move_linearisation_points,
 )
 from tasks.vehicle.effects.slots import Slot
+from tasks.vehicle.effects.table import PARAMETERS
 
 HELD = 1e18
 """Prior precision that holds a nuisance at 0."""
@@ -24,6 +25,10 @@ MISSED = 0.3
 
 SETTLED = 1.0
 """Fall of the misfit that a fit no longer seeks: half a unit of log likelihood [1]."""
+LIMITS = tuple(
+    np.array([getattr(PARAMETERS[name], end) for name in FILE_NUMBERS]) for end in ("lower", "upper")
+)
+"""Bounds of the numbers of the file, float64 [8] each."""
 TRIALS = ((1.0, True), (0.4, True), (1.0, False), (0.4, False), (0.16, False), (0.064, False))
 """Shares of a step that are tried, and whether the runs' own offsets move with it."""
 
@@ -39,12 +44,12 @@ class Fit:
     ----------
     parts : the hypotheses, in the order of the parameters
     values : float64 [K] all parameters [their units]
-    session : float64 [7] session nuisances
-    session_sigma : float64 [7] their prior sigmas
+    session : float64 [8] session nuisances
+    session_sigma : float64 [8] their prior sigmas
     objective : sum over runs of the marginalised misfit, plus the session's prior term
     by_run : float64 [R] misfit of each run without the session's prior
     covariance : float64 [K, K] of the parameters, session marginalised
-    session_error : float64 [7] standard deviations of the session's nuisances, parameters marginalised
+    session_error : float64 [8] standard deviations of the session's nuisances, parameters marginalised
     residuals : whitened residual of each run at the fit
     offsets : float64 [D] each, the run's own offsets about which its residual is linearised
     """
@@ -66,7 +71,7 @@ class Fit:
 
     @property
     def pulls(self) -> NDArray[np.float64]:
-        """Return how far each number of the session is pulled, in its prior sigmas and either way, float64 [7]."""
+        """Return how far each number of the session is pulled, in its prior sigmas and either way, float64 [8]."""
         return np.asarray(np.abs(self.session) / self.session_sigma)
 
 
@@ -96,7 +101,7 @@ def fit_hypotheses(
     ----------
     evidence : the runs
     parts : hypotheses; without any, the session alone is fitted
-    session_sigma : float64 [7] prior sigmas of the session
+    session_sigma : float64 [8] prior sigmas of the session
     values, session, offsets : start of the fit; by default the hypotheses' first values, 0 and 0
     iterations : largest number of Gauss-Newton steps
     """
@@ -104,11 +109,12 @@ def fit_hypotheses(
         np.concatenate([np.empty(0), *(getattr(p, field) for p in parts)])
         for field in ("lower", "upper", "step", "start")
     )
+    least, most = (np.concatenate((own, limit)) for own, limit in zip((lower, upper), LIMITS, strict=True))
     x = first if values is None else values.copy()
     s = np.zeros(len(SESSION_INDEX)) if session is None else session.copy()
     prior = 1.0 / np.square(session_sigma)
     # a free parameter that is also a session nuisance is the same number: the nuisance stays at 0
-    taken = [SESSION.index(name) for part in parts for name in part.names if name in SESSION]
+    taken = [FILE_NUMBERS.index(name) for part in parts for name in part.names if name in FILE_NUMBERS]
     s[taken], prior[taken] = 0.0, HELD
     k = len(x)
     points = (
@@ -135,11 +141,13 @@ def fit_hypotheses(
         for run, point, (columns, q) in zip(evidence, here.points, slopes, strict=True):
             # the offsets' linear part N d of the residual: columns' N = q' factor'
             right += columns.T @ point.residual + q.T @ (run.factor.T @ point.offsets - point.projected)
-        move = _compute_gauss_newton_step(normal, right, here.values, lower, upper)
+        move = _compute_gauss_newton_step(
+            normal, right, np.concatenate((here.values, here.session)), least, most
+        )
         foreseen = float(move @ right)
         if foreseen < 0.1 and abs(fell) < 3.0:
             break
-        there = _step_along(evidence, parts, here, move, slopes, foreseen, (lower, upper), prior)
+        there = _step_along(evidence, parts, here, move, slopes, foreseen, (least, most), prior)
         if there is None:
             break
         fell, here = here.misfit - there.misfit, there
@@ -184,7 +192,8 @@ def _step_along(
     for share, together in TRIALS:
         if share * (2.0 - share) * foreseen < SETTLED and share < 1.0:
             continue
-        x, s = np.clip(here.values + share * move[:k], *bounds), here.session + share * move[k:]
+        there = np.clip(np.concatenate((here.values, here.session)) + share * move, *bounds)
+        x, s = there[:k], there[k:]
         own = tuple(
             point.offsets + share * together * (d - point.offsets)
             for point, d in zip(here.points, ahead, strict=True)
@@ -241,7 +250,7 @@ def _compute_gauss_newton_step(
     lower: NDArray[np.float64],
     upper: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return the Gauss-Newton step of parameters and session, without parameters that press against a bound."""
+    """Return the Gauss-Newton step of parameters and session, float64 [K], without those that press against a bound."""
     k = len(x)
     free = np.ones(len(right), dtype=bool)
     move = np.zeros(len(right))

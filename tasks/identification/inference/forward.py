@@ -19,8 +19,9 @@ from tasks.vehicle.model.chassis import Conditions
 from tasks.vehicle.model.simulation import Recording, Simulation, simulate
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle, compute_surface_response
 
-LEAD, LEAST_LEAD = 1.0, 5
-"""Time before the brake whose line gives the speed at the first sample [s], and its fewest samples [1]."""
+LEAD, LEAST_LEAD, DRIVEN_LEAD = 1.0, 5, 0.3
+"""Time before the brake whose line gives the speed at the first sample [s], its fewest samples [1], and the time before
+a run that begins where a driver lifted his foot [s]."""
 STEP = 0.002
 """Longest integration step [s]; `compute_step_misfit` checks it by halving."""
 
@@ -126,7 +127,9 @@ def prepare_run(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunMo
     samples = find_motion(speed)[1]
     pressed = np.flatnonzero(run.pressure > 0.1)
     lead = min(round(LEAD / run.interval), int(pressed[0]) if pressed.size else samples)
-    lead = min(max(lead, LEAST_LEAD), samples)
+    before = run.speed_before if run.speed_before is not None else np.empty(0)
+    before = before[-max(round(DRIVEN_LEAD / run.interval), LEAST_LEAD) :]
+    lead = min(max(lead, LEAST_LEAD - len(before)), samples)
     return RunModel(
         run=replace(run, pressure=zero_pressure_at_rest(run.pressure)),
         vehicle=vehicle,
@@ -135,7 +138,9 @@ def prepare_run(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunMo
             hazard=hazard, snow_depth_mm=state.snow_depth_mm, direction=run.direction, disc_rise=run.disc_rise
         ),
         samples=samples,
-        initial_speed=float(np.polyfit(np.arange(lead), speed[:lead], 1)[1]),
+        initial_speed=float(
+            np.polyfit(np.arange(-len(before), lead), np.concatenate((before, speed[:lead])), 1)[1]
+        ),
     )
 
 

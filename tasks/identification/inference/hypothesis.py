@@ -87,11 +87,6 @@ def make_library_hypothesis(effect: Effect, start: float | None = None, second: 
     )
 
 
-def is_nested(small: Hypothesis, large: Hypothesis) -> bool:
-    """Return whether every parameter of ``small`` is also one of ``large``."""
-    return set(small.names) < set(large.names)
-
-
 def compose_parameters(
     parts: tuple[Hypothesis, ...], values: NDArray[np.float64], session: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], tuple[Slot, ...]]:
@@ -101,7 +96,7 @@ def compose_parameters(
     ----------
     parts : hypotheses, in the order of the parameters
     values : float64 [K] their parameters [their units]
-    session : float64 [7] session nuisances
+    session : float64 [8] session nuisances
     """
     theta = np.zeros(len(EFFECT_TABLE))
     theta[list(SESSION_INDEX)] += session

@@ -19,10 +19,10 @@ from tasks.identification.inference.fit import Fit, fit_hypotheses
 from tasks.identification.inference.forward import RunModel, predict_channels, prepare_run
 from tasks.identification.inference.hypothesis import compose_parameters
 from tasks.identification.inference.noise import estimate_channel_noise, whiten_channels
+from tasks.identification.inference.start import estimate_session
 from tasks.identification.rules import DecisionRules
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.library import Effect
-from tasks.vehicle.effects.table import EFFECT_TABLE
 from tasks.vehicle.parameters import Vehicle
 
 BODY_CHANNELS = ("pitch", "pitch_rate", "vertical_acceleration")
@@ -30,6 +30,8 @@ SUSPENSION = ("pitch_gain", "damping", "stiffness")
 """Session nuisances that act on the body's motion only."""
 UNSEEN = 1e-3
 """Factor on the tolerance of a nuisance that no channel depends on, which keeps it at 0."""
+KNOWN = 0.04
+"""Most that a number of the session moves by one of its tolerances, in which its derivatives count [1]."""
 FREED = 20.0
 """Factor on the session's tolerances while the disturbances are scaled, so that they do not absorb a wrong number."""
 
@@ -55,17 +57,18 @@ def prepare_evidence(
     """
     rho, sigma = estimate_channel_noise(campaign)
     tolerances = _leave_out_unseen(campaign)
-    first = np.zeros(len(SESSION))
     guess = Disturbance()
     models = [
         prepare_run(replace(run, pressure=denoise_pressure(run.pressure)), vehicle, surface)
         for run in campaign.runs
     ]
+    first = estimate_session(campaign, [m for m in models if not m.run.held_out], rules)
+    base, session_sigma = compose_parameters((), np.empty(0), first)[0], np.array(tolerances.file_numbers)
 
     def select_models(held_out: bool) -> list[RunModel]:
         """Return the training or the held-out runs that are insensitive to the step; all if these are too few."""
         own = [m for m in models if m.run.held_out == held_out]
-        insensitive = [m for m in own if compute_step_misfit(m, rho, sigma) <= rules.step_misfit]
+        insensitive = [m for m in own if compute_step_misfit(m, base, rho, sigma) <= rules.step_misfit]
         return insensitive if len(insensitive) >= rules.fewest_runs else own
 
     def differentiate_runs(own: list[RunModel], base: NDArray[np.float64]) -> tuple[RunEvidence, ...]:
@@ -74,10 +77,10 @@ def prepare_evidence(
 
     train, held_out = select_models(False), select_models(True)
     used = [m.run.name for m in (*train, *held_out)]
-    base, session_sigma = compose_parameters((), np.empty(0), first)[0], np.array(tolerances.session)
     runs = differentiate_runs(train, base)
     null = fit_hypotheses(runs, (), session_sigma, session=first, iterations=6)
-    if np.max(null.pulls) > rules.relinearisation_pull:
+    known = np.minimum(session_sigma, KNOWN)
+    if np.max(np.abs(null.session - first) / known) > rules.relinearisation_pull:
         base = compose_parameters((), np.empty(0), null.session)[0]
         runs = differentiate_runs(train, base)
         null = fit_hypotheses(runs, (), session_sigma, session=null.session, iterations=6)
@@ -101,7 +104,9 @@ def _leave_out_unseen(campaign: Campaign) -> Tolerances:
     return replace(campaign.tolerances, session=tuple(session))
 
 
-def compute_step_misfit(model: RunModel, rho: NDArray[np.float64], sigma: NDArray[np.float64]) -> float:
+def compute_step_misfit(
+    model: RunModel, theta: NDArray[np.float64], rho: NDArray[np.float64], sigma: NDArray[np.float64]
+) -> float:
     """Return the misfit that halving the integration step alone makes [1].
 
     Runs that are sensitive to the step, such as those that stay near the threshold of the ABS, have a large one.
@@ -109,10 +114,10 @@ def compute_step_misfit(model: RunModel, rho: NDArray[np.float64], sigma: NDArra
     Parameters
     ----------
     model : the run
+    theta : float64 [len(EFFECT_TABLE)] parameters [units of the table]
     rho, sigma : channel noise
     """
-    plain = np.zeros(len(EFFECT_TABLE))
-    change = predict_channels(model, plain) - predict_channels(model, plain, refinement=2)
+    change = predict_channels(model, theta) - predict_channels(model, theta, refinement=2)
     return float(np.sum(whiten_channels(change, rho, sigma, model.sampled) ** 2))
 
 
@@ -132,6 +137,28 @@ def differentiate_at(evidence: Evidence, at: Fit) -> Evidence:
             differentiate_run(run.model, run.rho, run.sigma, theta, *here, slots) for run in evidence.train
         ),
     )
+
+
+def differentiate_about_offsets(evidence: Evidence, at: Fit) -> tuple[RunEvidence, ...]:
+    """Return the training runs with derivatives about a fit and about each run's own offsets there, without a library.
+
+    A run's own friction decides when its anti-lock brake acts: derivatives about an offset of 0 may tell many times too
+    much about the brake there.
+
+    Parameters
+    ----------
+    evidence : the runs
+    at : fit, the new linearisation point
+    """
+    theta, slots = at.compose()
+    runs = []
+    for run, offsets in zip(evidence.train, at.offsets, strict=True):
+        model, moved, forms = run.place(theta, slots, offsets)
+        fresh = differentiate_run(
+            model, run.rho, run.sigma, moved, (), evidence.tolerances, evidence.disturbance, forms
+        )
+        runs.append(replace(fresh, model=run.model, origin=offsets))
+    return tuple(runs)
 
 
 def rescale_disturbances(evidence: Evidence, disturbance: Disturbance) -> Evidence:
@@ -185,7 +212,7 @@ def fit_disturbance(
     ridge : float64 [K] precision of their priors
     """
     broad = [(30.0 * e.parameters[0].step) ** -2 for e in effects]
-    prior = np.concatenate((1.0 / np.square(FREED * np.array(tolerances.session)), broad, ridge))
+    prior = np.concatenate((1.0 / np.square(FREED * np.array(tolerances.file_numbers)), broad, ridge))
     blocks = []
     for run, r, columns in zip(evidence, residuals, splines, strict=True):
         b = np.column_stack((r, run.session, run.library, columns))

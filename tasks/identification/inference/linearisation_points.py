@@ -50,7 +50,7 @@ def linearise_runs(
     evidence : the runs
     parts : hypotheses, in the order of the parameters
     x : float64 [K] their parameters
-    s : float64 [7] session nuisances
+    s : float64 [8] session nuisances
     """
     points = linearise_at(evidence, parts, x, s, (None,) * len(evidence))
     for _ in range(SETTLING):
@@ -72,7 +72,7 @@ def move_linearisation_points(
     evidence : the runs
     parts : hypotheses, in the order of the parameters
     x : float64 [K] their parameters
-    s : float64 [7] session nuisances
+    s : float64 [8] session nuisances
     points : the points before the move
     """
     theta, slots = compose_parameters(parts, x, s)
@@ -107,7 +107,7 @@ def linearise_at(
     evidence : the runs
     parts : hypotheses, in the order of the parameters
     x : float64 [K] their parameters
-    s : float64 [7] session nuisances
+    s : float64 [8] session nuisances
     offsets : float64 [D] of each run; None is 0 everywhere
     """
     theta, slots = compose_parameters(parts, x, s)

@@ -16,6 +16,10 @@ INTEGRALS = tuple(
 )
 FEWEST_LAGS = 3
 """Lags at which the quiet parts must tell a channel's variogram: it has three unknowns [1]."""
+FEWEST_SAMPLES = 3 * LAGS[FEWEST_LAGS - 1]
+"""Samples of a channel that some run must exceed for that [1]."""
+LEAST_NOISE = np.array([0.01, 0.02, 0.03, 0.03, 0.005, 0.03, 0.03])
+"""Noise of a channel at the least: no model follows a car better, however quiet its sensors [unit of the channel]."""
 QUIET_PRESSURE = 0.1
 """Pressure at which the quiet part of a run ends [MPa]."""
 BEFORE_BRAKE, ON_HAZARD = 0.05, 0.4
@@ -45,6 +49,7 @@ def estimate_channel_noise(campaign: Campaign) -> tuple[NDArray[np.float64], NDA
         If a measured channel never changes, or the training runs are too short.
     """
     floor = np.where(campaign.is_measured, _compute_rounding_variance(campaign), np.inf)
+    floor[_find_copies(campaign)] = np.inf
     stretches = [stretch for run in campaign.train for stretch in _list_stretches(run)]
     problems = _find_problems(campaign, floor, _find_longest(stretches))
     if problems:
@@ -52,7 +57,7 @@ def estimate_channel_noise(campaign: Campaign) -> tuple[NDArray[np.float64], NDA
     variogram = np.maximum(_compute_variogram(stretches), floor)
     rho, sigma = np.zeros(len(CHANNELS)), np.zeros(len(CHANNELS))
     k = np.array(LAGS, dtype=np.float64)
-    for j in np.flatnonzero(campaign.is_measured):
+    for j in np.flatnonzero(np.isfinite(floor)):
         best, seen = np.inf, np.isfinite(variogram[:, j])
         for trial in np.arange(0.0, 0.95, 0.02):
             basis = (np.column_stack((1.0 - trial**k, k**2)) / variogram[:, j : j + 1])[seen]
@@ -60,7 +65,7 @@ def estimate_channel_noise(campaign: Campaign) -> tuple[NDArray[np.float64], NDA
             misfit = float(np.sum((basis @ (power, slow) - 1.0) ** 2))
             if misfit < best and power > 0 and slow > -0.05 * power:
                 best, rho[j], sigma[j] = misfit, trial, np.sqrt(power)
-    return rho, np.maximum(sigma, np.sqrt(floor))
+    return rho, np.maximum(np.maximum(sigma, np.sqrt(floor)), LEAST_NOISE)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,17 +153,25 @@ def _compute_rounding_variance(campaign: Campaign) -> NDArray[np.float64]:
     return np.where(np.isfinite(steps), steps, np.nan) ** 2 / 12
 
 
+def _find_copies(campaign: Campaign) -> list[int]:
+    """Return the channels that hold what another one does: one signal for both axles counts once."""
+    front, rear = (CHANNELS.index(f"wheel_speed_{axle}") for axle in ("front", "rear"))
+    both = campaign.is_measured[front] and campaign.is_measured[rear]
+    alike = both and all(np.array_equal(r.response[:, front], r.response[:, rear]) for r in campaign.train)
+    return [rear] if alike else []
+
+
 def _find_problems(campaign: Campaign, floor: NDArray[np.float64], longest: NDArray[np.int64]) -> list[str]:
     """Return a sentence for every reason why the noise cannot be estimated."""
     problems = [
         f"{campaign.name}: channel {CHANNELS[j]} must change; it holds one value in all training runs: record it anew"
         for j in np.flatnonzero(np.isnan(floor))
     ]
-    short = np.flatnonzero(campaign.is_measured & (longest <= 3 * LAGS[-1]))
+    short = np.flatnonzero(campaign.is_measured & (longest <= FEWEST_SAMPLES))
     if short.size:
         names = ", ".join(CHANNELS[j] for j in short)
         problems.append(
-            f"{campaign.name}: sensor noise is read from training runs, so one must hold more than {3 * LAGS[-1]}"
+            f"{campaign.name}: sensor noise is read from training runs, so one must hold more than {FEWEST_SAMPLES}"
             f" samples of each channel; the longest has {longest[short].min()} ({names}): lengthen the runs, or leave"
             " the channel out"
         )

@@ -42,15 +42,20 @@ class Effect:
         """Return the reference for the effect's equation."""
         return self.parameters[0].source
 
-    def say(self, values: Mapping[str, float]) -> str:
+    def say(
+        self, values: Mapping[str, float], intervals: Mapping[str, tuple[float, float]] | None = None
+    ) -> str:
         """Return the finding in plain words.
 
         Parameters
         ----------
         values : numbers of the effect by name; one that is not given has its first value [units of the table]
+        intervals : of numbers by name, said beside them [units of the table]
         """
         numbers = {p.name: p.start for p in self.parameters} | dict(values)
-        return self.says.format_map({name: _Said(value) for name, value in numbers.items()})
+        return self.says.format_map(
+            {name: _Said(value, (intervals or {}).get(name)) for name, value in numbers.items()}
+        )
 
 
 def say_number(number: float) -> str:
@@ -63,15 +68,37 @@ def say_number(number: float) -> str:
     return f"{number:.2g}" if abs(number) < 99.5 else f"{number:.0f}"
 
 
+def say_interval(number: float, interval: tuple[float, float] | None) -> str:
+    """Return a number with its interval, if there is one: 0.079 [0.077, 0.081].
+
+    Parameters
+    ----------
+    number : in any unit
+    interval : its lower and upper end [the same unit]
+    """
+    ends = "" if interval is None else f" [{', '.join(say_number(end) for end in interval)}]"
+    return f"{say_number(number)}{ends}"
+
+
 class _Said(float):
     """A number in a sentence: alone, as ``percent``, as a ``share`` above or below another, or as a ``fall``."""
 
+    interval: tuple[float, float] | None
+
+    def __new__(cls, value: float, interval: tuple[float, float] | None = None) -> "_Said":
+        said = super().__new__(cls, value)
+        said.interval = interval
+        return said
+
     def __format__(self, spec: str) -> str:
-        percent = 100.0 * float(self)
-        if spec == "percent":
-            return f"{say_number(percent)} %"
+        if not spec:
+            return say_interval(float(self), self.interval)
+        # of what is below another the size is said, and its interval turns round
+        scale = -100.0 if spec != "percent" and self < 0.0 else 100.0
+        low, high = sorted(scale * end for end in self.interval or (0.0, 0.0))
+        said = f"{say_number(scale * float(self))} %"
+        if self.interval is not None:
+            said += f" [{say_number(low)}, {say_number(high)}]"
         if spec == "share":
-            return f"{say_number(abs(percent))} % {'above' if percent >= 0.0 else 'below'}"
-        if spec == "fall":
-            return f"{'falls' if percent >= 0.0 else 'grows'} by {say_number(abs(percent))} %"
-        return say_number(float(self))
+            return f"{said} {'above' if scale > 0.0 else 'below'}"
+        return f"{'falls' if scale > 0.0 else 'grows'} by {said}" if spec == "fall" else said

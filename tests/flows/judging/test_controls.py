@@ -10,7 +10,6 @@ from typer.testing import CliRunner
 
 from flows.cli import app
 from flows.commands.evaluation import shorten_controls
-from flows.drawing import as_svg
 from flows.judging import controls as judging_controls
 from flows.judging.controls import (
     BLIND_BY_DESIGN,
@@ -23,13 +22,14 @@ from flows.judging.controls import (
     score_controls,
     summarise_controls,
 )
-from flows.judging.controls_figure import roc_figure
+from flows.judging.controls_figure import draw_roc
 from flows.judging.evaluation import evaluate_dataset
 from flows.judging.judged_clip import METHODS, JudgedClip
 from flows.judging.physics import clip_columns, clip_facts
 from flows.making.catalogue import catalogue_of
 from flows.making.generate import generate_dataset
 from flows.making.plan import read_plan
+from flows.pages.static import as_svg
 from flows.reading.previews import make_films
 from flows.reading.sheets import draw_sheets
 from tasks.errors import InputError
@@ -113,10 +113,10 @@ def test_each_fault_has_a_panel_with_the_curves_of_its_metrics(
     clips: list[JudgedClip], false: list[dict[str, Claim]]
 ) -> None:
     rows = list(score_controls(clips, false))
-    drawing = as_svg(roc_figure(rows, CONTROLS))
+    drawing = as_svg(draw_roc(rows, CONTROLS))
     tried = {row["control"] for row in rows}
     assert all(name in drawing for name in tried)
-    assert as_svg(roc_figure(rows, CONTROLS)) == drawing
+    assert as_svg(draw_roc(rows, CONTROLS)) == drawing
 
 
 def test_a_clip_whose_track_was_lost_is_not_scored(

@@ -114,6 +114,6 @@ def test_a_clip_with_a_lost_frame_has_no_curve():
 def test_one_seed_has_no_band_and_two_have_one():
     panels = list_panels(STREET)
     figure = draw_motion(list(panels.values()), "telemetry")
-    bands = {axis.get_title(): len(axis.collections) for axis in figure.axes if axis.get_title()}
+    bands = {panel.title: sum(line.low is not None for line in panel.lines) for panel in figure.panels}
     assert bands == {"snow-3, less dry": 1, "dry/hump": 0}
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["telemetry", "pnp"]
+    assert [line.name for line in figure.key] == ["telemetry", "pnp"]

@@ -1,6 +1,5 @@
 """Cars without a pressure sensor: another brake signal stands for the pressure, and none is told."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -8,14 +7,12 @@ import pytest
 import yaml
 
 from catalogs.campaigns import read_campaign
-from catalogs.decision_rules import load_decision_rules
 from flows.measured.importing import import_measurements
 from tasks.errors import InputError
-from tasks.identification.joint.calibration import needs_joint_fit
 from tests.campaign.recorded import MAP, braking_columns, log_signal
 
 
-def test_a_brake_command_stands_for_the_pressure_and_asks_for_the_joint_fit(tmp_path: Path) -> None:
+def test_a_brake_command_stands_for_the_pressure(tmp_path: Path) -> None:
     columns = log_signal(braking_columns(seconds=8.0))
     columns["command"] = columns.pop("p_bar") / 40.0  # 2 MPa are half of the brake
     for part in ("train", "held_out"):
@@ -37,8 +34,6 @@ def test_a_brake_command_stands_for_the_pressure_and_asks_for_the_joint_fit(tmp_
     assert campaign.brake_signal == "brake_command" and campaign.runs[0].pressure.max() == pytest.approx(
         5.0, abs=0.1
     )
-    assert needs_joint_fit(campaign, load_decision_rules().joint)
-    assert not needs_joint_fit(replace(campaign, brake_signal="brake_pressure"), load_decision_rules().joint)
 
 
 def test_a_campaign_without_any_brake_signal_is_told_which_would_do(tmp_path: Path) -> None:

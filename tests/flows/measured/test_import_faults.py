@@ -59,16 +59,16 @@ def _held(x: np.ndarray) -> np.ndarray:
         ("v_kmh", lambda x: x * 10, "channel speed reaches"),
         ("ax_g", lambda x: x * 9.81, "taken as g, it looks like m/s^2"),
         ("ax_g", lambda x: 1.0 + 0.01 * np.sin(np.arange(len(x))), "m/s^2 off on average, which no road"),
-        ("ax_g", lambda x: -x, "longitudinal_acceleration runs against the rate of speed"),
+        ("ax_g", lambda x: -x, "the rate of speed: turn its sign over"),
         ("p_bar", lambda x: x * 100, "channel brake_pressure reaches"),
         ("p_bar", lambda x: x / 10, "brake_pressure gives 15"),
         ("p_bar", lambda x: -x, "brake_pressure falls to"),
-        ("pitch_up", lambda x: -x, "channel pitch runs against the deceleration"),
+        ("pitch_up", lambda x: -x, "of deceleration, which must lie in 0.02 to 2: turn its sign over"),
         ("pitch_up", lambda x: np.degrees(x), "channel pitch reaches"),
-        ("pitch_rate_up", lambda x: -x, "channel pitch_rate runs against the slope of pitch"),
+        ("pitch_rate_up", lambda x: -x, "the slope of pitch: turn its sign over"),
         ("pitch_rate_up", lambda x: np.degrees(x), "pitch_rate"),
         ("az", lambda x: x - 9.81, "must exclude gravity"),
-        ("w_r", lambda x: -x, "wheel_speed_rear is negative"),
+        ("w_r", lambda x: -x, "to 0.6: turn the sign of the wheel over"),
         ("w_r", lambda x: 3.6 * 0.32 * x, "(one looks like km/h)"),
         ("pitch_up", _held, "pitch: is frozen: it holds"),
         ("v_kmh", _held, "speed: is frozen: it holds"),
@@ -76,7 +76,7 @@ def _held(x: np.ndarray) -> np.ndarray:
         ("az", lambda x: np.where(np.arange(len(x)) == 90, np.inf, x), "vertical_acceleration: has 1 samples"),
         ("t_ms", lambda x: x + 700.0 * (np.arange(len(x)) > 100), "gaps or forward jumps of its clock"),
         ("t_ms", lambda x: x - 300.0 * (np.arange(len(x)) > 100), "clock that does not advance"),
-        ("w_fl", lambda x: np.where((np.arange(len(x)) // 80) == 1, np.nan, x), "wheel_speed_front: has 1 gap"),
+        ("w_fl", lambda x: np.where((np.arange(len(x)) // 80) == 1, np.nan, x), "wheel_speed_front: has gaps"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_named_with_run_and_channel(
@@ -110,7 +110,7 @@ def test_all_problems_come_at_once(tmp_path: Path) -> None:
     log["az"][90] = np.inf
     log["p_bar"] *= 100
     text = problems_of(tmp_path, log)
-    assert "pitch runs against" in text and "not numbers" in text and "brake_pressure reaches" in text
+    assert "pitch gives -" in text and "not numbers" in text and "brake_pressure reaches" in text
 
 
 def test_a_missing_signal_is_named_with_those_that_come_near(tmp_path: Path) -> None:

@@ -1,6 +1,5 @@
-"""An import holds speeds against every pair of units, takes units that are stated, and leaves a few faulty runs out."""
+"""An import takes units and clocks that are stated, and leaves a few faulty runs out."""
 
-from itertools import permutations
 from pathlib import Path
 
 import numpy as np
@@ -10,34 +9,9 @@ from typer.testing import CliRunner
 
 from flows.cli import app
 from flows.measured.importing import import_measurements
-from tasks.campaign.channel_validation import find_plausibility_problems
-from tasks.campaign.channels import SPEED_UNITS, UNITS
-from tasks.campaign.deceleration import find_deceleration_problems
 from tasks.errors import InputError
-from tests.campaign.recorded import MAP, braking_columns, log_signal
-from tests.flows.measured.recordings import map_beside, problems_of, write_csv, write_map
-
-
-@pytest.mark.parametrize(("true", "taken"), list(permutations(SPEED_UNITS, 2)))
-def test_a_speed_in_another_unit_is_told_by_an_accelerometer(true: str, taken: str) -> None:
-    columns = braking_columns()
-    wrong = columns["speed"] * UNITS[taken][1] / UNITS[true][1]
-    felt = columns["longitudinal_acceleration"]
-    units = {"speed": taken, "longitudinal_acceleration": "g"}
-    channels = {"speed": wrong, "longitudinal_acceleration": felt}
-    (told,) = find_plausibility_problems(channels, 0.01, units)
-    assert f"taken as {taken}, it looks like {true}" in told
-    sound = channels | {"speed": columns["speed"]}
-    assert find_plausibility_problems(sound, 0.01, units) == []
-
-
-def test_a_stop_harder_than_tyres_give_is_told_without_an_accelerometer() -> None:
-    speed = braking_columns()["speed"]
-    assert find_deceleration_problems({"a": {"speed": speed}}, 0.01, 15.0) == []
-    hard = 20.0 - 5.0 * np.clip(0.01 * np.arange(400) - 1.0, 0.0, 3.0)
-    assert find_deceleration_problems({"a": {"speed": hard}}, 0.01, 15.0) == []
-    (told,) = find_deceleration_problems({"a": {"speed": 3.6 * hard}}, 0.01, 15.0)
-    assert "falls by 18 m/s^2 in a" in told and "taken as m/s, it looks like km/h" in told
+from tests.campaign.recorded import MAP, braking_columns, log_signal, write_digits
+from tests.flows.measured.recordings import import_columns, map_beside, problems_of, write_csv, write_map
 
 
 def test_a_unit_in_a_name_is_held_against_the_maps_and_taken_where_there_is_none(tmp_path: Path) -> None:
@@ -105,3 +79,22 @@ def test_a_file_that_cannot_be_read_among_many_is_left_out(tmp_path: Path) -> No
     report = import_measurements(str(source), map=channel_map, out=str(tmp_path / "out"))
     assert report["faulty"] == ["run-3.csv"] and len(report["runs"]) == 3
     assert "run-3.csv: signal t_ms is missing" in report["left_out"][0]
+
+
+def test_a_log_of_a_time_of_day_is_imported_by_its_unit_and_told_without_it(tmp_path: Path) -> None:
+    log = log_signal(braking_columns())
+    log["time"] = write_digits(37438.0 + log.pop("t_ms") / 1e3)
+    source = write_csv(tmp_path / "log.csv", log)
+    text = problems_of(tmp_path, log, time={"source": "time"})
+    assert "give unit: HHMMSS under time in the map" in text
+    assert "cut the run there" not in text and "frozen" not in text
+    found = import_columns(tmp_path, source, time={"source": "time", "unit": "HHMMSS"})
+    assert len(found["speed"]) > 390
+    np.testing.assert_allclose(found["speed"], braking_columns()["speed"][: len(found["speed"])], atol=1e-6)
+
+
+def test_what_is_no_time_of_day_is_refused_as_one(tmp_path: Path) -> None:
+    text = problems_of(tmp_path, log_signal(braking_columns()), time={"source": "t_ms", "unit": "HHMMSS"})
+    assert (
+        "log.csv: clock t_ms must be in HHMMSS, with minutes and seconds below 60; it reads 0 to 4000" in text
+    )

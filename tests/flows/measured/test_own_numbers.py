@@ -22,10 +22,10 @@ def test_a_number_that_stands_as_a_rival_is_not_told_again_among_the_vehicles_ow
         return make_estimate(effect, p, 0.1)
 
     grip, gain = number("retuned_friction_level", 0.65), number("retuned_pressure_gain", 0.51)
-    told = SimpleNamespace(rivals=[("pressure_nonlinearity", grip)], effects=[grip])
+    told = SimpleNamespace(rivals=[("pressure_nonlinearity", grip)], effects=[grip], experiment=None)
     outcome = SimpleNamespace(verdict=told, calibrated=(gain, grip))
     assert (
         _say_own_numbers(outcome, load_effects())
-        == "the brakes give 51 % above the torque of the vehicle file"
+        == "the brakes give 51 % [0, 100] above the torque of the vehicle file"
     )
     assert _say_own_numbers(SimpleNamespace(verdict=told, calibrated=(grip,)), load_effects()) == ""

@@ -46,7 +46,8 @@ def test_the_whole_protocol_on_three_drives(campaign: Path, tmp_path: Path) -> N
     assert (result["drives"], result["episodes"], result["unassessed"]) == (3, 24, [])
     assert 3 <= result["retained"] < result["candidates"]
     page = (tmp_path / "brake_protocol.html").read_text()
-    assert (tmp_path / "dives.svg").read_text() in page and f"{result['macro'][0]['pitch_rmse']:.4g}" in page
+    assert (tmp_path / "dives.svg").is_file() and 'class="plot"' in page
+    assert f"{result['macro'][0]['pitch_rmse']:.4g}" in page
     table = list(csv.DictReader((tmp_path / "attrition.csv").read_text().splitlines()))
     assert len(table) == 12 and int(table[-1]["left"]) == result["retained"]
     joint = next(row for row in result["macro"] if row["variant"] == "joint")

@@ -99,7 +99,7 @@ def test_the_plot_shows_the_telemetry_in_the_units_of_its_titles(data):
     figure = data["dry/flat"].plot()
     ticks = data["dry/flat"].pandas()
     titles = [axis.title.text for axis in figure.select_yaxes()]
-    assert titles == ["speed [km/h]", "braking slip [1]", "wheel load [kN]", "pitch [deg]"]
+    assert titles == ["speed [km/h]", "braking slip", "wheel load [kN]", "pitch [deg]"]
     shown = [
         ticks.speed * 3.6, ticks.braking_slip_f, ticks.braking_slip_r,
         ticks.axle_load_f / 2000, ticks.axle_load_r / 2000, np.degrees(ticks.pitch),
@@ -108,7 +108,7 @@ def test_the_plot_shows_the_telemetry_in_the_units_of_its_titles(data):
     for line, values in zip(figure.data, shown, strict=True):
         np.testing.assert_allclose(line.x, ticks.t_ns * 1e-9, rtol=1e-12)
         np.testing.assert_allclose(line.y, values, rtol=1e-12)
-    # brake onset, by the grid; the first pressure is one tick later
+    # shaded from the brake's onset by the grid; the first pressure is one tick later
     assert len(figure.layout.shapes) == 4
     assert all(shape.x0 == pytest.approx(0.2, abs=0.002) for shape in figure.layout.shapes)
     assert not data["dry/hump"].plot().layout.shapes

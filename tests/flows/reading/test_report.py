@@ -258,7 +258,7 @@ def test_labels_are_text_in_the_page_whatever_they_hold(browser, toy_dataset, tm
             page.wait_for_function(f"traces.shown[0]?.label === REPORT.clips[{row}].label")
             assert page.locator("#label").text_content() == HOSTILE[row]
         assert page.evaluate("window.owned") is None
-        assert page.locator("img").count() == 0 and page.locator("script").count() == 4 + 4
+        assert page.locator("img").count() == 0 and page.locator("script").count() == 5 + 4
         with page.expect_download() as download:
             page.click("#csv")
         first = next(csv.reader(download.value.path().read_text().splitlines()[1:2]))

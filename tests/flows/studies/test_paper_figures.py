@@ -22,10 +22,11 @@ def test_bands_lie_about_the_nominal_curve_and_printed_figures_at_their_rates():
         {"figure": "spearman.snow1.snow_density", "printed": -0.535}, {"figure": "rain50_mu.nominal", "printed": 0.347},
     ]  # fmt: skip
     figure = draw_sensitivity({"snow": rates | friction | stops}, printed)
-    above, below = figure.axes
-    assert list(above.lines[0].get_ydata()) == [0.8, 0.5, 0.3] and len(above.lines) == 1
-    assert [tuple(point) for point in below.lines[1].get_xydata()] == [(1.0, 42.53), (3.0, 58.39)]
-    assert below.collections[0].get_datalim(below.transData).y1 == 69
+    above, below = figure.panels
+    assert [list(line.y) for line in above.lines[1:]] == [[0.8, 0.5, 0.3]]
+    *_, marks = below.lines
+    assert (marks.x, marks.y) == ([1.0, 3.0], [42.53, 58.39])
+    assert below.lines[0].high == [31, 69]
 
 
 def fold(drive: str, dive: list[float], predicted: list[float]) -> dict:
@@ -46,18 +47,12 @@ def test_each_dive_is_drawn_over_its_own_peak_and_the_mean_where_all_drives_have
     figure = draw_dives(
         [fold("one", [0.0, -0.5, -2.0], [0.0, -1.0, -1.0]), fold("$2", [0.0, 1.0], [0.0, 0.5])]
     )
-    first, second, mean = figure.axes
-    assert list(first.lines[0].get_ydata()) == [0.0, -0.25, -1.0] and list(first.lines[1].get_ydata()) == [
-        0.0,
-        -1.0,
-        -1.0,
-    ]
-    assert "peak ratio 1.10" in first.get_title(loc="left") and second.get_title(loc="left").startswith(
-        r"\$2: 3"
-    )
-    np.testing.assert_allclose(mean.lines[0].get_ydata(), [0.0, 0.25])
-    spread = mean.collections[0].get_datalim(mean.transData)
-    assert (spread.y0, spread.y1) == pytest.approx((-0.5, 1.0))
+    first, second, mean = figure.panels
+    assert [list(line.y) for line in first.lines] == [[0.0, -0.25, -1.0], [0.0, -1.0, -1.0]]
+    assert "peak ratio 1.10" in first.title and second.title.startswith("$2: 3")
+    (line, _) = mean.lines
+    np.testing.assert_allclose(line.y, [0.0, 0.25])
+    assert (min(line.low), max(line.high)) == pytest.approx((-0.5, 1.0))
 
 
 def test_a_model_that_is_its_own_reference_leaves_nothing_over():
@@ -78,10 +73,7 @@ def test_a_model_that_is_its_own_reference_leaves_nothing_over():
     trace |= {f"slip_{wheel}": told[f"braking_slip_{axle}"] for wheel, axle in wheels.items()}
     trace |= {f"wheel_load_{wheel}": told[f"axle_load_{axle}"] / 2 for wheel, axle in wheels.items()}
     figure = draw_trajectories("own $case", trace, {"itself": ride}, (0.1, 0.9))
-    labels = [axis.get_ylabel() for axis in figure.axes]
-    left_over = [
-        axis.lines[0] for axis, label in zip(figure.axes, labels, strict=True) if label == "difference"
-    ]
-    assert len(left_over) == 4 and max(np.max(np.abs(line.get_ydata())) for line in left_over) < 1e-9
-    pitch = figure.axes[labels.index("pitch, nose down [deg]")].lines[0].get_ydata()
+    left_over = [panel.lines[0] for panel in figure.panels if panel.y == "difference"]
+    assert len(left_over) == 4 and max(np.max(np.abs(line.y)) for line in left_over) < 1e-9
+    (pitch,) = (panel.lines[0].y for panel in figure.panels if panel.y == "pitch, nose down [deg]")
     assert pitch[-1] - pitch[0] > 1.0
