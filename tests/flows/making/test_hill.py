@@ -7,16 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from catalogs.grids import load_grid
+from catalogs.entries import load
 from catalogs.road_grade import ROAD_GRADE, load_kept_grade
 from catalogs.scenes import write_scene
 from flows.auditing.audit import audit_dataset
-from flows.auditing.driven_lines import Asked, drive_clip, is_driven, load_entries
+from flows.auditing.driven_lines import Asked, drive_clip, is_driven
 from flows.auditing.explain import explain_frame
 from flows.auditing.kept_lines import list_lines
 from flows.auditing.repair import repair_dataset
 from flows.judging.physics import audit_physics, clip_columns, clip_facts
 from flows.judging.physics_constants import read_constants
+from flows.making.catalogue import Catalogue
 from flows.making.freezing import frozen_run
 from flows.making.generate import generate_dataset
 from flows.making.plan import make_plan, read_plan
@@ -97,7 +98,7 @@ def test_without_the_scene_the_motion_follows_from_the_inputs(hill):
     asked = Asked(
         scenario=plan.clips[0].scenario, mode="paper", variant="full", duration_s=plan.duration_s, route=None
     )
-    again = drive_clip(asked, load_entries(hill.inputs, "full"))
+    again = drive_clip(asked, Catalogue(hill.inputs))
     names = [channel.name for channel in TICK_CHANNELS]
     recorded = json.loads(hill.manifest.read_bytes())["clips"][0]["content"]["ticks"]
     assert columns_hash(again.ride.columns, names) == recorded
@@ -110,7 +111,7 @@ def test_without_the_scene_the_motion_follows_from_the_inputs(hill):
 
 
 def test_the_frozen_run_of_a_hill_has_the_telemetry_of_its_dataset(hill):
-    frozen = frozen_run(load_grid(str(hill.root.parent / "grid.yaml")))
+    frozen = frozen_run(load("grid", str(hill.root.parent / "grid.yaml")))
     assert (
         frozen["clips"][0]["ticks"] == json.loads(hill.manifest.read_bytes())["clips"][0]["content"]["ticks"]
     )

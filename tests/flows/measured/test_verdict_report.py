@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 
 from catalogs.decision_rules import load_decision_rules
+from catalogs.entries import load
 from catalogs.joint_numbers import load_joint_numbers
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle
 from flows.measured.closing import tell_search, verdict_json
 from flows.measured.residuals import predict_runs
 from flows.measured.verdict_figures import find_alike_numbers, format_plain_unit, make_brake_curve
@@ -25,7 +24,7 @@ from tasks.identification.benchmark import make_synthetic_campaign
 from tasks.identification.joint.verdict import JointOutcome, judge_jointly
 from tests.browsers import find_barriers, open_chromium
 
-VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
+VEHICLE, SURFACE = load("vehicle", "paper-reference"), load("surface", "dense-asphalt")
 STOPS = tuple(
     RunPlan(speed=speed, peak=peak, duration=2.6, disc_rise=20.0)
     for speed, peak in ((16.0, 1.2), (20.0, 1.8), (12.0, 0.8))
