@@ -89,7 +89,7 @@ def _make_schema(form: Any) -> type[CatalogueEntry]:
     """The schema of a file, or of a part of one: a table for a class, else value, unit and source."""
     if not is_dataclass(form):
         within = tuple(WRITTEN.get(one, one) for one in get_args(form))
-        value = GenericAlias(tuple, within) if within else WRITTEN[form]
+        value: Any = GenericAlias(tuple, within) if within else WRITTEN[form]
         return create_model(
             "Look", __base__=CatalogueEntry, value=(value, ...), unit=(Text, ...), source=(Text, ...)
         )
@@ -103,7 +103,7 @@ def _make_schema(form: Any) -> type[CatalogueEntry]:
 
 def _build(form: Any, entry: Any) -> Any:
     """The parameters that an entry of their schema holds."""
-    if not is_dataclass(form):
+    if "value" in type(entry).model_fields:
         return entry.value
     given = {name: (kind, getattr(entry, name)) for name, (kind, _) in _list_fields(form).items()}
     values = {name: None if one is None else _build(kind, one) for name, (kind, one) in given.items()}

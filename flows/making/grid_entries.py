@@ -114,7 +114,7 @@ def read_entries(settings: GridFile, weathers: Collection[str] = ()) -> GridEntr
     for row in INPUTS:
         if not row.needed(settings):
             continue
-        reference = None if row.setting is None else getattr(settings, row.setting)
+        reference: Any = None if row.setting is None else getattr(settings, row.setting)
         try:
             if row.kind == "vehicle":
                 file = open_vehicle(reference)
@@ -127,7 +127,7 @@ def read_entries(settings: GridFile, weathers: Collection[str] = ()) -> GridEntr
         contents[row.name], values[row.name] = content, value
         if row.setting is not None:
             places[row.name] = row.setting, place
-    families = {row.tyre_family for kind in weathers if (row := WEATHERS.get(kind))}
+    families = {WEATHERS[kind].tyre_family for kind in weathers if kind in WEATHERS}
     unasked = WEATHERS.keys() - families - set(weathers)
     contents |= {
         f"weather/{name}.yaml": content for name, content in WEATHER.contents.items() if name not in unasked
