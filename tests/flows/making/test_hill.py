@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from catalogs.entries import load
-from catalogs.road_grade import ROAD_GRADE, load_kept_grade
+from catalogs.road_grade import ROAD_GRADE
 from catalogs.scenes import write_scene
 from flows.auditing.audit import audit_dataset
 from flows.auditing.driven_lines import Asked, drive_clip, is_driven
@@ -80,7 +80,7 @@ def test_the_stop_is_shorter_uphill_and_its_label_ranges_are_on_the_same_hill(hi
 
 def test_the_grade_stands_in_the_ticks_and_in_the_inputs_of_a_hill_alone(hill, level):
     ticks = clip_of(hill)[0]
-    np.testing.assert_array_equal(ticks["road_grade"], load_kept_grade(hill.inputs).at(ticks["station"]))
+    np.testing.assert_array_equal(ticks["road_grade"], Catalogue(hill.inputs).grade.at(ticks["station"]))
     assert 0.03 < ticks["road_grade"].max() < 0.08
     assert ROAD_GRADE in json.loads(hill.manifest.read_bytes())["inputs"]
     assert ROAD_GRADE not in json.loads(level.manifest.read_bytes())["inputs"]

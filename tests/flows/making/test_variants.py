@@ -129,12 +129,12 @@ def test_fixed_mu_stops_alike_at_two_rates_and_keeps_its_rates_with_the_dataset(
 
 def test_the_rates_of_fixed_mu_are_those_kept_with_the_dataset(made, tmp_path):
     """A catalogue that changes later changes no dataset that is made again."""
-    from catalogs.studies.ablation import cut_coupling, load_kept_families
+    from catalogs.studies.ablation import cut_coupling
 
     for name in ("ablation.yaml", "study.yaml"):
         content = (made["fixed-mu"].inputs / name).read_text()
         (tmp_path / name).write_text(content.replace("rain: {value: 10", "rain: {value: 20"))
-    families = load_kept_families(tmp_path, "fixed-mu")
+    families = Catalogue(tmp_path).families
     scenario = read_plan(made["fixed-mu"].root).clips[0].scenario
     assert cut_coupling(scenario, "fixed-mu", families).precipitation_mm_h == 20
     assert catalogue_of(made["fixed-mu"].root).families.rates_mm_h["rain"] == 10
