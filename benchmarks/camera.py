@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from catalogs.cameras import load_camera
+from catalogs.entries import load
 from catalogs.scenes import load_scene
 from tasks.eval.image_quality import psnr
 from tasks.render.camera import Camera, continuous_rig, world_to_camera
@@ -32,7 +32,7 @@ def measure_rows(scene_name: str = "street") -> list[dict[str, Any]]:
     -------
     Rows of name, value, unit, peer (what the value is held against) and ratio (value over peer).
     """
-    scene, asked = load_scene(scene_name), load_camera("dashcam-480x320-rolling")
+    scene, asked = load_scene(scene_name), load("camera", "dashcam-480x320-rolling")
     pinhole = replace(asked, lens=None)
     backend = CpuBackend()
     prepared = backend.prepare_gaussians(scene.gaussians)

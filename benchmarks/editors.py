@@ -18,9 +18,8 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from benchmarks.synthetic_street import camera_matrix, make_mount, render_clip, rig_poses
+from catalogs.entries import load
 from catalogs.scenario import Scenario
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle
 from flows.judging.video_sets.judge_set import format_cell, judge_video_set
 from flows.making.driving import simulate_drive
 from flows.store.layout import write_json
@@ -72,7 +71,7 @@ class Motion:
 def drive(rate: float, **asked: Any) -> Motion:
     """Motion of the paper's vehicle at the frames of a video."""
     _, ride = simulate_drive(
-        Scenario(**asked), load_vehicle("paper-reference"), load_surface("dense-asphalt"), "paper", 9.0
+        Scenario(**asked), load("vehicle", "paper-reference"), load("surface", "dense-asphalt"), "paper", 9.0
     )
     ticks = np.rint(np.arange(FRAMES) * 1000 / rate).astype(int)
     station, heave, pitch = (ride.columns[name][ticks] for name in ("station", "heave", "pitch"))

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from benchmarks.side_by_side import least_cpu_s, make_row, print_rows
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import load
 from tasks.surface.road_profile import FLAT_ROAD
 from tasks.surface.state import SurfaceState
 from tasks.vehicle import reference
@@ -74,7 +74,7 @@ def measure_rows() -> list[dict[str, Any]]:
     -------
     Rows of name, value, unit, peer (the model) and ratio (value over the model's value).
     """
-    vehicle = load_vehicle("paper-reference")
+    vehicle = load("vehicle", "paper-reference")
     response = compute_surface_response(vehicle, FAMILY, FRICTION)
     on_road = (build_chassis(vehicle, response, Conditions()), response.tyre, make_road_feature(FLAT_ROAD))
     omega = SPEED / vehicle.wheel_radius

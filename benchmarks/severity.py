@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from catalogs.grids import load_grid
+from catalogs.entries import load
 from flows.cli import run_to_end
-from flows.making.catalogue import load_catalogue
+from flows.making.catalogue import Catalogue
 from flows.making.driving import simulate_drive
 from flows.making.pictures import frame_rows, render_frames, rig_of
 from flows.making.plan import freeze_grid
@@ -56,14 +56,14 @@ def measure_rows(
 
 def _measure_clips(scene: str, seed: int) -> tuple[dict[str, float], dict[str, dict[str, float]]]:
     """Rate and statistics of each clip of the severity grid, by its label."""
-    grid = load_grid("severity")
+    grid = load("grid", "severity")
     short = {"scene": scene, "seed": seed, "frames": FRAMES, "frame_rate_hz": FRAME_RATE_HZ}
     grid = replace(grid, settings=grid.settings.model_copy(update=short))
     plan, inputs = freeze_grid(grid, "severity", "cpu")
     with tempfile.TemporaryDirectory() as folder:
         for name, content in inputs.items():
             write_atomically(Path(folder) / name, content)
-        catalogue = load_catalogue(Path(folder), scene)  # reads how a weather looks when it first draws it
+        catalogue = Catalogue(Path(folder), scene)
         rates, values = {}, {}
         for clip in plan.clips:
             state, ride = simulate_drive(

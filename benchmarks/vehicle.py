@@ -14,9 +14,8 @@ import numpy as np
 
 from benchmarks.side_by_side import make_row, print_rows
 from benchmarks.vehicle_modes import simulate_condition
-from catalogs.studies import Condition, load_conditions, load_sensitivity_study
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import load
+from catalogs.studies import Condition, load_conditions
 from tasks.campaign.campaign import CHANNELS, Run
 from tasks.identification.inference.forward import prepare_run, simulate_run
 from tasks.studies.sensitivity import sensitivity_study
@@ -53,13 +52,13 @@ def measure_rows() -> list[dict[str, Any]]:
     -------
     Rows of name, value, unit, peer (what the value is held against) and ratio (value over peer).
     """
-    vehicle, surface = load_vehicle("paper-reference"), load_surface("dense-asphalt")
+    vehicle, surface = load("vehicle", "paper-reference"), load("surface", "dense-asphalt")
     result = _stop_rows(vehicle)
     conditions = {condition.name: condition for condition in load_conditions()}
     for name in ("flat-dry", "hump-dry"):
         result += _rollout_rows(conditions[name])
     result.append(_inference_row(vehicle, surface))
-    protocol, _ = load_sensitivity_study()
+    protocol, _ = load("sensitivity study")
     study_s = _cpu_s(lambda: sensitivity_study(vehicle, surface, protocol), repeats=3)
     limit = f"limit {STUDY_LIMIT_S:g} CPU-s"
     result.append(make_row("sensitivity study, 4,434 stops", study_s, "CPU-s", limit, STUDY_LIMIT_S))
@@ -117,7 +116,7 @@ def _twin_step_s(vehicle: Vehicle) -> float:
 
 def _rollout_rows(condition: Condition) -> list[dict[str, Any]]:
     """Logged 10 s rollouts of one condition in both modes."""
-    vehicle, surface = load_vehicle("paper-reference"), load_surface("dense-asphalt")
+    vehicle, surface = load("vehicle", "paper-reference"), load("surface", "dense-asphalt")
     paper_ms, coupled_ms = (
         1000 * _cpu_s(lambda mode=mode: simulate_condition(vehicle, surface, condition.scenario, mode))
         for mode in ("paper", "coupled")

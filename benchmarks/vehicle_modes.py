@@ -5,10 +5,9 @@ Prints the table of docs/explanation/vehicle-modes.md.
 
 from math import isnan
 
+from catalogs.entries import load
 from catalogs.scenario import Scenario
 from catalogs.studies import load_conditions
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle
 from tasks.studies.mode_comparison import ModeDifference, mode_difference
 from tasks.surface.road_profile import RoadHazard
 from tasks.surface.state import SurfaceParameters
@@ -26,7 +25,7 @@ HEADER = (
 
 def compute_differences() -> dict[str, ModeDifference]:
     """The modes' difference on each condition, by its name."""
-    vehicle, surface = load_vehicle("paper-reference"), load_surface("dense-asphalt")
+    vehicle, surface = load("vehicle", "paper-reference"), load("surface", "dense-asphalt")
     return {
         condition.name: mode_difference(
             simulate_condition(vehicle, surface, condition.scenario, "paper"),

@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from catalogs.cameras import load_camera
+from catalogs.entries import load
 from catalogs.scenes import load_scene
-from catalogs.surfaces import load_surface
 from catalogs.weather.look import load_weather
 from tasks.render.camera import world_to_camera
 from tasks.render.composition import compose_over_sky
@@ -52,8 +51,8 @@ def measure_rows(scene_name: str = "street", camera_name: str = "dashcam-480x320
     Rows of name, value, unit, peer (what the value is held against) and ratio (value over peer). A weather's
     row "added" counts its Gaussians in the rasteriser too, and its ratio is the share of the clear frame.
     """
-    scene, camera, parameters = load_scene(scene_name), load_camera(camera_name), load_weather()
-    pavement = load_surface("dense-asphalt")
+    scene, camera, parameters = load_scene(scene_name), load("camera", camera_name), load_weather()
+    pavement = load("surface", "dense-asphalt")
     pose = scene.route.T_world_rig[STATION] @ camera.T_rig_camera
     K = np.asarray(camera.K, dtype=np.float64)
     view = world_to_camera(pose)

@@ -1,17 +1,14 @@
 """Where a scenario lies among the conditions that the calibration was fitted on."""
 
-from functools import lru_cache
-from pathlib import Path
 from typing import Annotated, Literal, get_args
 
 from pydantic import Field, model_validator
 
 from catalogs.names import WeatherName
-from catalogs.quantities import CatalogueEntry, Number, Text, read_entry
+from catalogs.quantities import CatalogueEntry, Number, Text
 from catalogs.scenario import Scenario
 from tasks.surface.weather import WEATHERS
 
-CALIBRATED_RANGE = Path(__file__).with_name("calibrated_range.yaml")
 CalibrationTag = Literal["in-grid", "interpolated", "off-grid", "beyond-calibration"]
 CALIBRATION_TAGS: tuple[CalibrationTag, ...] = get_args(CalibrationTag)
 
@@ -50,12 +47,6 @@ class CalibratedRange(CatalogueEntry):
     hump_length: DrivenLevels
     depression_height: DrivenLevels
     depression_length: DrivenLevels
-
-
-@lru_cache
-def load_calibrated_range() -> CalibratedRange:
-    """The calibrated range of the catalogue."""
-    return read_entry(CalibratedRange, CALIBRATED_RANGE, "calibrated range")
 
 
 def calibration_tag(scenario: Scenario, driven: CalibratedRange) -> CalibrationTag:

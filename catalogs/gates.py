@@ -1,13 +1,9 @@
 """The limits that a generated clip, and that any other video, must keep."""
 
-from pathlib import Path
 from typing import Annotated
 
-from catalogs.quantities import CatalogueEntry, Scalar, read_entry, require_quantity
+from catalogs.quantities import CatalogueEntry, Scalar, require_quantity
 from tasks.eval.motion_agreement import PoseThresholds
-
-GATES = Path(__file__).with_name("gates.yaml")
-FOREIGN_GATES = Path(__file__).with_name("foreign_gates.yaml")
 
 
 class ForeignGateEntry(CatalogueEntry):
@@ -18,6 +14,11 @@ class ForeignGateEntry(CatalogueEntry):
     response_deg: Annotated[Scalar, require_quantity("deg", minimum=0)]
     normalised_progress_rmse: Annotated[Scalar, require_quantity("1", above=0)]
     failed_share: Annotated[Scalar, require_quantity("1", minimum=0, maximum=1)]
+
+    def build(self) -> PoseThresholds:
+        """The limits themselves; figures that need depth are not judged where the file has no limit of them."""
+        given = {name: scalar.value for name, scalar in self if scalar is not None}
+        return PoseThresholds(**{"pitch_rmse_deg": float("inf"), "progress_rmse_m": None, **given})
 
 
 class GateEntry(ForeignGateEntry):
@@ -34,31 +35,3 @@ class GateEntry(ForeignGateEntry):
     rise_rmse_m: Annotated[Scalar, require_quantity("m", above=0)] | None = None
     heave_gain_error: Annotated[Scalar, require_quantity("1", above=0)] | None = None
     heave_gain_std: Annotated[Scalar, require_quantity("1", above=0)] | None = None
-
-
-def load_gates(path: Path = GATES) -> PoseThresholds:
-    """Read the limits for generated clips.
-
-    Raises
-    ------
-    InputError
-        Listing every problem of the file.
-    """
-    return PoseThresholds(**_read_values(read_entry(GateEntry, path, "gate file")))
-
-
-def load_foreign_gates(path: Path = FOREIGN_GATES) -> PoseThresholds:
-    """Read the limits for any video: figures that need depth are not judged.
-
-    Raises
-    ------
-    InputError
-        Listing every problem of the file.
-    """
-    values = _read_values(read_entry(ForeignGateEntry, path, "gate file"))
-    return PoseThresholds(pitch_rmse_deg=float("inf"), progress_rmse_m=None, **values)
-
-
-def _read_values(entry: ForeignGateEntry) -> dict[str, float]:
-    given = {name: getattr(entry, name) for name in type(entry).model_fields}
-    return {name: scalar.value for name, scalar in given.items() if scalar is not None}

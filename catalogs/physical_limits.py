@@ -1,12 +1,8 @@
 """Physical limits that no scenario and no clip may exceed."""
 
-from functools import cache
-from pathlib import Path
 from typing import Annotated
 
-from catalogs.quantities import CatalogueEntry, Scalar, read_entry, require_quantity
-
-PHYSICAL_LIMITS = Path(__file__).with_name("physical_limits.yaml")
+from catalogs.quantities import CatalogueEntry, Scalar, require_quantity
 
 Speed = Annotated[Scalar, require_quantity("km h-1", above=0)]
 Seconds = Annotated[Scalar, require_quantity("s", above=0)]
@@ -37,12 +33,6 @@ class PhysicalLimits(CatalogueEntry):
     road_grade: Annotated[Scalar, require_quantity("1", above=0)]
     frame_rate: Annotated[Scalar, require_quantity("Hz", above=0)]
     frames: Annotated[Scalar, require_quantity("1", minimum=2)]
-
-
-@cache
-def load_physical_limits() -> PhysicalLimits:
-    """The limits of the catalogue."""
-    return read_entry(PhysicalLimits, PHYSICAL_LIMITS, "table of physical limits")
 
 
 def find_limit_problem(name: str, value: float, limit: Scalar) -> str | None:

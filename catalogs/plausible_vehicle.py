@@ -1,15 +1,12 @@
 """Ranges in which the figures of a car lie, and how far its numbers may be off."""
 
 from collections.abc import Mapping
-from functools import cache
-from pathlib import Path
 
 from pydantic import model_validator
 
-from catalogs.quantities import CatalogueEntry, Number, Scalar, Text, read_entry
+from catalogs.entries import load
+from catalogs.quantities import CatalogueEntry, Number, Scalar, Text
 from tasks.vehicle.figures import FIGURES
-
-PLAUSIBLE_VEHICLE = Path(__file__).with_name("plausible_vehicle.yaml")
 
 
 class PlausibleRange(CatalogueEntry):
@@ -69,12 +66,6 @@ class PlausibleVehicle(CatalogueEntry):
         return self
 
 
-@cache
-def load_plausible_vehicle() -> PlausibleVehicle:
-    """Return the ranges of the catalogue."""
-    return read_entry(PlausibleVehicle, PLAUSIBLE_VEHICLE, "table of plausible figures")
-
-
 def find_plausibility_problems(figures: Mapping[str, float], tolerances: Mapping[str, float]) -> list[str]:
     """Return a sentence for each figure and each tolerance of a vehicle that is implausible.
 
@@ -83,7 +74,7 @@ def find_plausibility_problems(figures: Mapping[str, float], tolerances: Mapping
     figures : of `tasks.vehicle.figures.compute_figures`
     tolerances : one sigma of the vehicle's numbers as a share of their values, by field [1]
     """
-    ranges = load_plausible_vehicle()
+    ranges = load("table of plausible figures")
     problems = [ranges.figures[name].problem(name, value) for name, value in figures.items()]
     problems += [
         ranges.tolerance.problem(f"tolerance of {name} over its value", share)

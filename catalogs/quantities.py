@@ -20,6 +20,10 @@ class CatalogueEntry(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
+    def build(self) -> Any:
+        """Return what the entry is for those who ask for it: itself, where a kind has no other value."""
+        return self
+
 
 class Scalar(CatalogueEntry):
     """One number with its unit and source."""

@@ -10,8 +10,9 @@ from pydantic import AliasChoices, BaseModel, ConfigDict, Field, ValidationError
 
 from catalogs.campaign_files import find_unit_problems, parse_columns
 from catalogs.documents import LARGEST_YAML, parse_json, read_content
+from catalogs.entries import load
 from catalogs.names import Name, WeatherName
-from catalogs.physical_limits import find_limit_problem, load_physical_limits
+from catalogs.physical_limits import find_limit_problem
 from catalogs.sentences import cap_problems, describe_rules, shorten_value
 from tasks.errors import InputError
 from tasks.eval.state_agreement import REFERENCE_COLUMNS, CaseFacts
@@ -71,7 +72,7 @@ class ReferenceCase(BaseModel):
 
     @model_validator(mode="after")
     def _keeps_physical_limits(self) -> "ReferenceCase":
-        limits = load_physical_limits()
+        limits = load("table of physical limits")
         bounded = {
             "initial_speed_km_h": (self.initial_speed_km_h, limits.initial_speed),
             "peak_pressure_mpa": (self.peak_pressure_mpa or 0.0, limits.peak_pressure),

@@ -1,10 +1,9 @@
 """The grade of a scene's road as a dataset keeps it, so that its motion follows from its inputs without the scene."""
 
-from pathlib import Path
 from typing import Annotated
 
-from catalogs.quantities import CatalogueEntry, Scalar, Table, read_entry, require_quantity
-from tasks.surface.road_profile import LEVEL_ROAD, RoadGrade
+from catalogs.quantities import CatalogueEntry, Scalar, Table, require_quantity
+from tasks.surface.road_profile import RoadGrade
 
 ROAD_GRADE = "road_grade.yaml"
 """Name among the kept inputs; a dataset of a level road keeps none."""
@@ -15,6 +14,10 @@ class RoadGradeEntry(CatalogueEntry):
 
     spacing: Annotated[Scalar, require_quantity("m", above=0)]
     rise: Annotated[Table, require_quantity("1", above=-1, below=1)]
+
+    def build(self) -> RoadGrade:
+        """The grade itself."""
+        return RoadGrade(rise=self.rise.value, spacing_m=self.spacing.value)
 
 
 def write_road_grade(grade: RoadGrade, scene: str) -> bytes:
@@ -32,22 +35,3 @@ def write_road_grade(grade: RoadGrade, scene: str) -> bytes:
         f'spacing: {{value: {grade.spacing_m:.9f}, unit: m, source: "{source}"}}\n'
         f'rise: {{value: [{values}], unit: "1", source: "{source}"}}\n'
     ).encode()
-
-
-def load_kept_grade(inputs: Path) -> RoadGrade:
-    """Read the grade among a dataset's kept inputs; level where it keeps none.
-
-    Parameters
-    ----------
-    inputs : folder of the kept catalogue files
-
-    Raises
-    ------
-    InputError
-        Listing every problem of the file.
-    """
-    kept = inputs / ROAD_GRADE
-    if not kept.is_file():
-        return LEVEL_ROAD
-    entry = read_entry(RoadGradeEntry, kept, "grade of the road")
-    return RoadGrade(rise=entry.rise.value, spacing_m=entry.spacing.value)

@@ -6,12 +6,12 @@ from math import isfinite, pi
 from operator import attrgetter
 from typing import Any
 
+from catalogs.entries import load
 from catalogs.names import WeatherName
 from catalogs.physical_limits import (
     PhysicalLimits,
     find_least_problem,
     find_limit_problem,
-    load_physical_limits,
 )
 from catalogs.quantities import Scalar
 from tasks.surface.weather import DRY, WEATHERS, find_weather
@@ -106,7 +106,7 @@ def find_scenario_problems(scenario: Scenario, unknown: Collection[str] = ()) ->
     if abs(s.hazard_height_m) > 0 and s.hazard_length_m == 0:
         problems.append(f"a hazard of height {s.hazard_height_m:g} m needs hazard_length_m above 0; it is 0")
     if abs(s.hazard_height_m) > 0 and s.hazard_length_m > 0:
-        limits = load_physical_limits()
+        limits = load("table of physical limits")
         found = [find_least_problem("hazard_length_m", s.hazard_length_m, limits.shortest_hazard)]
         steepest = pi * abs(s.hazard_height_m) / s.hazard_length_m
         if found == [None] and find_limit_problem("", abs(s.hazard_height_m), limits.hazard_height) is None:
@@ -150,7 +150,7 @@ def find_range_problems(scenario: Scenario) -> list[str]:
     """
     given = {name: value for name in NOT_NEGATIVE if (value := getattr(scenario, name)) is not None}
     problems = [f"{name} must not be negative; it is {value:g}" for name, value in given.items() if value < 0]
-    limits = load_physical_limits()
+    limits = load("table of physical limits")
     found = [
         find_least_problem("initial_speed_km_h", scenario.initial_speed_km_h, limits.slowest_initial_speed)
     ]
@@ -160,7 +160,7 @@ def find_range_problems(scenario: Scenario) -> list[str]:
 
 def list_ranges() -> dict[str, tuple[float | None, float]]:
     """Return the least and the largest value of each number of a scenario; None where there is no least [its unit]."""
-    limits = load_physical_limits()
+    limits = load("table of physical limits")
     least: dict[str, float] = dict.fromkeys(NOT_NEGATIVE, 0.0)
     least["initial_speed_km_h"] = limits.slowest_initial_speed.value
     least["hazard_height_m"] = -limits.hazard_height.value

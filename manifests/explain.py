@@ -5,6 +5,7 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from catalogs.documents import parse_yaml_value
+from catalogs.entries import KINDS
 from catalogs.grids.form import BEFORE
 from catalogs.tyres import tyre_entries
 from manifests.canonical import sha256_of
@@ -187,7 +188,7 @@ def kind_of_input(name: str) -> str:
     name : path below ``inputs/``
     """
     path = PurePosixPath(name)
-    if path.suffix == ".tir":
+    if path.suffix in KINDS["tyre"].suffixes:
         return "tyre"
     return path.parts[0] if path.parts[0] in ("weather", "traces") else name
 

@@ -6,9 +6,8 @@ from typing import Any
 
 import yaml
 
-from catalogs.entries import CATALOGUE, entry_names, find_entry
-from catalogs.grids import load_grid
-from catalogs.vehicles import vehicle_content, vehicle_numbers
+from catalogs.entries import CATALOGUE, entry_names, find_entry, load
+from catalogs.vehicles import open_vehicle
 from reference_pages.markdown import format_cell, format_table, format_value
 from tasks.conventions import CHANNELS_BY_NAME
 
@@ -42,7 +41,8 @@ def write_weather_page() -> str:
 def write_vehicles_page() -> str:
     """Return the page of vehicles: their numbers side by side, then each with its sources."""
     names = sorted(entry_names("vehicle"), key=lambda name: (name != REFERENCE, name))
-    numbers = {name: vehicle_numbers(name) for name in names}
+    files = {name: open_vehicle(name) for name in names}
+    numbers = {name: file.numbers for name, file in files.items()}
     keys = list(dict.fromkeys(key for name in names for key in numbers[name]))
     unit_of = {key: number.unit for name in names for key, number in numbers[name].items()}
     rows = [
@@ -59,8 +59,7 @@ def write_vehicles_page() -> str:
         + format_table(("number", "unit", *(f"`{name}`" for name in names)), rows)
     )
     for name in names:
-        content = yaml.safe_load(vehicle_content(name))
-        page += _describe_content(name, find_entry("vehicle", name), content)
+        page += _describe_content(name, files[name].source, yaml.safe_load(files[name].content))
     return page
 
 
@@ -71,7 +70,7 @@ def write_grids_page() -> str:
         " [Write a grid](../../how-to/write-a-grid.md) says how to write your own.\n\n"
     )
     for name in entry_names("grid"):
-        grid = load_grid(name)
+        grid = load("grid", name)
         settings = grid.settings
         drawn = (
             f"{settings.frames} frames at {settings.frame_rate_hz:g} Hz"

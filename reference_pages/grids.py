@@ -3,8 +3,8 @@
 import re
 from typing import Any
 
+from catalogs.entries import load
 from catalogs.grids.schema import grid_schema
-from catalogs.physical_limits import load_physical_limits
 from reference_pages.markdown import format_table, format_value
 from tasks.surface.weather import WEATHERS
 
@@ -32,7 +32,7 @@ def write_field_table() -> str:
         if field == "weather":
             row[3] = ", ".join(f"`{kind}`" for kind in WEATHERS)
         if field == "precipitation_mm_h":
-            limits = load_physical_limits()
+            limits = load("table of physical limits")
             falling = [(kind.name, kind.rate_limit) for kind in WEATHERS.values() if kind.rate_limit]
             row[3] = ", ".join(f"{name}: 0 to {getattr(limits, limit).value:g}" for name, limit in falling)
         rows.append(row)

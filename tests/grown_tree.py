@@ -14,8 +14,7 @@ import numpy as np
 import yaml
 from typer.testing import CliRunner
 
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import load
 from flows.cli import app
 from tasks.surface.road_profile import FLAT_ROAD
 from tasks.surface.weather import Weather, surface_state
@@ -29,7 +28,7 @@ tyre: rational
 effects:
   linear_drag: {value: 40, unit: N s m-1, source: test}
 """
-GRAVEL = surface_state(Weather(kind="gravel"), load_surface("dense-asphalt"))
+GRAVEL = surface_state(Weather(kind="gravel"), load("surface", "dense-asphalt"))
 
 
 def run_command(*words: object) -> str:
@@ -104,7 +103,7 @@ def main(folder: Path) -> None:
     """Check each addition, and the older dataset last."""
     car = folder / "car.yaml"
     car.write_text(CAR)
-    vehicle = load_vehicle(car)
+    vehicle = load("vehicle", car)
     braked = drive(vehicle, 2.3)
     check_tyre(vehicle, braked)
     check_effect(vehicle)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import load
 from flows.making.generate import generate_dataset
 from tasks.eval.poses.rigid import project_points
 from tasks.eval.poses.solve_pnp import PnpLimits, solve_pnp
@@ -42,7 +42,7 @@ def compile_vehicle(_: Path) -> None:
     surface = SurfaceState(kind="dry", friction=0.82)
     for mode in ("coupled", "paper"):
         simulate_scenario(
-            load_vehicle("paper-reference"), surface, controls, FLAT_ROAD, mode=mode, duration_s=0.2,
+            load("vehicle", "paper-reference"), surface, controls, FLAT_ROAD, mode=mode, duration_s=0.2,
             step_s=0.0005,
         )  # fmt: skip
 

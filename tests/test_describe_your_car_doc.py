@@ -5,7 +5,8 @@ import shlex
 
 from typer.testing import CliRunner
 
-from catalogs.vehicles import load_tolerances, load_vehicle
+from catalogs.entries import load
+from catalogs.vehicles import open_vehicle
 from flows.cli import app
 from manifests.provenance import SOURCE_ROOT
 
@@ -28,13 +29,15 @@ def test_the_commands_run_on_the_car_of_the_page(tmp_path, monkeypatch):
     checked = run(app, check)
     assert checked.exit_code == 0 and "my-car.yaml: every figure is plausible" in checked.output
     assert run(app, use).exit_code == 0
-    kept, own = (load_vehicle(tmp_path / p) for p in ("datasets/my-car/inputs/vehicle.yaml", "my-car.yaml"))
+    kept, own = (
+        load("vehicle", tmp_path / p) for p in ("datasets/my-car/inputs/vehicle.yaml", "my-car.yaml")
+    )
     assert (kept.mass, kept.families) == (own.mass, own.families) == (1285, own.families)
-    assert len(load_tolerances(tmp_path / "my-car.yaml")) == car.count("tolerance:")
+    assert len(open_vehicle(tmp_path / "my-car.yaml").tolerances) == car.count("tolerance:")
     (tmp_path / "my-car.yaml").write_text(f"{car}\n{effects}\n")
     checked = run(app, check)
     assert checked.exit_code == 0 and "my-car.yaml: every figure is plausible" in checked.output
-    assert set(load_vehicle(tmp_path / "my-car.yaml").effects) == {
+    assert set(load("vehicle", tmp_path / "my-car.yaml").effects) == {
         "drag_area",
         "rolling_coefficient",
         "engine_torque",

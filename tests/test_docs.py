@@ -15,7 +15,7 @@ from typer.exceptions import TyperException
 
 from benchmarks.size import list_sentences, measure_documents
 from catalogs.channel_maps.conditions import Conditions
-from catalogs.grids import load_grid
+from catalogs.entries import load
 from flows.cli import app
 from manifests.provenance import SOURCE_ROOT
 from reference_pages.pages import WRITERS
@@ -119,7 +119,7 @@ def test_make_targets_in_the_documents_exist():
 def test_the_grid_in_a_document_is_sound(document, clips, tmp_path):
     block = list_blocks(SOURCE_ROOT / document, "yaml")[0]
     (tmp_path / "grid.yaml").write_text(block)
-    assert len(load_grid(Path(tmp_path / "grid.yaml")).scenarios) == clips
+    assert len(load("grid", Path(tmp_path / "grid.yaml")).scenarios) == clips
 
 
 def test_the_page_of_imports_names_every_condition_of_a_run():

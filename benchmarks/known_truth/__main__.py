@@ -10,8 +10,7 @@ from functools import partial
 
 from benchmarks.known_truth.coverage import FitOutcome, fit_known_truth, format_coverage, refit_linearly
 from benchmarks.known_truth.traces import list_development_cases
-from catalogs.calibration import load_procedure
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import load
 
 
 def print_fits(title: str, fits: list[FitOutcome]) -> None:
@@ -37,8 +36,8 @@ if __name__ == "__main__":
     parser.add_argument("--procedure", default="paper-staged")
     parser.add_argument("--workers", type=int, default=2)
     asked = parser.parse_args()
-    procedure, interval = load_procedure(asked.procedure)
-    inputs = (load_vehicle("paper-reference"), list_development_cases(), procedure, interval)
+    procedure, interval = load("calibration procedure", asked.procedure)
+    inputs = (load("vehicle", "paper-reference"), list_development_cases(), procedure, interval)
     with ProcessPoolExecutor(asked.workers) as pool:
         each = asked.draws // asked.truths
         linear = [

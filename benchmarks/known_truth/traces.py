@@ -6,9 +6,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from catalogs.grids import load_grid
+from catalogs.entries import load
 from catalogs.references import ReferenceCase, Traces
-from catalogs.surfaces import load_surface
 from flows.making.driving import weather_of
 from flows.measured.calibration import calibration_case
 from flows.studies.vehicle_model import agreement_of
@@ -33,7 +32,7 @@ SPREAD = {
 
 def list_development_cases() -> tuple[ReferenceCase, ...]:
     """Return the 19 development conditions of the frozen run, without their stopping distances."""
-    pavement = load_surface("dense-asphalt")
+    pavement = load("surface", "dense-asphalt")
     return tuple(
         ReferenceCase(
             case=label,
@@ -48,7 +47,7 @@ def list_development_cases() -> tuple[ReferenceCase, ...]:
             hazard_length_m=scenario.hazard_length_m,
             hazard_height_m=scenario.hazard_height_m,
         )
-        for label, scenario in load_grid(GRID).scenarios
+        for label, scenario in load("grid", GRID).scenarios
     )
 
 

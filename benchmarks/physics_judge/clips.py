@@ -6,12 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from catalogs.entries import find_entry
-from catalogs.low_speed import load_low_speed
+from catalogs.entries import find_entry, load
 from catalogs.scenario import Scenario, find_scenario_problems
-from catalogs.surfaces import load_surface
-from catalogs.tyres import load_tyre, tyre_entries
-from catalogs.vehicles import load_vehicle
+from catalogs.tyres import tyre_entries
 from flows.judging.physics_constants import make_constants
 from flows.making.clip import collect_motion_figures
 from flows.making.driving import collect_surface_figures, simulate_drive
@@ -92,7 +89,7 @@ def make_clip(scenario: Scenario, vehicle: Vehicle, mode: Mode, *, duration_s: f
     mode : paper or coupled
     duration_s : length [s]
     """
-    pavement, steady = load_surface("dense-asphalt"), load_low_speed()
+    pavement, steady = load("surface", "dense-asphalt"), load("low-speed rule")
     route = make_route(scenario.initial_speed_km_h / 3.6 * duration_s + 30.0)
     state, ride = simulate_drive(scenario, vehicle, pavement, mode, duration_s, steady, sample_grade(route))
     ticks = ride.columns
@@ -134,17 +131,17 @@ def _read_constants(vehicle: Vehicle, mode: Mode) -> Constants:
     car = {
         f.name: value for f in fields(vehicle) if isinstance(value := getattr(vehicle, f.name), float | int)
     }
-    steady = load_low_speed()
+    steady = load("low-speed rule")
     tyre = None if vehicle.tyre is None else tyre_entries(find_entry("tyre", TYRE).read_bytes())
     return make_constants(
-        car, vehicle, load_surface("dense-asphalt"), mode=mode, ticks_per_frame=100.0, steady=steady, tyre=tyre
+        car, vehicle, load("surface", "dense-asphalt"), mode=mode, ticks_per_frame=100.0, steady=steady, tyre=tyre
     )  # fmt: skip
 
 
 def draw_vehicle(draw: np.random.Generator, mode: Mode) -> Vehicle:
     """Return a catalogue car, half of them calibrated otherwise, some on the Magic Formula, some with effects."""
     names = CARS if mode == "coupled" else CARS[:1]
-    vehicle = load_vehicle(str(draw.choice(names)))
+    vehicle = load("vehicle", str(draw.choice(names)))
     if draw.random() < 0.5:
         kept = ("gravity", "slip_speed_floor", "stop_speed", "lock_speed", "name", "static_pitch")
         scaled = {
@@ -153,7 +150,7 @@ def draw_vehicle(draw: np.random.Generator, mode: Mode) -> Vehicle:
         }  # fmt: skip
         vehicle = replace(vehicle, **{k: v for k, v in scaled.items() if not k.startswith("abs_")})  # type: ignore[arg-type]
     if draw.random() < 0.3:
-        vehicle = replace(vehicle, tyre=load_tyre(TYRE))
+        vehicle = replace(vehicle, tyre=load("tyre", TYRE))
     if mode == "coupled" and draw.random() < 0.2:
         vehicle = replace(vehicle, abs_build_rate=8.0, abs_release_rate=25.0)
     if mode == "coupled" and draw.random() < 0.6:

@@ -9,8 +9,7 @@ from pydantic import AfterValidator, Field, ValidationError, ValidationInfo, fie
 from catalogs.channel_maps.conditions import Conditions, find_condition_problems
 from catalogs.channel_maps.text_files import CsvEntry
 from catalogs.channel_maps.tolerances import Tolerances
-from catalogs.documents import read_yaml
-from catalogs.entries import find_entry
+from catalogs.documents import parse_yaml
 from catalogs.names import LONGEST_NAME
 from catalogs.quantities import CatalogueEntry, Number, Text
 from catalogs.sentences import cap_problems, describe_rules, shorten, shorten_value
@@ -263,22 +262,25 @@ def _raise_problems(value: Kept, problems: list[str]) -> Kept:
     return value
 
 
-def load_channel_map(name_or_path: str | Path) -> tuple[ChannelMap, Path]:
-    """Read a map by its name in the catalogue or from a YAML file; also the file.
+def build_channel_map(content: bytes, place: Path) -> tuple[ChannelMap, Path]:
+    """Return the map that a YAML file holds; also the file.
+
+    Parameters
+    ----------
+    content, place : of the file
 
     Raises
     ------
     InputError
-        If there is no such map, or it is no YAML; the sentence lists the maps that exist.
+        If it is no YAML.
     FaultyMap
         Listing every problem of the file.
     """
-    path = find_entry("channel map", name_or_path)
-    content = read_yaml(path, "channel map", finite=False)
+    table = parse_yaml(content, place, "channel map", finite=False)
     try:
-        return ChannelMap.model_validate(content), path
+        return ChannelMap.model_validate(table), place
     except ValidationError as error:
-        raise FaultyMap(cap_problems(describe_rules(error, path)), _readable_part(content)) from None
+        raise FaultyMap(cap_problems(describe_rules(error, place)), _readable_part(table)) from None
 
 
 def _readable_part(content: dict[str, Any]) -> ChannelMap | None:

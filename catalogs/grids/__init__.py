@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from catalogs.documents import read_yaml
-from catalogs.entries import find_entry
+from catalogs.documents import parse_yaml
 from catalogs.grids.blocks import fields_set_by, list_combinations
 from catalogs.grids.faults import read_form
 from catalogs.grids.form import GridFile
@@ -15,7 +14,7 @@ from catalogs.scenario import UNKNOWN_WEATHER, Scenario, find_range_problems, fi
 from catalogs.sentences import cap_problems, name_some, shorten
 from tasks.errors import InputError
 
-__all__ = ["FaultyGrid", "Grid", "GridFile", "expand_grid", "load_grid", "warn_of_late_brakes"]
+__all__ = ["FaultyGrid", "Grid", "GridFile", "build_grid", "expand_grid", "warn_of_late_brakes"]
 
 LONGEST_LABEL = 200
 """Bytes of a label [1]: with a suffix it is still a file name, of 255 bytes at most."""
@@ -57,18 +56,21 @@ class FaultyGrid(InputError):
         self.grid = grid
 
 
-def load_grid(source: str | Path) -> Grid:
-    """Read and check a grid by catalogue name or file.
+def build_grid(content: bytes, path: Path) -> Grid:
+    """Return the grid that a file holds, checked.
+
+    Parameters
+    ----------
+    content, path : of the file
 
     Raises
     ------
     InputError
-        The file cannot be read.
+        The file is no YAML.
     FaultyGrid
         Listing every problem of the file at once.
     """
-    path = find_entry("grid", source)
-    form = read_form(read_yaml(path, "grid", finite=False), path)
+    form = read_form(parse_yaml(content, path, "grid", finite=False), path)
     problems = cap_problems(form.problems)
     grid = None if form.settings is None else Grid(settings=form.settings, scenarios=(), tags=())
     if form.settings is not None and form.is_expandable:

@@ -5,22 +5,24 @@ from typing import Annotated, Literal
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from catalogs.entries import load
 from catalogs.grids.blocks import Blocks, PartialScenario, Whole, count_combinations
 from catalogs.grids.blocks import Number as LaxNumber
 from catalogs.grids.selection import Condition
 from catalogs.names import Name
-from catalogs.physical_limits import find_limit_problem, load_physical_limits
+from catalogs.physical_limits import find_limit_problem
 from catalogs.variants import Variant
 
-LIMITS = load_physical_limits()
+LIMITS = load("table of physical limits")
 TICK_RATE_HZ = 1000
 MOST_CLIPS = 100_000
 """Clips of one grid [1]: a manifest takes 2 kB a clip and every command reads it whole, 200 MB of JSON here."""
 Reference = Annotated[str, Field(min_length=1, max_length=4096)]
 """Name or file of an entry; 4096 characters are the longest path."""
 
-BEFORE = {"low_speed": "literal", "variant": "full"}
-"""Value of a setting that a record lacks; for ``low_speed`` grid files mean another default."""
+BEFORE = {"composition": "linear", "low_speed": "literal", "duration_s": None, "variant": "full"}
+"""Value of a setting that a record lacks, and that an id leaves out, so that older clips keep theirs; for ``low_speed``
+grid files mean another default."""
 
 
 class GridFile(Blocks):

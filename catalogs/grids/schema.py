@@ -2,9 +2,8 @@
 
 from typing import Any
 
-from catalogs.entries import entry_names
+from catalogs.entries import entry_names, load
 from catalogs.grids import GridFile
-from catalogs.physical_limits import load_physical_limits
 from catalogs.scenario import SCENARIO_FIELDS, Scenario, list_ranges
 from catalogs.scenes import BUILT_IN
 from tasks.conventions import CHANNELS_BY_NAME
@@ -21,7 +20,7 @@ def grid_schema() -> dict[str, Any]:
         bounds = zip(("minimum", "maximum"), ranges.get(name, (None, None)), strict=True)
         fields[name] |= {"description": f"{channel.description}{unit}", "default": getattr(Scenario(), name)}
         fields[name] |= {bound: value for bound, value in bounds if value is not None}
-    schema["properties"]["duration_s"]["maximum"] = load_physical_limits().duration.value
+    schema["properties"]["duration_s"]["maximum"] = load("table of physical limits").duration.value
     entries = {
         "vehicle": entry_names("vehicle"),
         "surface": entry_names("surface"),

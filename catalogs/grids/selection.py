@@ -6,7 +6,8 @@ from typing import Annotated, Any
 
 from pydantic import Field, RootModel, model_validator
 
-from catalogs.calibrated_range import CALIBRATION_TAGS, calibration_tag, load_calibrated_range
+from catalogs.calibrated_range import CALIBRATION_TAGS, calibration_tag
+from catalogs.entries import load
 from catalogs.grids.blocks import Number, Strict
 from catalogs.scenario import NUMBERS, SCENARIO_FIELDS, Scenario
 from catalogs.sentences import shorten_value
@@ -72,7 +73,7 @@ class Condition(RootModel[dict[str, Value | Annotated[list[Value], Field(min_len
 
 def facts_of(scenario: Scenario) -> dict[str, Any]:
     """Return the facts that conditions test: the scenario's fields and its place in the calibrated range."""
-    return scenario.as_row() | {CALIBRATION: calibration_tag(scenario, load_calibrated_range())}
+    return scenario.as_row() | {CALIBRATION: calibration_tag(scenario, load("calibrated range"))}
 
 
 def split_of(facts: Mapping[str, Any], splits: Mapping[str, Condition]) -> str | None:

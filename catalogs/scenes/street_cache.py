@@ -39,7 +39,8 @@ def cached_street(*changes: Path, seed: int = 2025) -> Path:
     InputError
         If the cache cannot be written, or holds in the street's place what is no street.
     """
-    folder = cache_root() / f"street-{seed}-{_recipe_hash(*changes)}"
+    entries = (STREET_FILE, *changes)
+    folder = cache_root() / f"street-{seed}-{_recipe_hash(entries, tuple(map(_stamp_file, entries)))}"
     try:
         if not _is_whole(folder):
             with _only_maker(folder.parent):
@@ -129,10 +130,11 @@ def _only_maker(root: Path) -> FileLock:
     return FileLock(root / "street.lock", mode=0o644)
 
 
-def _recipe_hash(*changes: Path) -> str:
+@lru_cache(maxsize=8)
+def _recipe_hash(entries: tuple[Path, ...], _: tuple[tuple[int, ...], ...]) -> str:
     """Over the entries of a street, the code that makes it and the libraries that it computes with."""
-    entries = [path.read_bytes() for path in (STREET_FILE, *changes)]
-    digest = hashlib.sha256(b"".join([f"{np.__version__} {scipy.__version__}".encode(), *entries]))
+    contents = [path.read_bytes() for path in entries]
+    digest = hashlib.sha256(b"".join([f"{np.__version__} {scipy.__version__}".encode(), *contents]))
     package = Path(tasks.scene.__file__).parent
     for path in sorted(package.rglob("*.py")):
         if "stereo" not in path.parts:

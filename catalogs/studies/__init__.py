@@ -14,7 +14,6 @@ from catalogs.quantities import (
     Table,
     Text,
     read_entries,
-    read_entry,
     require_quantity,
 )
 from catalogs.scenario import Scenario
@@ -65,6 +64,20 @@ class SensitivityEntry(CatalogueEntry):
     snow: WeatherStudyEntry
     printed: tuple[PrintedEntry, ...]
 
+    def build(self) -> tuple[StudyProtocol, tuple[PrintedFigure, ...]]:
+        """Protocol and printed figures of the paper's Appendix E."""
+        values: dict[str, Any] = {name: quantity.value for name, quantity in self.protocol}
+        values["initial_speed"] /= 3.6
+        values["samples"] = int(values["samples"])
+        protocol = StudyProtocol(
+            **values,
+            weathers={
+                kind: WeatherStudy(kind=kind, **_make_study(varied))
+                for kind, varied in (("rain", self.rain), ("snow", self.snow))
+            },
+        )
+        return protocol, tuple(PrintedFigure(**figure.model_dump()) for figure in self.printed)
+
 
 class ConditionEntry(PartialScenario):
     """One condition of the paper's Appendix C as the file gives it."""
@@ -87,35 +100,6 @@ class Condition:
     name: str
     split: str
     scenario: Scenario
-
-
-SENSITIVITY = FOLDER / "surface-sensitivity.yaml"
-
-
-def load_sensitivity_study(path: Path = SENSITIVITY) -> tuple[StudyProtocol, tuple[PrintedFigure, ...]]:
-    """Protocol and printed figures of the paper's Appendix E.
-
-    Parameters
-    ----------
-    path : the study's file
-
-    Raises
-    ------
-    InputError
-        Listing every problem of the file.
-    """
-    entry = read_entry(SensitivityEntry, path, "study")
-    values: dict[str, Any] = {name: quantity.value for name, quantity in entry.protocol}
-    values["initial_speed"] /= 3.6
-    values["samples"] = int(values["samples"])
-    protocol = StudyProtocol(
-        **values,
-        weathers={
-            kind: WeatherStudy(kind=kind, **_make_study(varied))
-            for kind, varied in (("rain", entry.rain), ("snow", entry.snow))
-        },
-    )
-    return protocol, tuple(PrintedFigure(**figure.model_dump()) for figure in entry.printed)
 
 
 def load_conditions() -> tuple[Condition, ...]:

@@ -2,19 +2,21 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 
+from catalogs.entries import load
 from catalogs.names import WeatherName
-from catalogs.quantities import CatalogueEntry, Scalar, Text, read_entry, require_quantity
+from catalogs.quantities import CatalogueEntry, Scalar, Text, require_quantity
 from catalogs.scenario import Scenario
-from catalogs.studies import SENSITIVITY, Condition, load_conditions, load_sensitivity_study
+from catalogs.studies import Condition, load_conditions
 from catalogs.variants import Variant
+from tasks.studies.sensitivity import StudyProtocol
 from tasks.surface.weather import DRY, find_weather
 
-ABLATION = Path(__file__).with_name("ablation.yaml")
+ABLATION = "ablation.yaml"
+"""Name among the kept inputs of a dataset of ``fixed-mu``."""
 
 Rate = Annotated[Scalar, require_quantity("mm h-1", above=0)]
 
@@ -60,7 +62,8 @@ class FamilyWeather:
 
 def load_ablation() -> Ablation:
     """The study of the paper's Section 4.4."""
-    entry, protocol = load_ablation_entry(), load_sensitivity_study()[0]
+    entry: AblationEntry = load("ablation")
+    protocol = load("sensitivity study")[0]
     conditions = {condition.name: condition for condition in load_conditions()}
     dry = conditions[entry.stop_condition].scenario
     stops: dict[str, tuple[Scenario, ...]] = {}
@@ -79,51 +82,16 @@ def load_ablation() -> Ablation:
     )
 
 
-def load_ablation_entry(path: Path = ABLATION) -> AblationEntry:
-    """Read the ablation's file.
-
-    Raises
-    ------
-    InputError
-        Listing every problem of the file.
-    """
-    return read_entry(AblationEntry, path, "study")
-
-
-def load_families(ablation: Path = ABLATION, study: Path = SENSITIVITY) -> FamilyWeather:
-    """Read what stands for each kind of weather in ``fixed-mu``.
+def find_families(entry: AblationEntry, study: StudyProtocol) -> FamilyWeather:
+    """Return what stands for each kind of weather in ``fixed-mu``.
 
     Parameters
     ----------
-    ablation, study : files of the ablation, and of the study whose snow has fallen for so long
-
-    Raises
-    ------
-    InputError
-        Listing every problem of the files.
+    entry : of the ablation
+    study : whose snow has fallen for so long
     """
-    rates = {kind: rate.value for kind, rate in load_ablation_entry(ablation).family_rates.items()}
-    return FamilyWeather(
-        rates_mm_h=rates, accumulation_h=load_sensitivity_study(study)[0].snow_accumulation_h
-    )
-
-
-def load_kept_families(inputs: Path, variant: Variant) -> FamilyWeather | None:
-    """Read `load_families` among a dataset's kept inputs; None where its variant has none.
-
-    Parameters
-    ----------
-    inputs : folder of the kept catalogue files
-    variant : of the dataset
-
-    Raises
-    ------
-    InputError
-        Listing every problem of the files.
-    """
-    if variant != "fixed-mu":
-        return None
-    return load_families(inputs / ABLATION.name, inputs / "study.yaml")
+    rates = {kind: rate.value for kind, rate in entry.family_rates.items()}
+    return FamilyWeather(rates_mm_h=rates, accumulation_h=study.snow_accumulation_h)
 
 
 def cut_coupling(scenario: Scenario, variant: Variant, families: FamilyWeather | None = None) -> Scenario:
@@ -142,7 +110,7 @@ def cut_coupling(scenario: Scenario, variant: Variant, families: FamilyWeather |
         return replace(dry, peak_pressure_mpa=0.0, brake_onset_s=None, brake_onset_m=None)
     if variant in ("full", "no-low-speed-rule"):
         return scenario
-    families = families or load_families()
+    families = families or find_families(load("ablation"), load("sensitivity study")[0])
     if (rate := families.rates_mm_h.get(scenario.weather)) is None:
         return scenario
     hours = families.accumulation_h if find_weather(scenario.weather).accumulates else 0.0

@@ -8,11 +8,10 @@ from pydantic import Field
 from catalogs.documents import read_json_document
 from catalogs.effects.truths import Truth
 from catalogs.names import WeatherName
-from catalogs.quantities import CatalogueEntry, Number, read_entry
+from catalogs.quantities import CatalogueEntry, Number
 from tasks.campaign.planned_runs import TRAINING, RunPlan
 from tasks.surface.weather import DRY
 
-FILE = Path(__file__).with_name("closing.yaml")
 ERROR_RATES = Path(__file__).with_name("closing_error_rates.json")
 """Counts of `musync lab close-loop-benchmark`, without the campaigns one by one."""
 
@@ -55,21 +54,6 @@ class ClosingStudy(CatalogueEntry):
         count = len(truths)
         chosen = {frozenset((j, (j + self.partner_after) % count)): None for j in range(count)}
         return tuple((truths[min(pair)], truths[max(pair)]) for pair in chosen if len(pair) == 2)
-
-
-def load_closing_study(path: str | Path = FILE) -> ClosingStudy:
-    """The study's file.
-
-    Parameters
-    ----------
-    path : YAML
-
-    Raises
-    ------
-    InputError
-        With every rule the file breaks.
-    """
-    return read_entry(ClosingStudy, Path(path), "study")
 
 
 def load_error_rates() -> dict[str, Any]:

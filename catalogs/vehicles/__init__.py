@@ -1,23 +1,22 @@
 """Vehicles: mechanical values, tyre families and frozen calibration."""
 
-from functools import cache
+from dataclasses import dataclass
+from functools import cache, cached_property
 from math import radians
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
-from catalogs.entries import find_entry
+from catalogs.entries import KINDS, find_entry, parse, read_file
 from catalogs.names import Name, WeatherName
 from catalogs.quantities import CatalogueEntry, Scalar, parse_entry, require_quantity
 from catalogs.tyre_families import KNOT_TABLES, FamilyEntry
-from catalogs.tyres import load_tyre
 from catalogs.vehicles.added import FormEntry, find_effect_problems
 from catalogs.vehicles.frozen import Provenance
 from catalogs.vehicles.inherited import Generation, join_generations, read_generations
 from catalogs.vehicles.numbers import VehicleNumber
-from catalogs.weather.grip import FOLDER as WEATHER
-from catalogs.weather.grip import shared_families
+from catalogs.weather.grip import WEATHER, WeatherFolder
 from tasks.vehicle.effects.table import EFFECT_UNITS, PARAMETERS
 from tasks.vehicle.parameters import Vehicle
 
@@ -91,144 +90,113 @@ class VehicleEntry(CatalogueEntry):
         return {**inside, **knots, **EFFECT_UNITS}
 
 
-def vehicle_tyre_source(name_or_path: str | Path) -> Path | None:
-    """The property file of the tyre that a vehicle names: beside the file that names it, or in the catalogue.
+@dataclass(frozen=True, kw_only=True)
+class VehicleFile:
+    """A vehicle's file with those that it extends, read and checked once.
+
+    Parameters
+    ----------
+    source : the file
+    content : the file with everything in it that it inherits: what a dataset keeps, and what hashes cover; the file's
+        own bytes where it extends no other vehicle
+    entry : what it holds
+    tyre_source : property file of the tyre that the vehicle names, beside the file that names it or in the catalogue;
+        None where it names none and drives on its families' Burckhardt curves
+    """
+
+    source: Path
+    content: bytes
+    entry: VehicleEntry
+    tyre_source: Path | None
+
+    @property
+    def provenance(self) -> Provenance | None:
+        """Where the numbers come from, if it is a frozen vehicle or extends one."""
+        return self.entry.provenance
+
+    @property
+    def numbers(self) -> dict[str, VehicleNumber]:
+        """Each number: by the field of `Vehicle`, and of effects by the name in the table of effects."""
+        own = {name: number for name, number in self.entry if isinstance(number, VehicleNumber)}
+        return own | self.entry.effects
+
+    @property
+    def tolerances(self) -> dict[str, float]:
+        """One sigma of each of the `numbers` that has a tolerance, as a share of its value [1]."""
+        shares = {name: number.relative_tolerance for name, number in self.numbers.items()}
+        return {name: share for name, share in shares.items() if share is not None}
+
+    @cached_property
+    def tyre(self) -> tuple[Path, bytes] | None:
+        """The tyre's file and its content."""
+        return (
+            None if self.tyre_source is None else (self.tyre_source, read_file("tyre", self.tyre_source)[0])
+        )
+
+    def build(self, weather: WeatherFolder = WEATHER) -> Vehicle:
+        """Return the vehicle; the weather has tyre families for kinds that it has none of."""
+        values: dict[str, Any] = {name: one.value for name, one in self.entry if isinstance(one, Scalar)}
+        values["static_pitch"] = radians(values["static_pitch"])
+        return Vehicle(
+            name=self.source.stem,
+            families={kind: family.family for kind, family in self.entry.families.items()},
+            shared_families=weather.families,
+            tyre=None if self.tyre is None else parse("tyre", self.tyre[1], self.tyre[0]),
+            effects={name: number.value for name, number in self.entry.effects.items()},
+            forms=tuple(form.form for form in self.entry.forms),
+            **values,
+        )
+
+
+def open_vehicle(name_or_path: str | Path) -> VehicleFile:
+    """Read a vehicle's file, by its name in the catalogue or its path, and those that it extends.
 
     Parameters
     ----------
     name_or_path : of the vehicle
 
-    Returns
-    -------
-    The file; None where the vehicle names none and drives on its families' Burckhardt curves.
-
     Raises
     ------
     InputError
-        As ``load_vehicle``.
+        Listing every problem of the files, or the names that exist.
     """
-    line = read_generations(find_entry("vehicle", name_or_path))
-    return _find_tyre(_check_line(line), line)
+    return _open_content(*read_file("vehicle", name_or_path))
 
 
-def vehicle_provenance(name_or_path: str | Path) -> Provenance | None:
-    """Where a vehicle's numbers come from, if it is a frozen one or extends one.
-
-    Raises
-    ------
-    InputError
-        As ``load_vehicle``.
-    """
-    return _check_line(read_generations(find_entry("vehicle", name_or_path))).provenance
-
-
-def vehicle_content(name_or_path: str | Path) -> bytes:
-    """The file of a vehicle with everything in it that it inherits: what a dataset keeps, and what hashes cover.
+def build_vehicle(content: bytes, source: Path, weather: WeatherFolder = WEATHER) -> Vehicle:
+    """Return the vehicle of a file that is already read.
 
     Parameters
     ----------
-    name_or_path : of the vehicle
-
-    Returns
-    -------
-    The file's own bytes where it extends no other vehicle.
+    content, source : of the file
+    weather : as of `VehicleFile.build`
 
     Raises
     ------
     InputError
-        As ``load_vehicle``.
+        As `open_vehicle`.
     """
-    line = read_generations(find_entry("vehicle", name_or_path))
-    _check_line(line)
-    return join_generations(line)
-
-
-def vehicle_numbers(name_or_path: str | Path) -> dict[str, VehicleNumber]:
-    """Each number of a vehicle: by the field of `Vehicle`, and of its effects by the name in the table of effects.
-
-    Parameters
-    ----------
-    name_or_path : of the vehicle
-
-    Raises
-    ------
-    InputError
-        As ``load_vehicle``.
-    """
-    entry = _check_line(read_generations(find_entry("vehicle", name_or_path)))
-    return {name: number for name, number in entry if isinstance(number, VehicleNumber)} | entry.effects
-
-
-def load_tolerances(name_or_path: str | Path) -> dict[str, float]:
-    """One sigma of each number of a vehicle that has a tolerance, as a share of its value [1].
-
-    Parameters
-    ----------
-    name_or_path : of the vehicle
-
-    Returns
-    -------
-    By the field of `Vehicle`, and of its effects by the name in the table of effects; empty where nobody gave one.
-
-    Raises
-    ------
-    InputError
-        As ``load_vehicle``.
-    """
-    numbers = vehicle_numbers(name_or_path)
-    return {
-        name: share for name, number in numbers.items() if (share := number.relative_tolerance) is not None
-    }
+    return _open_content(content, source).build(weather)
 
 
 @cache
 def vehicle_units() -> dict[str, str]:
     """Unit of each number of a vehicle file."""
-    return {name: number.unit for name, number in vehicle_numbers("paper-reference").items()}
+    return {name: number.unit for name, number in open_vehicle("paper-reference").numbers.items()}
 
 
-def load_vehicle(name_or_path: str | Path, weather: Path = WEATHER) -> Vehicle:
-    """Read a vehicle by its name in the catalogue or from a YAML file.
-
-    Parameters
-    ----------
-    name_or_path : name, or path ending in .yaml
-    weather : folder of the weather catalogue, which has tyre families for kinds that the vehicle has none of
-
-    Raises
-    ------
-    InputError
-        Listing every problem of the file, or the names that exist.
-    """
-    source = find_entry("vehicle", name_or_path)
-    line = read_generations(source)
-    entry = _check_line(line)
-    values: dict[str, Any] = {
-        name: quantity.value
-        for name in VehicleEntry.model_fields
-        if isinstance(quantity := getattr(entry, name), Scalar)
-    }
-    families = {kind: family.family for kind, family in entry.families.items()}
-    values["static_pitch"] = radians(values["static_pitch"])
-    effects = {name: number.value for name, number in entry.effects.items()}
-    forms = tuple(form.form for form in entry.forms)
-    tyre = None if (file := _find_tyre(entry, line)) is None else load_tyre(file)
-    return Vehicle(
-        name=source.stem, families=families, shared_families=shared_families(weather), tyre=tyre, effects=effects,
-        forms=forms, **values,
-    )  # fmt: skip
+def _open_content(content: bytes, source: Path) -> VehicleFile:
+    line = read_generations(content, source)
+    # what another file brings is checked first, so that a problem is told of its file
+    for oldest in range(len(line) - 1, -1, -1):
+        whole = join_generations(line[oldest:])
+        entry = parse_entry(VehicleEntry, whole, line[oldest].source, "vehicle")
+    return VehicleFile(source=source, content=whole, entry=entry, tyre_source=_find_tyre(entry, line))
 
 
 def _find_tyre(entry: VehicleEntry, line: list[Generation]) -> Path | None:
     if entry.tyre is None:
         return None
     vehicle = line[0] if len(line) == 1 else next(one for one in line if "tyre" in one.table)
-    beside = vehicle.source.with_name(f"{entry.tyre}.tir")
+    beside = vehicle.source.with_name(f"{entry.tyre}{KINDS['tyre'].suffixes[0]}")
     return beside if beside.is_file() else find_entry("tyre", entry.tyre)
-
-
-def _check_line(line: list[Generation]) -> VehicleEntry:
-    """The vehicle of these files; what another one brings is checked first, so that a problem is told of its file."""
-    if len(line) > 1:
-        _check_line(line[1:])
-    return parse_entry(VehicleEntry, join_generations(line), line[0].source, "vehicle")

@@ -41,12 +41,12 @@ class Generation:
         return parse_yaml(self.content, self.source, "vehicle", finite=False)
 
 
-def read_generations(source: Path) -> list[Generation]:
+def read_generations(content: bytes, source: Path) -> list[Generation]:
     """Return the files that make a vehicle, the vehicle's own first.
 
     Parameters
     ----------
-    source : file of the vehicle
+    content, source : of the vehicle's file
 
     Raises
     ------
@@ -57,7 +57,6 @@ def read_generations(source: Path) -> list[Generation]:
     seen: list[str] = []
     while True:
         seen.append(os.path.realpath(source))
-        content = read_content(source, "vehicle", LARGEST_YAML)
         check_seal(content, source)
         line.append(Generation(source=source, content=content))
         # most files extend nothing and are parsed once, by the model that checks them
@@ -79,6 +78,7 @@ def read_generations(source: Path) -> list[Generation]:
                 f"{shorten(line[0].source)}: at most {MOST_GENERATIONS} files may extend each other; there are more:"
                 f" {chain}"
             )
+        content = read_content(source, "vehicle", LARGEST_YAML)
 
 
 def join_generations(line: Sequence[Generation]) -> bytes:

@@ -1,7 +1,7 @@
 """Numbers of the surface, and tyre families, that the entries of the kinds of weather give."""
 
-from collections.abc import Iterator
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from pydantic import ConfigDict, Field, field_validator
@@ -13,8 +13,6 @@ from catalogs.tyre_families import FamilyEntry
 from tasks.surface.weather import WEATHERS
 from tasks.vehicle.parameters import TyreFamily
 
-FOLDER = Path(__file__).parent
-"""Entries that ship: one YAML file for each kind of weather, beside those of the air and the sky."""
 KIND_OF_FILE = "weather catalogue's file"
 """Name of such a file in sentences."""
 
@@ -51,43 +49,42 @@ class GripEntry(CatalogueEntry):
 GRIP_SECTIONS = tuple(GripEntry.model_fields)
 
 
-def shared_families(folder: Path) -> dict[str, TyreFamily]:
-    """Tyre families that the kinds of weather bring, by kind.
+@dataclass(frozen=True)
+class WeatherFolder:
+    """A folder with a file for each kind of weather, and those of the air and the sky; each file is read once.
 
     Parameters
     ----------
-    folder : of the weather catalogue
-
-    Raises
-    ------
-    InputError
-        Listing every problem of a file.
+    folder : of the files
     """
-    return {kind: entry.tyre.family for kind, entry in _load_entries(folder) if entry.tyre is not None}
+
+    folder: Path
+
+    @cached_property
+    def contents(self) -> dict[str, bytes]:
+        """Content of each file, by its name without the suffix; raises `InputError` where one cannot be read."""
+        files = sorted(self.folder.glob("*.yaml"))
+        return {file.stem: read_content(file, KIND_OF_FILE, LARGEST_YAML) for file in files}
+
+    @cached_property
+    def grips(self) -> dict[str, GripEntry]:
+        """How kinds of weather grip; raises `InputError` that lists every problem of a file."""
+        return {
+            kind: parse_entry(GripEntry, self.contents[kind], self.folder / f"{kind}.yaml", KIND_OF_FILE)
+            for kind in WEATHERS
+            if kind in self.contents
+        }
+
+    @property
+    def families(self) -> dict[str, TyreFamily]:
+        """Tyre families that the kinds of weather bring, by kind."""
+        return {kind: entry.tyre.family for kind, entry in self.grips.items() if entry.tyre is not None}
+
+    @property
+    def surface_numbers(self) -> dict[str, Bounded]:
+        """Numbers of ``SurfaceParameters`` that the kinds of weather bring, by field."""
+        return {name: number for entry in self.grips.values() for name, number in entry.surface.items()}
 
 
-def weather_numbers(folder: Path) -> dict[str, Bounded]:
-    """Numbers of ``SurfaceParameters`` that the kinds of weather bring, by field.
-
-    Parameters
-    ----------
-    folder : of the weather catalogue
-
-    Raises
-    ------
-    InputError
-        Listing every problem of a file.
-    """
-    return {name: number for _, entry in _load_entries(folder) for name, number in entry.surface.items()}
-
-
-def _load_entries(folder: Path) -> Iterator[tuple[str, GripEntry]]:
-    for kind in WEATHERS:
-        path = folder / f"{kind}.yaml"
-        if path.is_file():
-            yield kind, _parse_entry(read_content(path, KIND_OF_FILE, LARGEST_YAML), path)
-
-
-@lru_cache(maxsize=64)
-def _parse_entry(content: bytes, path: Path) -> GripEntry:
-    return parse_entry(GripEntry, content, path, KIND_OF_FILE)
+WEATHER = WeatherFolder(Path(__file__).parent)
+"""The kinds of weather that ship."""

@@ -8,16 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from catalogs.low_speed import load_kept_low_speed
-from catalogs.road_grade import load_kept_grade
 from catalogs.scenario import Scenario, find_scenario_problems
-from catalogs.studies import load_sensitivity_study
-from catalogs.studies.ablation import FamilyWeather, cut_coupling, load_kept_families
-from catalogs.surfaces import load_surface
+from catalogs.studies.ablation import cut_coupling
 from catalogs.variants import Variant
-from catalogs.vehicles import load_vehicle
 from catalogs.weather.grip import GRIP_SECTIONS
 from flows.auditing.kept_lines import Line, is_number, scale_line
+from flows.making.catalogue import Catalogue
 from flows.making.driving import (
     collect_surface_figures,
     hazard_of,
@@ -35,11 +31,8 @@ from tasks.errors import InputError
 from tasks.explanation import Step, force_steps, pitch_steps, surface_steps
 from tasks.render.camera import body_poses
 from tasks.scene.route import Route
-from tasks.studies.sensitivity import StudyProtocol
-from tasks.surface.road_profile import RoadGrade
-from tasks.surface.state import SurfaceParameters, SurfaceState
-from tasks.vehicle.paper.low_speed import SteadyStop
-from tasks.vehicle.parameters import Vehicle, compute_surface_response
+from tasks.surface.state import SurfaceState
+from tasks.vehicle.parameters import compute_surface_response
 from tasks.vehicle.rollout import Mode, Rollout, compute_lift_times
 
 SMALL, LARGE = (1.01, 0.99), (2.0, 0.5)
@@ -49,18 +42,6 @@ TICKS = frozenset(channel.name for channel in TICK_CHANNELS)
 STUDY = "study.yaml"
 ASKED = "asked for"
 """File of the lines that are no catalogue's: the numbers that the grid asks for."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Entries:
-    """The entries that a clip is driven with."""
-
-    vehicle: Vehicle
-    surface: SurfaceParameters
-    study: StudyProtocol
-    steady: SteadyStop | None
-    families: FamilyWeather | None
-    grade: RoadGrade
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,25 +87,7 @@ class Moved:
     beyond: tuple[str, ...] = ()
 
 
-def load_entries(inputs: Path, variant: Variant) -> Entries:
-    """Read vehicle, pavement and study of a folder as a dataset keeps them, and what its variant needs.
-
-    Raises
-    ------
-    InputError
-        If one breaks a rule.
-    """
-    return Entries(
-        vehicle=load_vehicle(inputs / "vehicle.yaml", inputs / "weather"),
-        surface=load_surface(inputs / "surface.yaml", inputs / "weather"),
-        study=load_sensitivity_study(inputs / STUDY)[0],
-        steady=load_kept_low_speed(inputs),
-        families=load_kept_families(inputs, variant),
-        grade=load_kept_grade(inputs),
-    )
-
-
-def drive_clip(asked: Asked, entries: Entries) -> Drive:
+def drive_clip(asked: Asked, entries: Catalogue) -> Drive:
     """Drive a clip; its numbers are those of its ticks, poses, figures and label ranges.
 
     Parameters
@@ -176,7 +139,7 @@ def lay_straight_route(length: float) -> Route:
     return Route(station=station, T_world_rig=T_world_rig)
 
 
-def list_steps(asked: Asked, entries: Entries, drive: Drive) -> list[Step]:
+def list_steps(asked: Asked, entries: Catalogue, drive: Drive) -> list[Step]:
     """Return the steps by which the numbers of the hardest braked tick follow, as of `musync explain`.
 
     Parameters
@@ -251,14 +214,14 @@ def _move_line(asked: Asked, kept: Mapping[str, bytes], line: Line, before: Driv
 
 def _change_line(
     asked: Asked, kept: Mapping[str, bytes], line: Line, factor: float, inputs: Path
-) -> tuple[Asked, Entries]:
+) -> tuple[Asked, Catalogue]:
     if line.file != ASKED:
         (inputs / line.file).write_bytes(scale_line(line.file, kept[line.file], line.place, factor))
-        return asked, load_entries(inputs, asked.variant)
+        return asked, Catalogue(inputs)
     scenario = replace(asked.scenario, **{line.key: line.value * factor})
     if problems := find_scenario_problems(scenario):
         raise InputError(problems)
-    return replace(asked, scenario=scenario), load_entries(inputs, asked.variant)
+    return replace(asked, scenario=scenario), Catalogue(inputs)
 
 
 def _find_moved(before: Mapping[str, Any], after: Mapping[str, Any]) -> set[str]:

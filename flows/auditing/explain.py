@@ -7,15 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from catalogs.cameras import load_camera
-from catalogs.low_speed import load_kept_low_speed
-from catalogs.road_grade import load_kept_grade
 from catalogs.scenario import Scenario
 from catalogs.scenes import load_scene
-from catalogs.studies.ablation import cut_coupling, load_kept_families
-from catalogs.surfaces import load_surface
+from catalogs.studies.ablation import cut_coupling
 from catalogs.variants import warn_of_variant
-from catalogs.vehicles import load_vehicle
+from flows.making.catalogue import Catalogue
 from flows.making.driving import collect_surface_depths, controls_of, hazard_of, surface_of, weather_of
 from flows.making.input_changes import refuse_changed_records
 from flows.making.places import find_scene
@@ -87,10 +83,10 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
             f"{folder}: every tick must have every number; frame {frame} or 0 of clip {planned.label} has none in"
             f" {', '.join(dict.fromkeys(empty))}: musync lab repair makes the table again"
         )
-    vehicle = load_vehicle(layout.inputs / "vehicle.yaml", layout.inputs / "weather")
+    catalogue = Catalogue(layout.inputs)
+    vehicle, surface, steady = catalogue.vehicle, catalogue.surface, catalogue.steady
     mode = plan.settings.vehicle_mode
-    surface = load_surface(layout.inputs / "surface.yaml", layout.inputs / "weather")
-    driven = cut_coupling(scenario, variant, load_kept_families(layout.inputs, variant))
+    driven = cut_coupling(scenario, variant, catalogue.families)
     if variant != "full":  # the stored depths are those of the picture, which the motion does not follow from
         row = row | collect_surface_depths(surface_of(driven, surface))
     hazard = hazard_of(driven)
@@ -99,17 +95,16 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
         friction=float(row["surface_friction"]),
         snow_depth_mm=float(row["snow_depth_mm"]),
     )
-    steady = load_kept_low_speed(layout.inputs)
     ride = simulate_scenario(
         vehicle, state, controls_of(driven), hazard, mode=mode, duration_s=plan.duration_s, steady=steady,
-        grade=load_kept_grade(layout.inputs),
+        grade=catalogue.grade,
     )  # fmt: skip
     response = compute_surface_response(vehicle, state.kind, state.friction)
     steps = [
         *surface_steps(weather_of(driven), surface, vehicle, row),
         *force_steps(vehicle, response, hazard, mode, row),
         *pitch_steps(vehicle, response, hazard, row, ride, steady),
-        *picture_steps(vehicle, load_camera(layout.inputs / "camera.yaml"), row, first, find_route(plan.scene)),
+        *picture_steps(vehicle, catalogue.camera, row, first, find_route(plan.scene)),
     ]  # fmt: skip
     result = {
         "dataset": str(layout.root),

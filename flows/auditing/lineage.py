@@ -15,12 +15,12 @@ from flows.auditing.driven_lines import (
     is_driven,
     list_asked,
     list_steps,
-    load_entries,
     move_lines,
 )
 from flows.auditing.explain import find_planned_clip, find_route
 from flows.auditing.kept_lines import Line, describe_file, list_lines
 from flows.auditing.lineage_text import format_text
+from flows.making.catalogue import Catalogue
 from flows.making.gathering import table_parts
 from flows.making.input_changes import read_kept
 from flows.making.plan import Plan
@@ -87,7 +87,7 @@ def trace_lineage(dataset: str, clip: str, *, out: str | None = None) -> dict[st
         scenario=planned.scenario, mode=plan.settings.vehicle_mode, variant=plan.settings.variant,
         duration_s=plan.duration_s, route=find_route(plan.scene),
     )  # fmt: skip
-    entries = load_entries(layout.inputs, asked.variant)
+    entries = Catalogue(layout.inputs)
     drive = drive_clip(asked, entries)
     units = {name: channel.unit for name, channel in CHANNELS_BY_NAME.items()}
     lines = list_asked(planned.scenario, units, manifest["grid"]["name"])

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from catalogs.cameras import load_camera
 from catalogs.scenario import Scenario
-from catalogs.vehicles import load_vehicle
+from flows.making.catalogue import Catalogue
 from flows.making.gathering import table_parts
 from flows.making.plan import Plan, read_plan
 from flows.store.arrays import arrays_of
@@ -139,14 +138,19 @@ class ExportedDataset:
         return read_plan(self.layout.root)
 
     @cached_property
+    def catalogue(self) -> Catalogue:
+        """The dataset's kept entries."""
+        return Catalogue(self.layout.inputs)
+
+    @property
     def camera(self) -> Camera:
         """The dataset's one camera."""
-        return load_camera(self.layout.inputs / "camera.yaml")
+        return self.catalogue.camera
 
-    @cached_property
+    @property
     def vehicle(self) -> Vehicle:
         """The dataset's one vehicle."""
-        return load_vehicle(self.layout.inputs / "vehicle.yaml", self.layout.inputs / "weather")
+        return self.catalogue.vehicle
 
     @property
     def frame_rate_hz(self) -> float:

@@ -16,9 +16,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from catalogs.entries import load
 from catalogs.sentences import shorten
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle, vehicle_content, vehicle_provenance
+from catalogs.vehicles import open_vehicle
 from flows.exporting.fmu_binary import (
     FRAME,
     PLATFORMS,
@@ -74,7 +74,7 @@ def write_fmu(
         partial(_refuse_unknown_platforms, chosen),
         *(partial(find_compiler, PLATFORMS[name]) for name in compilable),
         partial(_refuse_paper_mode, vehicle),
-        partial(load_surface, surface),
+        partial(load, "surface", surface),
     )
     for check in checks:
         try:
@@ -84,8 +84,9 @@ def write_fmu(
     if problems:
         raise InputError(problems)
     results = Outputs(Path(out).parent, "vehicle fmu", Path(out).name)
-    car = load_vehicle(vehicle)
-    results.write(Path(out).name, pack_fmu(car, vehicle_content(vehicle), surface, compilable))
+    file = open_vehicle(vehicle)
+    car = file.build()
+    results.write(Path(out).name, pack_fmu(car, file.content, surface, compilable))
     return {
         "fmu": out,
         "vehicle": car.name,
@@ -109,7 +110,7 @@ def pack_fmu(car: Vehicle, content: bytes, surface: str, platforms: Sequence[str
     platforms : where it will run, of `PLATFORMS`
     """
     weathers = car.find_weathers()
-    first = surface_state(Weather(kind=weathers[0]), load_surface(surface))
+    first = surface_state(Weather(kind=weathers[0]), load("surface", surface))
     starts = {row.name: row.start for row in INPUTS} | {
         "weather": float(find_weather(weathers[0]).code),
         "road_friction": first.friction,
@@ -153,8 +154,9 @@ def _refuse_unknown_platforms(names: Sequence[str]) -> None:
 
 def _refuse_paper_mode(vehicle: str) -> None:
     """Raise for a vehicle whose numbers mean something else in the physical model, which is what an FMU holds."""
-    frozen = vehicle_provenance(vehicle)
-    load_vehicle(vehicle)
+    file = open_vehicle(vehicle)
+    file.build()
+    frozen = file.provenance
     if frozen is not None and frozen.mode != "coupled":
         raise InputError(
             f"{shorten(vehicle)}: was fitted in {frozen.mode} mode, and an FMU drives the physical model, in which its"

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from catalogs.gates import load_gates
+from catalogs.entries import load
 from catalogs.grids.form import TICK_RATE_HZ
 from catalogs.studies.ablation import cut_coupling
 from catalogs.variants import VARIANTS, Variant
@@ -179,7 +179,7 @@ def score_controls(clips: list[JudgedClip], false: list[dict[str, Claim]]) -> It
     clips : as their judges saw them
     false : of `make_false_claims`
     """
-    gates = load_gates()
+    gates = load("gate file")
     true = _true_claims(clips)
     dry = [find_control(clip, clips, weather=True) for clip in clips]
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from catalogs.gates import load_foreign_gates
+from catalogs.entries import load
 from flows.judging.claims import read_claim
 from flows.judging.foreign_sources import read_camera, read_footage
 from flows.store.outputs import Outputs
@@ -43,7 +43,7 @@ def judge_video(
     footage, told, lens = _read_all((read_footage, video), (read_claim, claim), (read_camera, camera))
     at = sample_claim(told, footage.times)
     recovered = footage.motion(lens, at.rows, metric=metric)
-    verdict = judge_motion(recovered, at, load_foreign_gates())
+    verdict = judge_motion(recovered, at, load("foreign gate file"))
     times, is_video = footage.times, footage.frames is not None
     result = {
         "video": footage.name,

@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from catalogs.gates import load_gates
+from catalogs.entries import load
 from flows.judging.evaluation_rows import figure_row, find_control
 from flows.judging.judged_clip import JudgedClip, Row
 from flows.judging.standards import MeantMotion, Standard, opening_of, require_whole_way
@@ -50,7 +50,7 @@ def motion_rows(
 
 def pose_rows(clips: Sequence[JudgedClip], standard: Standard) -> Iterator[Row]:
     """Yield pitch and progress of each clip by each method, with uncertainty; a failure is reported, not scored."""
-    responds = load_gates().response_deg
+    responds = load("gate file").response_deg
     for clip, method, motion, meant in _list_judged(clips, standard):
         known = np.isfinite(meant.pitch)
         if not known[0]:

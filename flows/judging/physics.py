@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from catalogs.scenes import load_scene
-from catalogs.studies.ablation import cut_coupling, load_kept_families
-from catalogs.surfaces import load_surface
+from catalogs.studies.ablation import cut_coupling
 from catalogs.variants import warn_of_variant
 from flows.judging.physics_constants import read_constants
+from flows.making.catalogue import Catalogue
 from flows.making.driving import collect_surface_depths, surface_of
 from flows.making.input_changes import refuse_changed_records
 from flows.making.places import find_scene, refuse_changed_scene
@@ -137,12 +137,11 @@ def drive_facts(root: Path, plan: Plan) -> dict[str, dict[str, Any]]:
     layout, variant = Layout(root), plan.settings.variant
     if variant == "full":
         return {}
-    surface = load_surface(layout.inputs / "surface.yaml", layout.inputs / "weather")
-    families = load_kept_families(layout.inputs, variant)
-    driven = {clip.clip_id: cut_coupling(clip.scenario, variant, families) for clip in plan.clips}
+    catalogue = Catalogue(layout.inputs)
+    driven = {clip.clip_id: cut_coupling(clip.scenario, variant, catalogue.families) for clip in plan.clips}
     return {
         name: {key: np.nan if value is None else value for key, value in scenario.as_row().items()}
-        | collect_surface_depths(surface_of(scenario, surface))
+        | collect_surface_depths(surface_of(scenario, catalogue.surface))
         for name, scenario in driven.items()
     }
 

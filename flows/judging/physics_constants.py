@@ -6,11 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from catalogs.documents import read_yaml
-from catalogs.low_speed import load_kept_low_speed
-from catalogs.surfaces import load_surface
+from catalogs.documents import parse_yaml
 from catalogs.tyres import tyre_entries
-from catalogs.vehicles import load_vehicle, vehicle_tyre_source
+from flows.making.catalogue import Catalogue
 from flows.making.plan import TICK_RATE_HZ
 from flows.store.layout import Layout
 from flows.store.sealed import read_plan_record, recorded_grid
@@ -38,16 +36,15 @@ def read_constants(root: Path) -> Constants:
     ]
     if missing:
         raise InputError(missing)
-    # of the form that they must have
-    vehicle = load_vehicle(files["vehicle"], layout.inputs / "weather")
-    pavement = load_surface(files["surface"], layout.inputs / "weather")
-    car = read_yaml(files["vehicle"], "catalogue entry")
+    catalogue = Catalogue(layout.inputs)
+    vehicle, pavement = catalogue.vehicle, catalogue.surface  # of the form that they must have
+    car = parse_yaml(catalogue.vehicle_file.content, files["vehicle"], "catalogue entry")
     settings = recorded_grid(read_plan_record(layout)["grid"], layout.plan)
-    mode, steady = settings.vehicle_mode, load_kept_low_speed(layout.inputs)
-    tyre = vehicle_tyre_source(files["vehicle"])
+    tyre = catalogue.vehicle_file.tyre
     return make_constants(
-        _convert_numbers(car), vehicle, pavement, mode=mode, ticks_per_frame=TICK_RATE_HZ / settings.frame_rate_hz,
-        steady=steady, tyre=None if tyre is None else tyre_entries(tyre.read_bytes()),
+        _convert_numbers(car), vehicle, pavement, mode=settings.vehicle_mode,
+        ticks_per_frame=TICK_RATE_HZ / settings.frame_rate_hz, steady=catalogue.steady,
+        tyre=None if tyre is None else tyre_entries(tyre[1]),
     )  # fmt: skip
 
 

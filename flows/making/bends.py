@@ -6,14 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from catalogs.grids import Grid
-from catalogs.low_speed import cut_low_speed, load_low_speed
 from catalogs.scenario import find_scenario_problems
 from catalogs.scenes import load_scene
 from catalogs.sentences import name_some
 from catalogs.studies.ablation import cut_coupling
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle
 from flows.making.driving import simulate_drive, surface_of
+from flows.making.grid_entries import GridEntries
 from tasks.scene.route import Route
 from tasks.scene.route_shape import find_lateral_demand, sample_curvature, sample_grade
 from tasks.surface.weather import find_weather_problem
@@ -41,30 +39,32 @@ class Bend:
     available: float
 
 
-def find_bend_problems(grid: Grid) -> list[str]:
+def find_bend_problems(grid: Grid, entries: GridEntries) -> list[str]:
     """Return a sentence for each clip that no tyre could keep on its route.
 
     Parameters
     ----------
     grid : whose entries and scene are sound
+    entries : of the grid
     """
     return [
         f"scenario {bend.label}: the bend at station {bend.station:.0f} m asks {bend.demand:.2f} m/s2 at"
         f" {bend.speed * 3.6:.0f} km/h, and the road gives {bend.available:.2f} (surface friction times g): drive more"
         " slowly, brake before the bend or take a straighter scene"
-        for bend in list_tight_bends(grid)
+        for bend in list_tight_bends(grid, entries)
         if bend.demand > bend.available
     ]
 
 
-def warn_of_bends(grid: Grid) -> str | None:
+def warn_of_bends(grid: Grid, entries: GridEntries) -> str | None:
     """Return a sentence that names the clips whose bends ask more than half of the grip; None without any.
 
     Parameters
     ----------
     grid : whose entries and scene are sound
+    entries : of the grid
     """
-    bends = list(list_tight_bends(grid))
+    bends = list(list_tight_bends(grid, entries))
     if not bends:
         return None
     worst = max(bends, key=lambda bend: bend.demand / bend.available)
@@ -75,7 +75,7 @@ def warn_of_bends(grid: Grid) -> str | None:
     )
 
 
-def list_tight_bends(grid: Grid) -> Iterator[Bend]:
+def list_tight_bends(grid: Grid, entries: GridEntries) -> Iterator[Bend]:
     """Yield the clips whose bends ask more than `WARNED_SHARE` of the grip, in the order of the grid.
 
     A clip is driven only where the speed that it begins with, or gains downhill, could ask so much of the sharpest bend
@@ -84,15 +84,11 @@ def list_tight_bends(grid: Grid) -> Iterator[Bend]:
     Parameters
     ----------
     grid : whose entries and scene are sound
+    entries : of the grid
     """
     settings = grid.settings
     route = load_scene(settings.scene).route
-    vehicle, surface, grade = (
-        load_vehicle(settings.vehicle),
-        load_surface(settings.surface),
-        sample_grade(route),
-    )
-    steady = cut_low_speed(load_low_speed(), settings.variant) if settings.keeps_stops_steady else None
+    vehicle, surface, steady, grade = entries.vehicle, entries.surface, entries.steady, sample_grade(route)
     for label, seen in grid.scenarios:
         scenario = cut_coupling(seen, settings.variant)
         if find_weather_problem(scenario.weather) is not None or find_scenario_problems(scenario):

@@ -1,21 +1,18 @@
 """The catalogue entries that a dataset was planned with, from its own frozen copies."""
 
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import replace
+from functools import cached_property, lru_cache
 from pathlib import Path
+from typing import Any
 
-from catalogs.cameras import load_camera
-from catalogs.gates import load_gates
-from catalogs.hazard_markings import load_marking
-from catalogs.low_speed import load_kept_low_speed
+from catalogs.entries import load
+from catalogs.low_speed import LOW_SPEED, LOW_SPEED_CUT
 from catalogs.references import read_reference
-from catalogs.road_grade import load_kept_grade
+from catalogs.road_grade import ROAD_GRADE
 from catalogs.scenes import load_scene
-from catalogs.studies import load_sensitivity_study
-from catalogs.studies.ablation import FamilyWeather, load_kept_families
-from catalogs.surfaces import load_surface
-from catalogs.variants import Variant
-from catalogs.vehicles import load_vehicle
+from catalogs.studies.ablation import ABLATION, FamilyWeather, find_families
+from catalogs.vehicles import VehicleFile, open_vehicle
+from catalogs.weather.grip import WeatherFolder
 from catalogs.weather.look import load_weather
 from flows.making.places import find_scene
 from flows.making.plan import read_plan
@@ -34,54 +31,101 @@ from tasks.vehicle.paper.low_speed import SteadyStop
 from tasks.vehicle.parameters import Vehicle
 
 
-@dataclass(frozen=True, kw_only=True)
 class Catalogue:
-    """The entries that a dataset was planned with, read from the dataset's own frozen copies."""
+    """The kept entries of a dataset, and its scene: each file is read once, when it is first asked for.
 
-    vehicle: Vehicle
-    surface: SurfaceParameters
-    camera: Camera
-    scene: Scene
-    weather: Path
-    gates: PoseThresholds
-    study: StudyProtocol
-    marking: HazardMarking | None = None
-    traces: Reference | None = None
-    steady: SteadyStop | None = None
-    families: FamilyWeather | None = None
-    grade: RoadGrade = LEVEL_ROAD
+    A property raises `InputError` that lists every problem of its file.
 
-    @property
+    Parameters
+    ----------
+    inputs : folder of the kept catalogue files
+    scene : name or folder on this machine; empty where none is asked for
+    """
+
+    def __init__(self, inputs: Path, scene: str = "") -> None:
+        self._inputs, self._scene = inputs, scene
+
+    @cached_property
+    def weather(self) -> WeatherFolder:
+        """The kinds of weather."""
+        return WeatherFolder(self._inputs / "weather")
+
+    @cached_property
     def weather_parameters(self) -> WeatherParameters:
-        """Return how the weathers look; the entries are read when a picture first asks for them."""
-        return _read_weather_parameters(self.weather)
+        """How the weathers look."""
+        return load_weather(self.weather)
 
+    @cached_property
+    def vehicle_file(self) -> VehicleFile:
+        """The vehicle as its file has it."""
+        return open_vehicle(self._inputs / "vehicle.yaml")
 
-@lru_cache(maxsize=2)
-def _read_weather_parameters(folder: Path) -> WeatherParameters:
-    return load_weather(folder)
+    @cached_property
+    def vehicle(self) -> Vehicle:
+        """The vehicle."""
+        return self.vehicle_file.build(self.weather)
+
+    @cached_property
+    def surface(self) -> SurfaceParameters:
+        """The pavement."""
+        return load("surface", self._inputs / "surface.yaml", self.weather)
+
+    @cached_property
+    def camera(self) -> Camera:
+        """The camera."""
+        return load("camera", self._inputs / "camera.yaml")
+
+    @cached_property
+    def gates(self) -> PoseThresholds:
+        """The limits of the pose check."""
+        return load("gate file", self._inputs / "gates.yaml")
+
+    @cached_property
+    def study(self) -> StudyProtocol:
+        """The study whose bounds give the label ranges."""
+        return load("sensitivity study", self._inputs / "study.yaml")[0]
+
+    @cached_property
+    def marking(self) -> HazardMarking | None:
+        """Paint on road features; None where they are bare."""
+        return self._load_kept("hazard marking", "hazard_marking.yaml")
+
+    @cached_property
+    def steady(self) -> SteadyStop | None:
+        """How stops end; None where the published rule is taken literally."""
+        steady: SteadyStop | None = self._load_kept("low-speed rule", LOW_SPEED)
+        applied = self._load_kept("cut of the low-speed rule", LOW_SPEED_CUT)
+        return steady if steady is None or applied is None else replace(steady, pitch_rule=applied)
+
+    @cached_property
+    def families(self) -> FamilyWeather | None:
+        """What stands for each kind of weather in ``fixed-mu``; None in any other variant."""
+        entry = self._load_kept("ablation", ABLATION)
+        return None if entry is None else find_families(entry, self.study)
+
+    @cached_property
+    def grade(self) -> RoadGrade:
+        """Grade of the road, which is level where none is kept."""
+        return self._load_kept("grade of the road", ROAD_GRADE) or LEVEL_ROAD
+
+    @cached_property
+    def scene(self) -> Scene:
+        """The scene."""
+        return load_scene(self._scene)
+
+    @cached_property
+    def traces(self) -> Reference | None:
+        """Reference traces whose motion the clips show; None where the vehicle drives."""
+        folder = self._inputs / TRACES
+        return read_reference(folder) if folder.is_dir() else None
+
+    def _load_kept(self, kind: str, name: str) -> Any:
+        """Load an entry that not every dataset keeps; None where this one does not."""
+        file = self._inputs / name
+        return load(kind, file) if file.is_file() else None
 
 
 @lru_cache(maxsize=2)
 def catalogue_of(root: Path) -> Catalogue:
-    """Load a dataset's frozen inputs and its scene."""
-    plan = read_plan(root)
-    return load_catalogue(Layout(root).inputs, find_scene(plan.scene), plan.settings.variant)
-
-
-def load_catalogue(inputs: Path, scene: str, variant: Variant = "full") -> Catalogue:
-    """Load frozen inputs from their folder, with those of a variant, and a scene."""
-    return Catalogue(
-        vehicle=load_vehicle(inputs / "vehicle.yaml", inputs / "weather"),
-        surface=load_surface(inputs / "surface.yaml", inputs / "weather"),
-        camera=load_camera(inputs / "camera.yaml"),
-        scene=load_scene(scene),
-        weather=inputs / "weather",
-        gates=load_gates(inputs / "gates.yaml"),
-        marking=load_marking(marking) if (marking := inputs / "hazard_marking.yaml").is_file() else None,
-        study=load_sensitivity_study(inputs / "study.yaml")[0],
-        traces=read_reference(traces) if (traces := inputs / TRACES).is_dir() else None,
-        steady=load_kept_low_speed(inputs),
-        families=load_kept_families(inputs, variant),
-        grade=load_kept_grade(inputs),
-    )
+    """Return a dataset's frozen inputs and its scene."""
+    return Catalogue(Layout(root).inputs, find_scene(read_plan(root).scene))

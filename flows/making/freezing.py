@@ -6,16 +6,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from catalogs.entries import entry_names
-from catalogs.grids import Grid, GridFile, expand_grid, load_grid
+from catalogs.entries import entry_names, load
+from catalogs.grids import Grid, GridFile, expand_grid
 from catalogs.grids.form import BEFORE
-from catalogs.low_speed import cut_low_speed, load_low_speed
 from catalogs.studies.ablation import cut_coupling
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle
 from flows.making.driving import simulate_drive
 from flows.making.generate import generate_dataset
-from flows.making.grid_inputs import find_private_entries, grade_of
+from flows.making.grid_entries import find_private_entries, read_entries
+from flows.making.grid_inputs import grade_of
 from flows.making.places import find_scene
 from flows.making.plan import Plan, freeze_grid
 from flows.making.run_report import RunReport
@@ -78,7 +76,7 @@ def freeze_run(grid: str | None = None, *, out: str | None = None) -> dict[str, 
     rows = []
     with progress_bar("frozen", len(names)) as advance:
         for name in names:
-            grid_asked = load_grid(name)
+            grid_asked = load("grid", name)
             if problems := find_private_entries(grid_asked.settings):
                 raise InputError([f"{name}: {problem}" for problem in problems])
             file = Path(out) if out is not None else FOLDER / f"{grid_asked.settings.name}.json"
@@ -241,20 +239,15 @@ def ticks_of(plan: Plan, asked: GridFile) -> dict[str, str]:
     plan : the clips
     asked : settings with the vehicle and the surface as they were asked for; the plan may record their names alone
     """
-    vehicle, surface = load_vehicle(asked.vehicle), load_surface(asked.surface)
-    mode, duration_s = plan.settings.vehicle_mode, plan.duration_s
-    steady = (
-        cut_low_speed(load_low_speed(), plan.settings.variant) if plan.settings.keeps_stops_steady else None
-    )
-    grade = grade_of(asked.scene)
+    entries, grade = read_entries(asked), grade_of(asked.scene)
     rides = (
         simulate_drive(
             cut_coupling(clip.scenario, plan.settings.variant),
-            vehicle,
-            surface,
-            mode,
-            duration_s,
-            steady,
+            entries.vehicle,
+            entries.surface,
+            plan.settings.vehicle_mode,
+            plan.duration_s,
+            entries.steady,
             grade,
         )[1]
         for clip in plan.clips

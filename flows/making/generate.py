@@ -204,10 +204,10 @@ def describe_frame_arrays(layout: Layout, plan: Plan) -> dict[str, Any]:
     layout : of the dataset, which keeps its camera
     plan : of the dataset
     """
-    from catalogs.cameras import load_camera
+    from catalogs.entries import load
     from tasks.render.lens import Lens
 
-    camera = load_camera(layout.inputs / "camera.yaml")
+    camera = load("camera", layout.inputs / "camera.yaml")
     attributes = {
         "camera": camera.name,
         "K": camera.K.tolist(),

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from catalogs.grids import GridFile
+from catalogs.grids.form import BEFORE
 from manifests.canonical import content_id
 
 
@@ -19,6 +20,9 @@ def list_deciding(
     inputs : name of each catalogue file to its SHA-256
     backend : rasteriser
     """
+    later = {name: getattr(settings, name) for name in BEFORE}
+    if not settings.keeps_stops_steady:
+        later["low_speed"] = BEFORE["low_speed"]
     return {
         "scene": dict(scene),
         "inputs": dict(inputs),
@@ -26,11 +30,7 @@ def list_deciding(
         "vehicle_mode": settings.vehicle_mode,
         "frames": settings.frames,
         "frame_rate_hz": settings.frame_rate_hz,
-        # a default that was introduced later is left out, so that older clips keep their ids
-        **({} if settings.composition == "linear" else {"composition": settings.composition}),
-        **({"low_speed": settings.low_speed} if settings.keeps_stops_steady else {}),
-        **({} if settings.duration_s is None else {"duration_s": settings.duration_s}),
-        **({} if settings.variant == "full" else {"variant": settings.variant}),
+        **{name: value for name, value in later.items() if value != BEFORE[name]},
     }
 
 

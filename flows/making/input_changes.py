@@ -1,14 +1,15 @@
 """Compare the inputs, parameters, scene and tools that made a dataset with those at hand."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
-from pathlib import Path
 from typing import Any
 
 from catalogs.road_grade import ROAD_GRADE, write_road_grade
 from catalogs.scenes import scene_identity
 from catalogs.sentences import cap_problems
-from flows.making.grid_inputs import READERS, grade_of, input_sources
+from catalogs.vehicles import open_vehicle
+from flows.making.grid_entries import read_entries
+from flows.making.grid_inputs import grade_of
 from flows.making.places import find_scene, noted_place
 from flows.store.address import send_files
 from flows.store.layout import Layout, write_atomically
@@ -17,6 +18,7 @@ from manifests.canonical import sha256_of
 from manifests.explain import find_input_differences, find_parameter_differences, tools_here
 from manifests.records import Manifest
 from tasks.errors import InputError
+from tasks.surface.weather import WEATHERS
 
 
 def input_changes(layout: Layout, manifest: Manifest) -> list[dict[str, Any]]:
@@ -70,27 +72,26 @@ def recorded_inputs(layout: Layout, manifest: Manifest) -> dict[str, bytes]:
     ----------
     layout, manifest : of a sealed dataset
     """
-    sources = input_sources(recorded_grid(manifest["grid"], layout.manifest))
+    at_hand = read_entries(recorded_grid(manifest["grid"], layout.manifest), WEATHERS).contents
     found: dict[str, bytes] = {}
     for name, digest in manifest["inputs"].items():
-        candidates = _read_candidates(layout, manifest, name, sources.get(name))
+        candidates = _read_candidates(layout, manifest, name, at_hand.get(name))
         content = next((one for one in candidates if sha256_of([one]) == digest), None)
         if content is not None:
             found[name] = content
     return found
 
 
-def _read_candidates(
-    layout: Layout, manifest: Manifest, name: str, find_source: Callable[[], Path] | None
-) -> Iterator[bytes]:
+def _read_candidates(layout: Layout, manifest: Manifest, name: str, at_hand: bytes | None) -> Iterator[bytes]:
     """Yield what may be an input: from the dataset, the catalogue, where it lay, or the scene that it follows from."""
-    for find in (lambda: layout.inputs / name, find_source, lambda: noted_place(manifest["inputs"][name])):
+    for file in (layout.inputs / name, noted_place(manifest["inputs"][name])):
         with suppress(InputError):
-            file = None if find is None else find()
             if file is not None and file.is_file():
                 yield file.read_bytes()
-                if name in READERS:
-                    yield READERS[name](file)
+                if name == "vehicle.yaml":
+                    yield open_vehicle(file).content
+    if at_hand is not None:
+        yield at_hand
     if name == ROAD_GRADE:
         with suppress(InputError):
             yield write_road_grade(grade_of(find_scene(manifest["scene"])), manifest["scene"]["name"])

@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from catalogs.grids import FaultyGrid, Grid, GridFile, load_grid
+from catalogs.entries import load
+from catalogs.grids import FaultyGrid, Grid, GridFile
 from catalogs.grids.form import TICK_RATE_HZ
 from catalogs.scenario import Scenario
-from catalogs.vehicles import vehicle_provenance
-from flows.making.grid_inputs import input_sources, read_grid_inputs, recorded_settings
+from catalogs.vehicles import open_vehicle
+from flows.making.grid_entries import recorded_settings
+from flows.making.grid_inputs import read_grid_inputs
 from flows.making.identity import identify_clip, identify_run, list_deciding
 from flows.making.places import remember_place
 from flows.store.layout import Layout
@@ -147,7 +149,7 @@ def make_plan(
         Listing every problem at once.
     """
     try:
-        grid = source if isinstance(source, Grid) else load_grid(source)
+        grid = source if isinstance(source, Grid) else load("grid", source)
     except FaultyGrid as faults:
         behind = [] if faults.grid is None else read_grid_inputs(faults.grid, TICK_RATE_HZ)[2]
         raise InputError([*faults.problems, *(f"{source}: {problem}" for problem in behind)]) from None
@@ -162,10 +164,10 @@ def make_plan(
 def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, bytes]]:
     """`make_plan` of a grid that is already read; ``source`` is what messages call it."""
     settings = grid.settings
-    inputs, scene, problems = read_grid_inputs(grid, TICK_RATE_HZ)
+    entries, scene, problems = read_grid_inputs(grid, TICK_RATE_HZ)
     if problems:
         raise InputError([f"{source}: {problem}" for problem in problems])
-    hashes = {name: sha256_of([content]) for name, content in inputs.items()}
+    hashes = {name: sha256_of([content]) for name, content in entries.contents.items()}
     deciding = list_deciding(settings, scene, hashes, backend)
     clips = tuple(_clip_plans(grid, deciding))
     repeated = {clip.label for clip in clips} if len({clip.clip_id for clip in clips}) < len(clips) else set()
@@ -175,10 +177,9 @@ def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, 
         )
     made_with = {"code": code_version(), "libraries": library_versions()}
     recorded = recorded_settings(settings)
-    for name, lookup in input_sources(settings).items():
-        key = "vehicle" if name.endswith(".tir") else Path(name).stem
-        if getattr(settings, key, None) != getattr(recorded, key, None):
-            remember_place(hashes[name], lookup())
+    for name, (setting, place) in entries.places.items():
+        if getattr(settings, setting) != getattr(recorded, setting):
+            remember_place(hashes[name], place)
     run_id = identify_run(
         deciding, recorded.model_dump(mode="json"), (clip.clip_id for clip in clips), made_with
     )
@@ -191,7 +192,7 @@ def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, 
         made_with=made_with,
         clips=clips,
     )
-    return plan, inputs
+    return plan, entries.contents
 
 
 @contextmanager
@@ -251,7 +252,7 @@ def plan_differences(
 
 
 def _with_vehicle(settings: GridFile, vehicle: str) -> GridFile:
-    provenance = vehicle_provenance(vehicle)
+    provenance = open_vehicle(vehicle).provenance
     mode = settings.vehicle_mode if provenance is None else provenance.mode
     return settings.model_copy(update={"vehicle": vehicle, "vehicle_mode": mode})
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from catalogs.grids import load_grid
+from catalogs.entries import load
 from catalogs.studies.ablation import cut_coupling
-from flows.making.catalogue import Catalogue, load_catalogue
+from flows.making.catalogue import Catalogue
 from flows.making.driving import collect_surface_figures, simulate_drive, surface_of
 from flows.making.pictures import frame_rows, render_frames, rig_of
 from flows.making.plan import ClipPlan, Plan, freeze_grid
@@ -69,7 +69,7 @@ def replay_audit(
     if seeds < 2 or frames < 2:
         raise InputError(f"seeds and frames must be at least 2; they are {seeds} and {frames}")
     results = Outputs(out, "replay-audit", "replay.json")
-    checked, name = load_grid(grid), select_backend(backend).name
+    checked, name = load("grid", grid), select_backend(backend).name
     runs: list[Replay] = []
     count = len(checked.scenarios)
     with tempfile.TemporaryDirectory() as folder, progress_bar("runs", count * (seeds + 1)) as advance:
@@ -79,7 +79,7 @@ def replay_audit(
             plan, inputs = freeze_grid(replace(checked, settings=settings), grid, name)
             for file, content in inputs.items():
                 write_atomically(Path(folder) / file, content)
-            catalogue = load_catalogue(Path(folder), settings.scene, settings.variant)
+            catalogue = Catalogue(Path(folder), settings.scene)
             for clip in plan.clips:
                 runs.append(_run_clip(clip, plan, catalogue, frames))
                 advance(f"{clip.label} seed {seed}")

@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from catalogs.grids import load_grid
+from catalogs.entries import load
 from flows.making.freezing import reproduce_run
 from flows.making.generate import generate_dataset
 from flows.making.run_report import RunReport
@@ -43,7 +43,7 @@ def make_dataset(
         For neither or both of grid and manifest, and as `generate_dataset` and `reproduce_run` raise it.
     """
     if grid is not None and manifest is None:
-        asked = grid if poses is None else replace(load_grid(grid), poses=Path(poses))
+        asked = grid if poses is None else replace(load("grid", grid), poses=Path(poses))
         return _list_facts(generate_dataset(asked, out, vehicle=vehicle, pictures=pictures, **execution))
     if manifest is None or grid is not None:
         raise InputError("generate needs either a GRID or --manifest NAME, and not both")

@@ -9,7 +9,6 @@ from catalogs.reference_match import find_case
 from catalogs.references import CG_HEIGHT, ReferenceCase, Traces, read_reference, trace_file
 from catalogs.scenario import Scenario
 from catalogs.sentences import cap_problems
-from catalogs.surfaces import load_surface
 from flows.making.driving import weather_of
 from manifests.manifest import TRACES, is_traced
 from tasks.errors import InputError
@@ -24,13 +23,16 @@ CASES = "cases.json"
 Reference = Sequence[tuple[ReferenceCase, Traces]]
 
 
-def read_trace_inputs(grid: Grid, folder: Path) -> tuple[dict[str, bytes], list[str]]:
+def read_trace_inputs(
+    grid: Grid, folder: Path, surface: SurfaceParameters | None
+) -> tuple[dict[str, bytes], list[str]]:
     """Return the files of a folder of traces that the clips of a grid show, and what stands against it.
 
     Parameters
     ----------
     grid : with its scenarios
     folder : of reference traces
+    surface : the grid's pavement; None where it is faulty, and no case can be found
 
     Returns
     -------
@@ -38,9 +40,10 @@ def read_trace_inputs(grid: Grid, folder: Path) -> tuple[dict[str, bytes], list[
     """
     try:
         reference = read_reference(folder)
-        surface = load_surface(grid.settings.surface)
     except InputError as error:
         return {}, list(error.problems)
+    if surface is None:
+        return {}, []
     traces = {case.case: columns for case, columns in reference}
     used: dict[str, ReferenceCase] = {}
     problems: list[str] = []

@@ -5,9 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from catalogs.bump_studies import load_bump_study
 from catalogs.drives import read_drives
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import load
 from flows.store.outputs import Outputs
 from tasks.errors import InputError
 from tasks.studies.brake_dive import pitch_mode
@@ -40,7 +39,7 @@ def bump_study(
         If the run or a channel is missing, or a window lies outside the run.
     """
     results = Outputs(out, "bump-study", "bump_study.json")
-    plan = load_bump_study(study)
+    plan = load("bump study", study)
     recorded = read_drives(campaign, needed=NEEDED)
     drive = next((drive for drive in recorded.drives if drive.name == plan.run), None)
     if drive is None:
@@ -50,7 +49,7 @@ def bump_study(
     outside = [window.name for window in plan.windows if window.from_s < 0 or window.to_s > length]
     if outside:
         raise InputError([f"{plan.run}: window {name} must lie within 0 to {length:g} s" for name in outside])
-    base = load_vehicle(vehicle or recorded.vehicle)
+    base = load("vehicle", vehicle or recorded.vehicle)
     passages = [passage_of(drive.columns, drive.interval, w.from_s, w.to_s) for w in plan.windows]
     _, car = fit_feature_and_car(passages[0], base)
     agreement = measure_sensor_agreement(drive.columns, drive.interval)

@@ -4,9 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from catalogs.buses import load_bus
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import load
 from flows.store.layout import write_atomically
 from tasks.errors import InputError
 from tasks.studies.bus_drive import bus_drive
@@ -52,8 +50,8 @@ def synthetic_drives(
         problems.append(f"{folder}: synthetic drives need a new or empty folder; this one holds other things")
     if problems:
         raise InputError(problems)
-    emitted, car = load_bus(bus), load_vehicle(vehicle)
-    friction = load_surface("dense-asphalt").dry_friction
+    emitted, car = load("bus", bus), load("vehicle", vehicle)
+    friction = load("surface", "dense-asphalt").dry_friction
     files = []
     for drive in range(1, drives + 1):
         signals = bus_drive(car, friction, emitted, events=events, seed=seed, drive=drive)

@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from catalogs.calibration import load_procedure
 from catalogs.documents import parse_yaml
-from catalogs.entries import find_entry
+from catalogs.entries import find_entry, load
 from catalogs.names import find_name_problem
 from catalogs.references import ReferenceCase, Traces, read_reference, trace_file
-from catalogs.vehicles import load_vehicle, vehicle_content
+from catalogs.vehicles import open_vehicle
 from catalogs.vehicles.frozen import frozen_text
 from flows.measured.grown_vehicle import tyre_beside
 from flows.store.outputs import Outputs
@@ -63,8 +62,8 @@ def calibrate_on_traces(
         raise InputError(f"--name must {problem}")
     beside = tyre_beside(vehicle)
     results = Outputs(out, "calibrate", f"{name}.yaml", "calibration.json", *beside)
-    start = load_vehicle(vehicle)
-    steps, interval = load_procedure(procedure)
+    start = load("vehicle", vehicle)
+    steps, interval = load("calibration procedure", procedure)
     reference = read_reference(Path(traces), split=split)
     before = agreement_of(start, reference, steps.mode)
     cases = [
@@ -78,7 +77,7 @@ def calibrate_on_traces(
     for file, content in beside.items():
         results.write(file, content)
     results.write(f"{name}.yaml", _frozen(fitted, vehicle, procedure, steps, split, data))
-    frozen = load_vehicle(target)
+    frozen = load("vehicle", target)
     after = agreement_of(frozen, reference, steps.mode)
     result = {
         "vehicle_file": str(target),
@@ -168,7 +167,8 @@ def _frozen(
     fitted: Vehicle, base: str, procedure_name: str, procedure: Procedure, split: str, data: dict[str, str]
 ) -> str:
     """Return the frozen file: the base's entry with the calibrated values and their provenance."""
-    source, content = find_entry("vehicle", base), vehicle_content(base)
+    file = open_vehicle(base)
+    source, content = file.source, file.content
     entry = parse_yaml(content, source, "vehicle")
     before = entry.pop("provenance", None) or {"bounds": {}}
     note = f"calibrated by {Path(procedure_name).stem} on {len(data)} {split} cases, see provenance"

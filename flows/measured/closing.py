@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from catalogs.campaigns import read_campaign
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import LIBRARY_FILE, load_effects
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_tolerances, load_vehicle, vehicle_content
+from catalogs.entries import load
+from catalogs.vehicles import open_vehicle
 from flows.measured.closing_ledger import count_readings, record_reading
 from flows.measured.friction_pulls import compute_friction_pulls, tell_friction_pulls
 from flows.measured.grown_vehicle import grown_vehicle, tyre_beside
@@ -57,7 +57,7 @@ def close_loop(
     """
     measured = read_campaign(Path(campaign))
     name = vehicle or measured.vehicle
-    model, road = load_vehicle(name), load_surface(surface)
+    model, road = load("vehicle", name), load("surface", surface)
     measured = estimate_disc_temperatures(measured, model.mass)
     grown = f"{Path(name).stem}-grown.yaml"
     beside = tyre_beside(name)
@@ -66,7 +66,7 @@ def close_loop(
     count_readings(measured)  # a faulty ledger is told of before the fit
     measured = replace(measured, tolerances=measured.tolerances.with_session(session_tolerances(name)))
     outcome = judge_runs(measured, model, road, load_effects(), load_decision_rules())
-    earlier = record_reading(measured, sha256_of([vehicle_content(name)]))
+    earlier = record_reading(measured, sha256_of([open_vehicle(name).content]))
     result = verdict_json(outcome.verdict) | tell_search(outcome)
     result = tell_friction_pulls(result, measured.tolerances.friction)
     result["held_out_readings_before"] = earlier
@@ -85,7 +85,7 @@ def close_loop(
         for file, content in beside.items():
             results.write(file, content)
         results.write(grown, text)
-        load_vehicle(results.path(grown))
+        load("vehicle", results.path(grown))
         result["vehicle_file"] = str(results.path(grown))
     result["not_carried_by_coupled_mode"] = missing
     results.write_json("verdict.json", result)
@@ -103,7 +103,7 @@ def session_tolerances(vehicle: str) -> dict[str, float]:
     ----------
     vehicle : catalogue name or file
     """
-    given = load_tolerances(vehicle)
+    given = open_vehicle(vehicle).tolerances
     return {
         name: max(given[f] for f in fields if f in given)
         for name, fields in CARRIED.items()
@@ -119,7 +119,7 @@ def find_unused_tolerances(vehicle: str) -> list[str]:
     vehicle : catalogue name or file
     """
     moved = set().union(*CARRIED.values())
-    return [name for name in load_tolerances(vehicle) if name not in moved]
+    return [name for name in open_vehicle(vehicle).tolerances if name not in moved]
 
 
 def _reached_ranges(outcome: Outcome) -> dict[str, tuple[float, float]]:

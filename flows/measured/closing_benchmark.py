@@ -8,9 +8,7 @@ from typing import Any
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from catalogs.effects.truths import Truth, load_sizes, load_truths
-from catalogs.studies.closing import load_closing_study
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import load
 from flows.measured.closing_benchmark_summary import pair_outcome, summarise_benchmark
 from flows.measured.closing_benchmark_tables import benchmark_tables
 from flows.store.journal import append_line, read_lines
@@ -39,9 +37,9 @@ JUDGES = (
     "catalogs/effects/",
     "catalogs/decision_rules",
     "catalogs/studies/closing.",
-    "catalogs/surfaces/",
+    "catalogs/surfaces",
     "catalogs/tyre_families",
-    "catalogs/tyres/__init__",
+    "catalogs/tyres.",
     "catalogs/vehicles/__init__",
     "catalogs/vehicles/inherited",
     "catalogs/vehicles/numbers",
@@ -101,7 +99,7 @@ def close_loop_benchmark(
     log, engine = results.path(FILE).with_name(LOG), engine_hash()
     rows = [row for row in read_lines(log, {"engine", "truth", "seed"}) if row["engine"] == engine]
     done = {(row["truth"], row["seed"]) for row in rows}
-    model, surface, effects = load_vehicle(vehicle), load_surface("dense-asphalt"), load_effects()
+    model, surface, effects = load("vehicle", vehicle), load("surface", "dense-asphalt"), load_effects()
     started = time.monotonic()
     for planned in _plan(seeds, first_seed, nulls, harder):
         if (planned.name, planned.seed) in done:
@@ -166,7 +164,7 @@ def _outcome(verdict: Verdict, truths: tuple[Truth, ...]) -> str:
 
 def _plan(seeds: int, first_seed: int, nulls: int, harder: int) -> Iterator[Planned]:
     """Every campaign, round by round over all truths, nulls and sizes spread over them; then the harder ones."""
-    truths, sizes, study = load_truths(), load_sizes(), load_closing_study()
+    truths, sizes, study = load_truths(), load_sizes(), load("closing study")
     library = tuple(truth for truth in truths if truth.in_library)
     rounds = max(seeds, 1)
     for i in range(rounds):

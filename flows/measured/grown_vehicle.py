@@ -5,8 +5,8 @@ from typing import Any
 
 from catalogs.documents import parse_yaml
 from catalogs.effects import LIBRARY_FILE
-from catalogs.entries import entry_folder, find_entry
-from catalogs.vehicles import load_vehicle, vehicle_content, vehicle_tyre_source
+from catalogs.entries import entry_folder
+from catalogs.vehicles import open_vehicle
 from catalogs.vehicles.frozen import frozen_text
 from manifests.canonical import sha256_of, sha256_of_file
 from manifests.provenance import code_version
@@ -32,10 +32,8 @@ def tyre_beside(name: str) -> dict[str, bytes]:
     -------
     One file by its name; none if the vehicle names no tyre, or one of the catalogue.
     """
-    tyre = vehicle_tyre_source(name)
-    if tyre is None or tyre.parent == entry_folder("tyre"):
-        return {}
-    return {tyre.name: tyre.read_bytes()}
+    tyre = open_vehicle(name).tyre
+    return {} if tyre is None or tyre[0].parent == entry_folder("tyre") else {tyre[0].name: tyre[1]}
 
 
 def grown_vehicle(
@@ -56,10 +54,11 @@ def grown_vehicle(
     -------
     The text, or None if nothing was added; and the parameters that no vehicle can carry.
     """
-    source, content = find_entry("vehicle", name), vehicle_content(name)
+    file = open_vehicle(name)
+    source, content = file.source, file.content
     entry: dict[str, Any] = parse_yaml(content, source, "vehicle")
     before = entry.pop("provenance", None) or {"bounds": {}}
-    base = load_vehicle(name)
+    base = file.build()
     bounds: dict[str, dict[str, Any]] = {}
     values: dict[str, float] = {}
     sources: dict[str, list[str]] = {}

@@ -12,8 +12,9 @@ import yaml
 
 from catalogs.campaign_checks import load_campaign_checks
 from catalogs.campaigns import HEAT_COLUMN, SLOPE_COLUMN
-from catalogs.channel_maps import ChannelMap, FaultyMap, load_channel_map
+from catalogs.channel_maps import ChannelMap, FaultyMap
 from catalogs.channel_maps.conditions import Conditions
+from catalogs.entries import load
 from catalogs.recordings import recording_files, recording_root, stored_files
 from flows.measured.readable_recordings import find_signal_problems, leave_out_faulty, read_recordings
 from flows.measured.run_plan import PlannedRun, find_run_problems, plan_runs
@@ -71,7 +72,7 @@ def import_measurements(
             f"{folder}: a campaign is made in a new or empty folder; this one holds other things"
         )
     try:
-        channel_map, map_file = load_channel_map(map)
+        channel_map, map_file = load("channel map", map)
     except FaultyMap as faults:
         raise InputError([*faults.problems, *find_signal_problems(Path(source), faults.readable)]) from None
     root = recording_root(Path(source))

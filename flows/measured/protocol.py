@@ -7,9 +7,7 @@ from math import isnan
 from typing import Any
 
 from catalogs.drives import read_drives
-from catalogs.protocols import load_protocol
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import load
 from flows.measured.dive_figure import draw_dives
 from flows.pages.figures import Figure
 from flows.pages.static import as_svg
@@ -58,12 +56,12 @@ def brake_protocol(
         If the campaign lacks what the protocol needs.
     """
     results = Outputs(out, "brake-protocol", "brake_protocol.json", "attrition.csv", DIVES, PAGE)
-    rules = load_protocol(protocol)
+    rules = load("protocol", protocol)
     recorded = read_drives(campaign)
-    base = load_vehicle(vehicle or recorded.vehicle)
+    base = load("vehicle", vehicle or recorded.vehicle)
     selection = select_events(recorded.drives, rules)
     used = tuple(judged.event for judged in selection.judged) if all_events else selection.retained
-    folds = leave_one_drive_out(used, base, load_surface("dense-asphalt"))
+    folds = leave_one_drive_out(used, base, load("surface", "dense-asphalt"))
     table = [asdict(row) for row in tabulate_attrition(selection, rules)]
     result: dict[str, Any] = {
         "campaign": recorded.name,

@@ -4,7 +4,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from catalogs.channel_maps import ChannelMap, FaultyMap, load_channel_map
+from catalogs.channel_maps import ChannelMap, FaultyMap
+from catalogs.entries import load
 from catalogs.recordings import recording_files, recording_root, summarise_signals
 from tasks.errors import InputError
 
@@ -44,7 +45,7 @@ def list_recorded_signals(source: str, map: str | None) -> dict[str, Any]:
 def _load_readable_map(map: str) -> ChannelMap:
     """Return a map, or what a map that is not finished says of signals, clock and text."""
     try:
-        return load_channel_map(map)[0]
+        return load("channel map", map)[0]
     except FaultyMap as faults:
         if faults.readable is None:
             raise

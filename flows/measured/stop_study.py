@@ -5,9 +5,7 @@ from math import isnan
 from typing import Any
 
 from catalogs.drives import read_drives
-from catalogs.stop_studies import load_stop_study
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import load
 from flows.store.outputs import Outputs
 from tasks.campaign.campaign import CHANNELS
 from tasks.campaign.events import RecordedRun
@@ -46,7 +44,7 @@ def stop_study(
         If a run or a channel is missing, or a run holds no stop.
     """
     results = Outputs(out, "stop-study", "stop_study.json")
-    plan = load_stop_study(study)
+    plan = load("stop study", study)
     recorded = read_drives(campaign)
     by_name = {drive.name: drive for drive in recorded.drives}
     problems: list[str] = []
@@ -60,7 +58,7 @@ def stop_study(
     if problems:
         raise InputError([f"{recorded.name}: {problem}" for problem in problems])
     train, held_out = stops[plan.train], stops[plan.held_out]
-    car, surface = load_vehicle(vehicle or recorded.vehicle), load_surface("dense-asphalt")
+    car, surface = load("vehicle", vehicle or recorded.vehicle), load("surface", "dense-asphalt")
     rungs = fit_ladder(train, held_out, plan.ladder, car, surface)
     last = rungs[-1]
     result: dict[str, Any] = {

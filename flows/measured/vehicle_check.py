@@ -4,8 +4,9 @@ from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 
-from catalogs.plausible_vehicle import find_plausibility_problems, load_plausible_vehicle
-from catalogs.vehicles import load_tolerances, load_vehicle, vehicle_numbers
+from catalogs.entries import load
+from catalogs.plausible_vehicle import find_plausibility_problems
+from catalogs.vehicles import open_vehicle
 from flows.measured.vehicle_template import TO_FILL_IN
 from tasks.vehicle.figures import compute_figures
 
@@ -25,11 +26,12 @@ def check_vehicle(vehicle: str) -> dict[str, Any]:
     Raises
     ------
     InputError
-        As `catalogs.vehicles.load_vehicle`.
+        As `catalogs.vehicles.open_vehicle`.
     """
-    figures, tolerances = compute_figures(load_vehicle(vehicle)), load_tolerances(vehicle)
+    file = open_vehicle(vehicle)
+    figures, tolerances = compute_figures(file.build()), file.tolerances
     problems = find_plausibility_problems(figures, tolerances)
-    ranges = load_plausible_vehicle().figures
+    ranges = load("table of plausible figures").figures
     return {
         "vehicle": vehicle,
         "plausible": not problems,
@@ -46,7 +48,7 @@ def check_vehicle(vehicle: str) -> dict[str, Any]:
         ],
         "tolerances": tolerances,
         "without_source": [
-            name for name, number in vehicle_numbers(vehicle).items() if number.source.startswith(TO_FILL_IN)
+            name for name, number in file.numbers.items() if number.source.startswith(TO_FILL_IN)
         ],
     }
 

@@ -8,10 +8,9 @@ from typing import Any
 
 import yaml
 
-from catalogs.entries import YAML
-from catalogs.plausible_vehicle import load_plausible_vehicle
+from catalogs.entries import YAML, load
 from catalogs.sentences import shorten
-from catalogs.vehicles import vehicle_numbers
+from catalogs.vehicles import open_vehicle
 from catalogs.vehicles.numbers import VehicleNumber
 from tasks.errors import InputError
 
@@ -77,7 +76,7 @@ def make_vehicle_template(
                 " there"
             )
     try:
-        numbers = vehicle_numbers(base)
+        numbers = open_vehicle(base).numbers
     except InputError as error:
         problems += error.problems
     if problems:
@@ -128,7 +127,8 @@ def _describe_taken(out: str) -> str:
 
 
 def _propose_tolerance(field: str, value: float) -> float:
-    return float(f"{abs(value) * load_plausible_vehicle().usual_tolerances[field].value:.2g}")
+    usual = load("table of plausible figures").usual_tolerances[field].value
+    return float(f"{abs(value) * usual:.2g}")
 
 
 def _format_number(value: float) -> str:

@@ -1,12 +1,14 @@
 """Summaries of a dataset and of the clips that a grid would make; nothing is made."""
 
 from collections import Counter
+from dataclasses import replace
 from typing import Any
 
-from catalogs.cameras import load_camera
-from catalogs.grids import load_grid, warn_of_late_brakes
+from catalogs.entries import load
+from catalogs.grids import warn_of_late_brakes
 from catalogs.variants import warn_of_variant
 from flows.making.bends import warn_of_bends
+from flows.making.grid_entries import read_entries
 from flows.making.plan import make_plan
 from flows.store.address import open_for_reading, stored_bytes, want_manifest
 from flows.store.sealed import read_manifest, recorded_grid
@@ -70,10 +72,16 @@ def validate_grid(grid: str, *, vehicle: str | None = None, pictures: bool = Tru
     """
     plan, _ = make_plan(grid, "cpu", vehicle, pictures=pictures)
     settings = plan.settings
-    read = load_grid(grid)
-    camera = load_camera(read.settings.camera)  # of a file the plan records the name, without its folder
+    read = load("grid", grid)
+    # the plan records the name of a file, without its folder
+    driven = {"vehicle": vehicle or read.settings.vehicle, "vehicle_mode": settings.vehicle_mode}
+    read = replace(read, settings=read.settings.model_copy(update=driven))
+    entries = read_entries(read.settings)
+    camera = entries.camera
     warnings = [
-        w for w in (warn_of_variant(settings.variant), warn_of_late_brakes(read), warn_of_bends(read)) if w
+        w
+        for w in (warn_of_variant(settings.variant), warn_of_late_brakes(read), warn_of_bends(read, entries))
+        if w
     ]
     frames = len(plan.clips) * settings.frames if settings.pictures else 0
     ticks = len(plan.clips) * plan.ticks_per_clip

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from catalogs.cameras import load_camera
+from catalogs.entries import load
 from catalogs.grids.form import TICK_RATE_HZ
 from catalogs.variants import warn_of_variant
 from flows.making.input_changes import refuse_changed_records
@@ -169,7 +169,7 @@ def locate_horizon(layout: Layout) -> dict[str, float] | None:
     path = layout.inputs / "camera.yaml"
     if not path.is_file():
         return None
-    camera = load_camera(path)
+    camera = load("camera", path)
     ahead, _, up = camera.T_rig_camera[:3, 2]
     focal, middle = camera.K[1, 1] / camera.height, camera.K[1, 2] / camera.height
     return {"level": float(middle + focal * up / ahead), "per_slope": float(focal)}

@@ -28,7 +28,7 @@ from prefect.client.schemas.sorting import FlowRunSort
 from prefect.runtime import deployment, flow_run
 from prefect.tasks import exponential_backoff
 
-from catalogs.grids import load_grid
+from catalogs.entries import load
 from catalogs.sentences import shorten
 from flows.running.prefect_progress import show_progress
 from flows.running.runner import RunnerName, end_with_parent
@@ -65,7 +65,7 @@ def _name_run() -> str:
     """Grid, clips and time of a run; a faulty grid has no number of clips, and fails later with its faults."""
     asked = read_options(flow_run.parameters)["grid"]
     try:
-        grid = load_grid(asked)
+        grid = load("grid", asked)
         what = f"{grid.settings.name}, {len(grid.scenarios)} clips"
     except InputError:
         what = Path(asked).stem

@@ -8,12 +8,12 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from catalogs.entries import load
 from catalogs.references import Traces, read_reference
 from catalogs.studies import Condition
 from catalogs.studies.ablation import Ablation, cut_coupling, load_ablation
-from catalogs.surfaces import load_surface
 from catalogs.variants import COUPLINGS, Variant
-from catalogs.vehicles import load_vehicle, vehicle_provenance
+from catalogs.vehicles import open_vehicle
 from flows.making.driving import simulate_drive
 from flows.pages.static import as_svg
 from flows.pages.writer import Section, Table, write_page
@@ -55,8 +55,9 @@ def run_ablation(
         If the traces do not hold the condition that is compared.
     """
     results = Outputs(out, "ablation", "ablation.json", "ablation.parquet", "ablation.svg", "ablation.html")
-    study, car, surface = load_ablation(), load_vehicle(vehicle), load_surface("dense-asphalt")
-    provenance = vehicle_provenance(vehicle)
+    file = open_vehicle(vehicle)
+    study, car, surface = load_ablation(), file.build(), load("surface", "dense-asphalt")
+    provenance = file.provenance
     chosen: Mode = mode or (provenance.mode if provenance else "paper")
     oracle = None if traces is None else oracle_trace(Path(traces), study.pitch)
     stops = stop_rows(study, car, surface, chosen)

@@ -7,11 +7,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from catalogs.entries import load
 from catalogs.references import ReferenceCase, Traces, read_reference
-from catalogs.studies import load_sensitivity_study
 from catalogs.studies.agreement import find_printed_name, put_beside_print
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle, vehicle_provenance
+from catalogs.vehicles import open_vehicle
 from flows.pages.figures import Figure
 from flows.pages.static import as_svg
 from flows.pages.writer import Section, Table, write_page
@@ -41,8 +40,8 @@ STOP_FIGURES = ("braking_time_error_s", "slip_distance_error_m")
 def run_sensitivity(*, out: str | None = None) -> dict[str, Any]:
     """The paper's Appendix E: envelopes and rank correlations, beside the printed figures."""
     results = Outputs(out, "sensitivity", "sensitivity.json", "sensitivity.svg", "sensitivity.html")
-    protocol, printed = load_sensitivity_study()
-    vehicle, surface = load_vehicle("paper-reference"), load_surface("dense-asphalt")
+    protocol, printed = load("sensitivity study")
+    vehicle, surface = load("vehicle", "paper-reference"), load("surface", "dense-asphalt")
     started = time.process_time()
     result = sensitivity_study(vehicle, surface, protocol)
     result |= {"cpu_s": time.process_time() - started, "beside_print": beside_print(result, printed)}
@@ -85,7 +84,8 @@ def measure_agreement(
     reference = read_reference(Path(traces))
     files = (f"{case.case}.svg" for case, _ in reference)
     results = Outputs(out, "agreement", "agreement.json", "agreement.html", *files)
-    model, provenance = load_vehicle(vehicle), vehicle_provenance(vehicle)
+    file = open_vehicle(vehicle)
+    model, provenance = file.build(), file.provenance
     chosen: Mode = mode or (provenance.mode if provenance else "paper")
     result = {"vehicle": vehicle, "mode": chosen} | agreement_of(model, reference, chosen)
     results.write_json("agreement.json", result)
@@ -93,7 +93,9 @@ def measure_agreement(
     for (case, columns), row in zip(reference, result["cases"] if out else (), strict=False):
         rides = {f"{vehicle}, {chosen} mode": simulate_case(model, case, columns, chosen)}
         if (vehicle, chosen) != PAPER:
-            rides[", ".join(PAPER) + " mode"] = simulate_case(load_vehicle(PAPER[0]), case, columns, "paper")
+            rides[", ".join(PAPER) + " mode"] = simulate_case(
+                load("vehicle", PAPER[0]), case, columns, "paper"
+            )
         figures.append(draw_trajectories(case.case, columns, rides, row["window"]))
         results.write(f"{case.case}.svg", as_svg(figures[-1]))
     results.write("agreement.html", _write_agreement_page(result, figures))

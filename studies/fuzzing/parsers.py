@@ -1,30 +1,19 @@
 """Every parser of what a stranger may have written."""
 
-from catalogs.bump_studies import load_bump_study
-from catalogs.buses import load_bus
-from catalogs.calibration import load_procedure
-from catalogs.cameras import load_camera
+from functools import partial
+
 from catalogs.campaigns import read_campaign
-from catalogs.channel_maps import load_channel_map
 from catalogs.drives import read_drives
 from catalogs.effects import load_effects
 from catalogs.effects.truths import load_sizes, load_truths
-from catalogs.gates import load_foreign_gates, load_gates
-from catalogs.grids import load_grid
-from catalogs.hazard_markings import load_marking
+from catalogs.entries import load
 from catalogs.learned_judges import load_judges
-from catalogs.protocols import load_protocol
 from catalogs.references import read_reference
 from catalogs.scenes.folder import read_scene
 from catalogs.scenes.gaussian_files import read_gaussians
 from catalogs.scenes.route_files import read_route
 from catalogs.scenes.stereo_folder import read_stereo_folder
 from catalogs.scenes.street import load_street_layout
-from catalogs.stop_studies import load_stop_study
-from catalogs.studies import load_sensitivity_study
-from catalogs.studies.closing import load_closing_study
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle
 from flows.judging.claims import read_claim
 from flows.judging.foreign_sources import read_camera, read_footage
 from flows.judging.physics_constants import read_constants
@@ -82,7 +71,7 @@ RECORDED = (
 
 PARSERS: tuple[Parser, ...] = (
     Parser(
-        name="grid", write=sound.write_grids, read=lambda folder: load_grid(folder / "grid.yaml"), share=8,
+        name="grid", write=sound.write_grids, read=lambda folder: load("grid", folder / "grid.yaml"), share=8,
         rules=(FINITE, *NUMBERS_OF_A_GRID), known_keys=r"|base|latin_hypercube|(axes\|[^|]+|scenarios)\|[^|]+",
     ),
     Parser(
@@ -90,25 +79,26 @@ PARSERS: tuple[Parser, ...] = (
         read=lambda folder: validate_grid(str(folder / "grid.yaml")), rules=(FINITE, *NUMBERS_OF_A_GRID),
         known_keys=r"|base|axes\|[^|]+\|[^|]+",
     ),
-    parse_entries("vehicle", "vehicles/[bp]*.yaml", load_vehicle, share=4),
-    parse_entries("frozen vehicle", "vehicles/m*.yaml", load_vehicle, share=1, reseal=seals.sealed_vehicle),
-    parse_entries("surface", "surfaces/*.yaml", load_surface, share=3),
-    parse_entries("camera", "cameras/*.yaml", load_camera, share=4),
-    parse_entries("gates", "gates.yaml", load_gates, share=2),
-    parse_entries("foreign gates", "foreign_gates.yaml", load_foreign_gates, share=2),
-    parse_entries("hazard marking", "hazard_markings/*.yaml", load_marking, share=2),
-    parse_entries("bus", "buses/*.yaml", load_bus, share=2),
-    parse_entries("calibration procedure", "calibration/*.yaml", load_procedure, share=2),
-    parse_entries("protocol", "protocols/*.yaml", load_protocol, share=2),
-    parse_entries("stop study", "stop_studies/*.yaml", load_stop_study, share=2),
-    parse_entries("bump study", "bump_studies/*.yaml", load_bump_study, share=2),
-    parse_entries("sensitivity study", "studies/surface-sensitivity.yaml", load_sensitivity_study, share=1),
-    parse_entries("closing study", "studies/closing.yaml", load_closing_study, share=2),
+    parse_entries("vehicle", "vehicles/[bp]*.yaml", partial(load, "vehicle"), share=4),
+    parse_entries("frozen vehicle", "vehicles/m*.yaml", partial(load, "vehicle"), share=1, reseal=seals.sealed_vehicle),
+    parse_entries("surface", "surfaces/*.yaml", partial(load, "surface"), share=3),
+    parse_entries("camera", "cameras/*.yaml", partial(load, "camera"), share=4),
+    parse_entries("gates", "gates.yaml", partial(load, "gate file"), share=2),
+    parse_entries("foreign gates", "foreign_gates.yaml", partial(load, "foreign gate file"), share=2),
+    parse_entries("hazard marking", "hazard_markings/*.yaml", partial(load, "hazard marking"), share=2),
+    parse_entries("bus", "buses/*.yaml", partial(load, "bus"), share=2),
+    parse_entries("calibration procedure", "calibration/*.yaml", partial(load, "calibration procedure"), share=2),
+    parse_entries("protocol", "protocols/*.yaml", partial(load, "protocol"), share=2),
+    parse_entries("stop study", "stop_studies/*.yaml", partial(load, "stop study"), share=2),
+    parse_entries("bump study", "bump_studies/*.yaml", partial(load, "bump study"), share=2),
+    parse_entries("sensitivity study", "studies/surface-sensitivity.yaml", partial(load, "sensitivity study"), share=1),
+    parse_entries("closing study", "studies/closing.yaml", partial(load, "closing study"), share=2),
     parse_entries("street", "scenes/street.yaml", load_street_layout, share=2),
     parse_entries("effects library", "effects/library.yaml", load_effects, share=0.5),
     parse_entries("truths", "effects/truths.yaml", lambda path: (load_truths(path), load_sizes(path)), share=1),
     parse_entries(
-        "channel map", "channel_maps/*.yaml", load_channel_map, share=3, rules=(files_inside(r"runs\|\d+\|file"),),
+        "channel map", "channel_maps/*.yaml", partial(load, "channel map"), share=3,
+        rules=(files_inside(r"runs\|\d+\|file"),),
     ),
     Parser(
         name="weather", write=sound.write_weather, read=read_weather, share=1, known_keys=".*",

@@ -4,10 +4,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from catalogs.channel_maps import load_channel_map
+from catalogs.entries import load
 from catalogs.recordings import read_signals, summarise_signals
-from catalogs.surfaces import load_surface
-from catalogs.weather.grip import shared_families
+from catalogs.weather.grip import WeatherFolder
 from catalogs.weather.look import load_weather
 from flows.auditing.signing import signature_findings
 from flows.auditing.verify import verify_dataset
@@ -48,7 +47,7 @@ def read_signature(folder: Path) -> None:
 
 def read_recording(folder: Path) -> None:
     """A recording as an import reads it, and as a list of its signals."""
-    channel_map, _ = load_channel_map(folder / "map.yaml")
+    channel_map, _ = load("channel map", folder / "map.yaml")
     path = next(folder.glob("log.*"))
     summarise_signals(path, channel_map)
     read_signals(path, channel_map)
@@ -56,9 +55,10 @@ def read_recording(folder: Path) -> None:
 
 def read_weather(folder: Path) -> None:
     """How the weathers look, and how they grip: what rolls on a road reads its own parts of the same files."""
-    load_weather(folder)
-    load_surface("dense-asphalt", folder)
-    shared_families(folder)
+    weather = WeatherFolder(folder)
+    load_weather(weather)
+    load("surface", "dense-asphalt", weather)
+    load("vehicle", "paper-reference", weather)
 
 
 def import_scene(folder: Path) -> None:

@@ -12,7 +12,8 @@ from pathlib import Path
 import torch
 
 import musync
-from catalogs.grids import Grid, load_grid
+from catalogs.entries import load
+from catalogs.grids import Grid
 from flows.cli import run_to_end
 from flows.making.generate import generate_dataset
 from studies.learn_friction.comparison import compare_predictors, format_errors, format_promises
@@ -24,7 +25,7 @@ GRID = Path(__file__).with_name("grid.yaml")
 
 def paint_grid() -> Grid:
     """Return the grid of the world in which weather is seen and not felt."""
-    grid = load_grid(GRID)
+    grid = load("grid", GRID)
     return replace(grid, settings=grid.settings.model_copy(update={"variant": "appearance-only"}))
 
 
@@ -42,7 +43,7 @@ def open_made(place: str) -> musync.Dataset:
     """
     if not Path(place, "manifest.json").is_file():
         generate_dataset(str(GRID), place, runner="threads")
-    data, wanted = musync.open(place), {label for label, _ in load_grid(GRID).scenarios}
+    data, wanted = musync.open(place), {label for label, _ in load("grid", GRID).scenarios}
     if set(data) != wanted:
         raise InputError(
             f"{place}: must be the dataset of studies/learn_friction/grid.yaml; its clips are others: name another"

@@ -3,7 +3,7 @@
 import pytest
 
 from benchmarks.pipeline import CLIP, FRAMES, SIZES
-from catalogs.grids import load_grid
+from catalogs.entries import load
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -11,6 +11,6 @@ def test_the_clip_of_each_size_is_a_grid_of_one_dry_stop_seen_by_a_camera_of_tha
     width, height, _ = size
     path = tmp_path / "clip.yaml"
     path.write_text(CLIP.format(width=width, height=height, frames=FRAMES))
-    grid = load_grid(str(path))
+    grid = load("grid", str(path))
     assert [(label, scenario.weather) for label, scenario in grid.scenarios] == [("dry", "dry")]
     assert (grid.settings.camera, grid.settings.frames) == (f"dashcam-{width}x{height}", FRAMES)

@@ -7,9 +7,7 @@ from scipy.signal import lfilter
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
-from catalogs.studies.closing import load_closing_study
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import load
 from tasks.campaign.gauge import denoise_pressure, estimate_gauge_noise
 from tasks.identification.benchmark import make_synthetic_campaign
 from tasks.identification.decision.verdict import judge_runs
@@ -67,7 +65,7 @@ def test_a_gauge_that_cannot_read_below_zero_brakes_no_wheel_at_rest() -> None:
 @pytest.mark.minutes
 def test_stops_of_one_kind_and_a_noisy_gauge_are_no_discovery() -> None:
     """Judged with the pressure as read, a form at the brake is found in it."""
-    model, surface = load_vehicle("paper-reference"), load_surface("dense-asphalt")
-    campaign = make_synthetic_campaign(model, surface, {}, 700_100, design=load_closing_study().drives())
+    model, surface = load("vehicle", "paper-reference"), load("surface", "dense-asphalt")
+    campaign = make_synthetic_campaign(model, surface, {}, 700_100, design=load("closing study").drives())
     lag = tuple(effect for effect in load_effects() if effect.name in {"brake_lag", "pressure_nonlinearity"})
     assert judge_runs(campaign, model, surface, lag, load_decision_rules()).verdict.verdict == "NOTHING"

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catalogs.protocols import load_protocol
+from catalogs.entries import load
 from tasks.campaign.events import Event, RecordedRun
 from tasks.campaign.selection import QUANTITIES, judge_event, select_events, tabulate_attrition
 
-PROTOCOL = load_protocol("brake-dive")
+PROTOCOL = load("protocol", "brake-dive")
 INTERVAL = 0.01
 T = np.arange(400) * INTERVAL
 ONSET = 1.5

@@ -2,8 +2,7 @@
 
 import pytest
 
-from catalogs.entries import FOLDERS, entry_folder, entry_names, find_entry
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import KINDS, entry_folder, entry_names, find_entry, load
 from tasks.errors import InputError
 
 
@@ -27,7 +26,7 @@ from tasks.errors import InputError
 )
 def test_a_name_that_is_none_is_one_short_sentence_with_those_that_exist(name):
     with pytest.raises(InputError, match=r"no such vehicle; .*paper-reference") as caught:
-        load_vehicle(name)
+        load("vehicle", name)
     assert len(str(caught.value)) < 500
 
 
@@ -44,8 +43,15 @@ def test_a_name_is_looked_up_and_a_file_is_taken_as_it_is(tmp_path):
     assert find_entry("vehicle", "bmw-m8") == entry_folder("vehicle") / "bmw-m8.yaml"
 
 
-@pytest.mark.parametrize("kind", FOLDERS)
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if entry_folder(kind).is_dir()])
 def test_every_name_of_a_kind_is_found_in_its_folder(kind):
     names = entry_names(kind)
     assert names
     assert {find_entry(kind, name).parent for name in names} == {entry_folder(kind)}
+    assert all(load(kind, name) is not None for name in names)
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if entry_folder(kind).is_file()])
+def test_the_only_entry_of_a_kind_is_read_once_and_another_file_in_its_place_whenever_it_is_named(kind):
+    assert load(kind) is load(kind)
+    assert load(kind, entry_folder(kind)) == load(kind)

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from catalogs.grids import FaultyGrid, load_grid
+from catalogs.entries import load
+from catalogs.grids import FaultyGrid
 from catalogs.grids.form import MOST_CLIPS
 from catalogs.sentences import MOST_PROBLEMS
 from tasks.errors import InputError
@@ -15,7 +16,7 @@ def problems_of(tmp_path: Path, body: str) -> list[str]:
     path = tmp_path / "grid.yaml"
     path.write_text(body)
     with pytest.raises(InputError) as caught:
-        load_grid(path)
+        load("grid", path)
     assert all(problem.startswith(f"{path}: ") for problem in caught.value.problems[:MOST_PROBLEMS])
     return [problem.removeprefix(f"{path}: ") for problem in caught.value.problems]
 
@@ -89,7 +90,7 @@ def test_what_can_be_read_of_a_faulty_grid_goes_on_to_the_catalogue(tmp_path):
     path = tmp_path / "grid.yaml"
     path.write_text("{name: t, vehicle: tank, colour: red, axes: {w: 3}}")
     with pytest.raises(FaultyGrid) as caught:
-        load_grid(path)
+        load("grid", path)
     assert caught.value.grid is not None and caught.value.grid.settings.vehicle == "tank"
 
 
@@ -155,4 +156,4 @@ def test_labels_of_many_long_names_and_labels_that_meet_are_refused(tmp_path):
 def test_a_label_of_any_script_with_marks_is_fine(tmp_path):
     path = tmp_path / "grid.yaml"
     path.write_text("{name: Größe & <b>, axes: {w: {'雨/25 mm [1]': {}}}}")
-    assert [label for label, _ in load_grid(path).scenarios] == ["雨/25 mm [1]"]
+    assert [label for label, _ in load("grid", path).scenarios] == ["雨/25 mm [1]"]

@@ -8,9 +8,9 @@ import pytest
 import yaml
 from jsonschema import Draft202012Validator
 
-from catalogs.calibrated_range import calibration_tag, load_calibrated_range
-from catalogs.entries import entry_names, find_entry
-from catalogs.grids import GridFile, expand_grid, load_grid, warn_of_late_brakes
+from catalogs.calibrated_range import calibration_tag
+from catalogs.entries import entry_names, find_entry, load
+from catalogs.grids import GridFile, expand_grid, warn_of_late_brakes
 from catalogs.grids.schema import grid_schema
 from catalogs.scenario import Scenario
 from catalogs.studies import load_conditions
@@ -141,7 +141,7 @@ def test_a_condition_that_no_scenario_can_meet_is_refused(tmp_path, condition, t
         ("splits.a", f"splits: {{a: {{{condition}}}, b: {{}}}}"),
     ):
         with pytest.raises(InputError) as caught:
-            load_grid(write_grid(tmp_path, body))
+            load("grid", write_grid(tmp_path, body))
         assert [problem.split(": ", 1)[1] for problem in caught.value.problems if f"{name}.{told}" in problem]
 
 
@@ -155,7 +155,7 @@ def test_a_condition_that_no_scenario_can_meet_is_refused(tmp_path, condition, t
 )
 def test_a_condition_that_no_clip_of_the_grid_meets_is_refused(tmp_path, body, told):
     with pytest.raises(InputError, match=told):
-        load_grid(write_grid(tmp_path, body))
+        load("grid", write_grid(tmp_path, body))
 
 
 @pytest.mark.parametrize(
@@ -167,7 +167,7 @@ def test_a_brake_after_the_end_of_the_telemetry_is_warned_of(tmp_path, duration,
     grid.write_text(
         f"{{name: t, duration_s: {duration}, scenarios: {{a: {{{braked}}}, b: {{brake_onset_s: 60}}}}}}"
     )
-    told = warn_of_late_brakes(load_grid(grid))
+    told = warn_of_late_brakes(load("grid", grid))
     assert (told is not None) == late
     if told is not None:
         assert (
@@ -184,13 +184,13 @@ def test_a_draw_may_leave_nothing_out(tmp_path):
     cube = "latin_hypercube: {count: 3, ranges: {initial_speed_km_h: [30, 70]}}"
     file = tmp_path / "grid.yaml"
     file.write_text(f"{{name: t, {cube}, exclude: [{{initial_speed_km_h: {{min: 69.999}}}}]}}")
-    assert load_grid(file).left_out == 0
+    assert load("grid", file).left_out == 0
 
 
 def test_the_papers_conditions_have_the_papers_relationship():
     """Appendix C: 19 development cases; held out, five weathers interpolate and seven controls are off the grid."""
     tags = {
-        c.name: (c.split, calibration_tag(c.scenario, load_calibrated_range())) for c in load_conditions()
+        c.name: (c.split, calibration_tag(c.scenario, load("calibrated range"))) for c in load_conditions()
     }
     assert {tag for split, tag in tags.values() if split == "development"} == {"in-grid"}
     held_out = {name: tag for name, (split, tag) in tags.items() if split == "held-out"}
@@ -218,7 +218,7 @@ def test_the_papers_conditions_have_the_papers_relationship():
 )
 def test_one_changed_control_moves_a_scenario_of_the_grid(change, tag):
     rain = Scenario(weather="rain", precipitation_mm_h=10.0, peak_pressure_mpa=2.3, brake_onset_s=1.0)
-    assert calibration_tag(replace(rain, **change), load_calibrated_range()) == tag
+    assert calibration_tag(replace(rain, **change), load("calibrated range")) == tag
 
 
 def test_the_json_schema_takes_every_grid_that_ships_and_refuses_what_the_reader_refuses():

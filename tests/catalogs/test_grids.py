@@ -2,8 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from catalogs.entries import entry_names
-from catalogs.grids import load_grid
+from catalogs.entries import entry_names, load
 from catalogs.scenario import Scenario, find_route_problems, find_scenario_problems
 from tasks.errors import InputError
 
@@ -16,11 +15,11 @@ def grid_file(tmp_path: Path, body: str) -> Path:
 
 @pytest.mark.parametrize("name", entry_names("grid"))
 def test_every_grid_that_ships_is_sound(name):
-    assert load_grid(name).scenarios
+    assert load("grid", name).scenarios
 
 
 def test_the_demo_covers_two_rates_of_each_weather_on_three_roads():
-    scenarios = [scenario for _, scenario in load_grid("demo").scenarios]
+    scenarios = [scenario for _, scenario in load("grid", "demo").scenarios]
     assert len(scenarios) >= 12
     assert {s.weather for s in scenarios} == {"dry", "rain", "snow"}
     assert len({s.precipitation_mm_h for s in scenarios if s.weather == "rain"}) == 2
@@ -30,12 +29,13 @@ def test_the_demo_covers_two_rates_of_each_weather_on_three_roads():
 
 
 def test_axes_multiply_and_later_axes_override_earlier_ones(tmp_path):
-    grid = load_grid(
+    grid = load(
+        "grid",
         grid_file(
             tmp_path,
             "{name: t, base: {initial_speed_km_h: 30}, axes: {a: {x: {}, y: {initial_speed_km_h: 50}},"
             " b: {p: {}, q: {initial_speed_km_h: 70}}}}",
-        )
+        ),
     )
     assert [(label, s.initial_speed_km_h) for label, s in grid.scenarios] == [
         ("x/p", 30), ("x/q", 70), ("y/p", 50), ("y/q", 70),
@@ -44,18 +44,18 @@ def test_axes_multiply_and_later_axes_override_earlier_ones(tmp_path):
 
 def test_how_frames_are_compressed_stands_in_the_record_only_where_it_was_asked_for(tmp_path):
     body = "name: g\naxes: {weather: {dry: {weather: dry}}}\n"
-    plain = load_grid(str(grid_file(tmp_path, body))).settings
-    quick = load_grid(str(grid_file(tmp_path, body + "compression: lz4\n"))).settings
+    plain = load("grid", str(grid_file(tmp_path, body))).settings
+    quick = load("grid", str(grid_file(tmp_path, body + "compression: lz4\n"))).settings
     assert "compression" not in plain.model_dump(mode="json") and plain.compression == "zstd"
     assert quick.model_dump(mode="json")["compression"] == "lz4"
     with pytest.raises(InputError, match="compression"):
-        load_grid(str(grid_file(tmp_path, body + "compression: zip\n")))
+        load("grid", str(grid_file(tmp_path, body + "compression: zip\n")))
 
 
 def test_a_name_that_commands_take_for_an_option_is_refused(tmp_path):
     """It names folders: `rm *` beside one called -rf removes what lies in the others."""
     with pytest.raises(InputError, match="begin with another character than -"):
-        load_grid(str(grid_file(tmp_path, "name: -rf\naxes: {weather: {dry: {weather: dry}}}\n")))
+        load("grid", str(grid_file(tmp_path, "name: -rf\naxes: {weather: {dry: {weather: dry}}}\n")))
 
 
 def test_all_faults_of_a_file_are_listed_at_once_each_with_its_place(tmp_path):
@@ -65,7 +65,7 @@ def test_all_faults_of_a_file_are_listed_at_once_each_with_its_place(tmp_path):
         " c: {precipitation_mm_h: .nan}}}}",
     )
     with pytest.raises(InputError) as caught:
-        load_grid(path)
+        load("grid", path)
     text = str(caught.value)
     assert len(caught.value.problems) == 5
     for place in (
@@ -85,7 +85,7 @@ def test_faults_of_form_do_not_hide_broken_rules_and_make_none_up(tmp_path):
         " b: {weather: rain, precipitation_mm_h: -1}}}}",
     )
     with pytest.raises(InputError) as caught:
-        load_grid(path)
+        load("grid", path)
     form, rules = caught.value.problems[:2], caught.value.problems[2:]
     assert sorted(sentence.split(": ")[1] for sentence in form) == ["axes.w.a.weather", "colour"]
     assert rules == (f"{path}: scenario b: precipitation_mm_h must not be negative; it is -1",)
@@ -97,7 +97,7 @@ def test_a_rule_broken_by_many_scenarios_is_told_once(tmp_path):
         "{name: t, axes: {w: {s: {weather: snow, precipitation_mm_h: 1}}, r: {a: {}, b: {}, c: {}}}}",
     )
     with pytest.raises(InputError) as caught:
-        load_grid(path)
+        load("grid", path)
     assert caught.value.problems == (
         f"{path}: scenario s/a and 2 more: weather snow needs an accumulation time;"
         " snow_accumulation_h is 0: give the hours of snowfall",
@@ -107,13 +107,13 @@ def test_a_rule_broken_by_many_scenarios_is_told_once(tmp_path):
 @pytest.mark.parametrize("body", ["[1, 2]", "name: [", "3", ""])
 def test_a_file_that_is_no_mapping_is_refused_with_one_sentence(tmp_path, body):
     with pytest.raises(InputError) as caught:
-        load_grid(grid_file(tmp_path, body))
+        load("grid", grid_file(tmp_path, body))
     assert len(caught.value.problems) == 1
 
 
 def test_an_unknown_grid_lists_those_that_exist():
     with pytest.raises(InputError, match="demo"):
-        load_grid("nowhere")
+        load("grid", "nowhere")
 
 
 @pytest.mark.parametrize(

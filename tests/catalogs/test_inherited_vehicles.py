@@ -5,14 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from catalogs.entries import entry_names, find_entry
-from catalogs.vehicles import (
-    load_tolerances,
-    load_vehicle,
-    vehicle_content,
-    vehicle_provenance,
-    vehicle_tyre_source,
-)
+from catalogs.entries import entry_names, find_entry, load
+from catalogs.vehicles import open_vehicle
 from catalogs.vehicles.inherited import MOST_GENERATIONS
 from tasks.errors import InputError
 from tasks.vehicle.effects.table import EFFECT_UNITS
@@ -33,14 +27,14 @@ def write(tmp_path):
 
 def refusal(path):
     with pytest.raises(InputError) as caught:
-        load_vehicle(path)
+        load("vehicle", path)
     (problem,) = caught.value.problems
     return problem
 
 
 def test_what_is_not_given_is_that_of_the_other_vehicle(write):
-    base = load_vehicle("paper-reference")
-    car = load_vehicle(write("car.yaml", f"extends: paper-reference\n{HEAVY}"))
+    base = load("vehicle", "paper-reference")
+    car = load("vehicle", write("car.yaml", f"extends: paper-reference\n{HEAVY}"))
     assert car == replace(base, name="car", sprung_mass=1500)
 
 
@@ -55,7 +49,8 @@ effects:
 tyre: pacejka-205-60r15
 """,
     )
-    car = load_vehicle(
+    car = load(
+        "vehicle",
         write(
             "car.yaml",
             """
@@ -65,26 +60,26 @@ families:
 effects:
   lag: {value: 0.1, unit: s, source: another stop}
 """,
-        )
+        ),
     )
-    base = load_vehicle("paper-reference")
+    base = load("vehicle", "paper-reference")
     assert car.effects == {"drag_area": 0.6, "lag": 0.1}
     assert car.tyre is not None
     assert car.families == {
         **base.families,
         "rain": replace(base.families["rain"], efficiency=(0.8, 0.8, 0.8, 0.8)),
     }
-    assert load_vehicle(write("bare.yaml", "extends: base.yaml\ntyre: null\n")).tyre is None
+    assert load("vehicle", write("bare.yaml", "extends: base.yaml\ntyre: null\n")).tyre is None
 
 
 def test_a_number_is_inherited_with_its_tolerance_or_given_whole(write):
     write("base.yaml", f"extends: paper-reference\n{HEAVY}")
-    assert load_tolerances(write("car.yaml", "extends: base.yaml\n")) == {"sprung_mass": 0.01}
+    assert open_vehicle(write("car.yaml", "extends: base.yaml\n")).tolerances == {"sprung_mass": 0.01}
     own = write("own.yaml", "extends: base.yaml\nsprung_mass: {value: 1400, unit: kg, source: scales}\n")
-    assert load_tolerances(own) == {}
+    assert open_vehicle(own).tolerances == {}
     half = write("half.yaml", "extends: base.yaml\nsprung_mass: {tolerance: 3}\n")
     with pytest.raises(InputError, match=r"sprung_mass\.value is missing"):
-        load_vehicle(half)
+        load("vehicle", half)
 
 
 @pytest.mark.parametrize(
@@ -119,7 +114,7 @@ def test_a_line_of_files_has_an_end(write):
     write("0.yaml", "extends: paper-reference")
     for k in range(1, MOST_GENERATIONS):
         write(f"{k}.yaml", f"extends: {k - 1}.yaml")
-    assert load_vehicle(write("last.yaml", f"extends: {MOST_GENERATIONS - 3}.yaml")).mass == 1308
+    assert load("vehicle", write("last.yaml", f"extends: {MOST_GENERATIONS - 3}.yaml")).mass == 1308
     assert "at most 8 files may extend each other" in refusal(
         write("car.yaml", f"extends: {MOST_GENERATIONS - 1}.yaml")
     )
@@ -133,7 +128,7 @@ def test_a_problem_of_the_other_vehicle_is_told_of_its_file(write):
 
 @pytest.mark.parametrize("name", entry_names("vehicle"))
 def test_a_vehicle_that_extends_none_is_kept_as_its_file_is(name):
-    assert vehicle_content(name) == find_entry("vehicle", name).read_bytes()
+    assert open_vehicle(name).content == find_entry("vehicle", name).read_bytes()
 
 
 @pytest.mark.parametrize("base", entry_names("vehicle"))
@@ -144,40 +139,41 @@ def test_the_whole_copy_loads_alone_as_the_same_car(write, tmp_path, base):
     path = write("car.yaml", f"extends: base.yaml\n{HEAVY}")
     (tmp_path / "elsewhere").mkdir()
     copy = tmp_path / "elsewhere" / "car.yaml"
-    copy.write_bytes(vehicle_content(path))
+    copy.write_bytes(open_vehicle(path).content)
     assert b"extends" not in copy.read_bytes()
-    assert load_vehicle(copy) == load_vehicle(path)
+    assert load("vehicle", copy) == load("vehicle", path)
     assert (
-        load_tolerances(copy)
-        == load_tolerances(path)
+        open_vehicle(copy).tolerances
+        == open_vehicle(path).tolerances
         == {"cg_height": pytest.approx(0.05), "sprung_mass": 0.01}
     )
-    assert vehicle_content(copy) == copy.read_bytes()
-    assert vehicle_provenance(copy) == vehicle_provenance(path)
+    assert open_vehicle(copy).content == copy.read_bytes()
+    assert open_vehicle(copy).provenance == open_vehicle(path).provenance
 
 
 def test_the_whole_copy_names_the_hash_of_every_file_in_it(write):
     base = write("base.yaml", "extends: paper-reference\n")
     path = write("car.yaml", f"extends: base.yaml\n{HEAVY}")
-    before = vehicle_content(path)
+    before = open_vehicle(path).content
     first = before.splitlines()[0].decode()
-    for content in (path.read_bytes(), vehicle_content(base)):
+    for content in (path.read_bytes(), open_vehicle(base).content):
         assert hashlib.sha256(content).hexdigest() in first
     base.write_text("extends: paper-reference\n# another word, and the same car\n")
     assert (
-        vehicle_content(path) != before and vehicle_content(path).splitlines()[1:] == before.splitlines()[1:]
+        open_vehicle(path).content != before
+        and open_vehicle(path).content.splitlines()[1:] == before.splitlines()[1:]
     )
 
 
 def test_numbers_over_a_frozen_vehicle_keep_its_mode_and_bounds_and_say_whose_they_are(write):
     path = write("car.yaml", f"extends: multibody-grown\n{HEAVY}")
-    provenance, before = vehicle_provenance(path), vehicle_provenance("multibody-grown")
+    provenance, before = open_vehicle(path).provenance, open_vehicle("multibody-grown").provenance
     assert (provenance.mode, provenance.bounds, provenance.base) == (
         "coupled",
         before.bounds,
         "multibody-grown",
     )
-    assert provenance.base_sha256 == hashlib.sha256(vehicle_content("multibody-grown")).hexdigest()
+    assert provenance.base_sha256 == hashlib.sha256(open_vehicle("multibody-grown").content).hexdigest()
     assert provenance.procedure_sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
     assert provenance.procedure == f"numbers of its own over those of multibody-grown: {before.procedure}"
 
@@ -198,7 +194,7 @@ def test_the_tyre_lies_beside_the_file_that_names_it(write, tmp_path):
     tyre = find_entry("tyre", "pacejka-205-60r15")
     (tmp_path / tyre.name).write_bytes(tyre.read_bytes())
     write("base.yaml", "extends: paper-reference\ntyre: pacejka-205-60r15\n")
-    assert vehicle_tyre_source(write("car.yaml", "extends: base.yaml")) == tmp_path / tyre.name
+    assert open_vehicle(write("car.yaml", "extends: base.yaml")).tyre_source == tmp_path / tyre.name
 
 
 @pytest.mark.parametrize(
@@ -240,8 +236,8 @@ effects:
   drag_area: {value: 0.6, unit: m2, source: data sheet, tolerance: 0.03}
 """,
     )
-    assert load_tolerances(path) == pytest.approx({"static_pitch": 0.2, "drag_area": 0.05})
-    assert load_tolerances("paper-reference") == {}
+    assert open_vehicle(path).tolerances == pytest.approx({"static_pitch": 0.2, "drag_area": 0.05})
+    assert open_vehicle("paper-reference").tolerances == {}
     zero = write(
         "zero.yaml", "extends: car.yaml\nstatic_pitch: {value: 0, unit: deg, source: s, tolerance: 0.1}\n"
     )

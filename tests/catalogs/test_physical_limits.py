@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from catalogs.physical_limits import PHYSICAL_LIMITS, load_physical_limits
+from catalogs.entries import find_entry, load
 from catalogs.scenario import Scenario, find_scenario_problems
 from catalogs.studies import load_conditions
 from catalogs.studies.ablation import load_ablation
@@ -14,12 +14,12 @@ SNOW = Scenario(weather="snow", precipitation_mm_h=1.0, snow_accumulation_h=1.0)
 
 
 def test_every_limit_says_why():
-    for name, limit in load_physical_limits():
+    for name, limit in load("table of physical limits"):
         assert len(limit.source) > 20, name
 
 
 def test_the_heaviest_rain_is_that_of_one_minute_in_an_hour():
-    assert load_physical_limits().rain_rate.value == pytest.approx(31.2 * 60)
+    assert load("table of physical limits").rain_rate.value == pytest.approx(31.2 * 60)
 
 
 def test_the_papers_scenarios_lie_within_the_limits():
@@ -59,7 +59,7 @@ def test_the_papers_scenarios_lie_within_the_limits():
 def test_what_lies_beyond_a_limit_is_refused_with_the_limits_reason(scenario, words):
     (problem,) = find_scenario_problems(scenario)
     assert words in problem
-    assert any(limit.source in problem for _, limit in load_physical_limits())
+    assert any(limit.source in problem for _, limit in load("table of physical limits"))
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])
@@ -69,4 +69,6 @@ def test_a_number_that_is_not_finite_is_refused(value):
 
 
 def test_the_catalogue_is_a_table_of_value_unit_and_source():
-    assert PHYSICAL_LIMITS.read_text().count("source:") == len(type(load_physical_limits()).model_fields)
+    assert find_entry("table of physical limits").read_text().count("source:") == len(
+        type(load("table of physical limits")).model_fields
+    )

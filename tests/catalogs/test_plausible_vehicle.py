@@ -6,17 +6,15 @@ import pytest
 import yaml
 from pydantic import ValidationError
 
-from catalogs.entries import entry_names
+from catalogs.entries import entry_names, find_entry, load
 from catalogs.plausible_vehicle import (
-    PLAUSIBLE_VEHICLE,
     PlausibleVehicle,
     find_plausibility_problems,
-    load_plausible_vehicle,
 )
-from catalogs.vehicles import load_tolerances, load_vehicle, vehicle_units
+from catalogs.vehicles import open_vehicle, vehicle_units
 from tasks.vehicle.figures import FIGURES, compute_figures
 
-REFERENCE = load_vehicle("paper-reference")
+REFERENCE = load("vehicle", "paper-reference")
 SLIPS = {
     "a mass in tonnes": ({"sprung_mass": 1.2}, {"mass", "static_front_load"}),
     "unsprung masses of all four corners at each axle": (
@@ -56,7 +54,10 @@ def named(problems):
 
 @pytest.mark.parametrize("name", entry_names("vehicle"))
 def test_every_vehicle_that_ships_is_plausible(name):
-    assert find_plausibility_problems(compute_figures(load_vehicle(name)), load_tolerances(name)) == []
+    assert (
+        find_plausibility_problems(compute_figures(load("vehicle", name)), open_vehicle(name).tolerances)
+        == []
+    )
 
 
 @pytest.mark.parametrize("slip", SLIPS)
@@ -71,7 +72,7 @@ def test_every_figure_is_told_by_some_slip():
 
 def test_a_sentence_has_rule_value_reason_and_what_to_look_at():
     (problem,) = find_plausibility_problems(compute_figures(replace(REFERENCE, front_brake_share=0.35)), {})
-    limits = load_plausible_vehicle().figures["front_brake_share"]
+    limits = load("table of plausible figures").figures["front_brake_share"]
     assert problem == (
         f"front_brake_share must lie within 0.45 to 0.85 ({limits.source}); it is 0.35: check {limits.check}"
     )
@@ -94,14 +95,14 @@ def test_a_tolerance_that_is_a_percentage_or_nothing_is_told(share):
 
 
 def test_usual_tolerances_are_of_numbers_that_exist_and_plausible():
-    ranges = load_plausible_vehicle()
+    ranges = load("table of plausible figures")
     shares = {name: number.value for name, number in ranges.usual_tolerances.items()}
     assert shares.keys() <= vehicle_units().keys()
     assert not find_plausibility_problems({}, shares)
 
 
 def test_the_catalogue_has_every_figure_in_its_unit_and_says_why():
-    content = yaml.safe_load(PLAUSIBLE_VEHICLE.read_text())
+    content = yaml.safe_load(find_entry("table of plausible figures").read_text())
     assert all(len(row["source"]) > 15 for row in content["figures"].values())
     del content["figures"]["mass"]
     content["figures"]["charm"] = content["figures"]["wheelbase"]

@@ -157,11 +157,9 @@ def test_the_facts_of_a_cached_street_name_its_source(cache):
 
 def test_the_street_is_built_from_its_entry_and_anew_where_that_changes(tmp_path, monkeypatch):
     monkeypatch.setattr("tasks.scene.street.build.build_street", lambda layout, seed: layout.lane_width)
-    recipe = street_cache._recipe_hash()
-    monkeypatch.setattr(street_cache, "STREET_FILE", tmp_path / "street.yaml")
-    entry = STREET_FILE.read_text()
-    (tmp_path / "street.yaml").write_text(
-        entry.replace("lane_width: {value: 3.5", "lane_width: {value: 3.25")
-    )
+    own = tmp_path / "street.yaml"
+    own.write_text(STREET_FILE.read_text().replace("lane_width: {value: 3.5", "lane_width: {value: 3.25"))
+    stamps = [((path,), (street_cache._stamp_file(path),)) for path in (STREET_FILE, own)]
+    monkeypatch.setattr(street_cache, "STREET_FILE", own)
     assert street_cache._build_street(1) == 3.25
-    assert street_cache._recipe_hash() != recipe
+    assert street_cache._recipe_hash(*stamps[0]) != street_cache._recipe_hash(*stamps[1])

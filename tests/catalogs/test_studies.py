@@ -4,9 +4,10 @@ from decimal import Decimal
 
 import pytest
 
+from catalogs.entries import load
 from catalogs.references import ReferenceCase
 from catalogs.scenario import find_scenario_problems
-from catalogs.studies import load_conditions, load_sensitivity_study
+from catalogs.studies import load_conditions
 from catalogs.studies.agreement import find_printed_name, printed_agreement, put_beside_print
 
 
@@ -33,7 +34,7 @@ def test_held_out_conditions_change_one_control_each():
 
 
 def test_the_study_samples_the_published_parameters():
-    protocol, printed = load_sensitivity_study()
+    protocol, printed = load("sensitivity study")
     assert (
         protocol.weathers["rain"].parameters[0] == protocol.weathers["snow"].parameters[0] == "dry_friction"
     )

@@ -6,9 +6,8 @@ from math import degrees
 import pytest
 import yaml
 
-from catalogs.entries import entry_names, find_entry
-from catalogs.vehicles import load_vehicle
-from catalogs.weather.grip import FOLDER as WEATHER
+from catalogs.entries import entry_names, find_entry, load
+from catalogs.weather.grip import WEATHER, WeatherFolder
 from tasks.errors import InputError
 from tasks.surface.weather import WEATHERS
 
@@ -26,12 +25,12 @@ def saved(tmp_path, entry):
 
 @pytest.mark.parametrize("name", entry_names("vehicle"))
 def test_every_vehicle_loads(name):
-    vehicle = load_vehicle(name)
+    vehicle = load("vehicle", name)
     assert vehicle.name == name and all(vehicle.find_tyre_family(kind) for kind in WEATHERS)
 
 
 def test_the_reference_vehicle_has_the_papers_loads_and_offsets():
-    vehicle = load_vehicle("paper-reference")
+    vehicle = load("vehicle", "paper-reference")
     front, rear = vehicle.static_axle_loads
     assert (round(front, 1), round(rear, 1)) == (7069.7, 5761.7)
     assert front + rear == pytest.approx(vehicle.mass * vehicle.gravity)
@@ -41,12 +40,12 @@ def test_the_reference_vehicle_has_the_papers_loads_and_offsets():
 
 def test_a_vehicle_file_elsewhere_loads_like_the_shipped_one(tmp_path, entry):
     entry["sprung_mass"]["value"] = 1300
-    assert load_vehicle(saved(tmp_path, entry)).sprung_mass == 1300
+    assert load("vehicle", saved(tmp_path, entry)).sprung_mass == 1300
 
 
 def test_an_unknown_name_lists_what_exists():
     with pytest.raises(InputError, match=r"tractor: no such vehicle.*paper-reference"):
-        load_vehicle("tractor")
+        load("vehicle", "tractor")
 
 
 def test_all_problems_of_a_file_are_listed_at_once(tmp_path, entry):
@@ -62,7 +61,7 @@ def test_all_problems_of_a_file_are_listed_at_once(tmp_path, entry):
     entry["families"]["dry"]["burckhardt"]["value"] = [0.1, 1.0, 0.5]
     path = saved(tmp_path, entry)
     with pytest.raises(InputError) as error:
-        load_vehicle(path)
+        load("vehicle", path)
     said = "\n".join(error.value.problems)
     for expected in (
         "sprung_mass: must be above 0; it is -1200",
@@ -82,24 +81,24 @@ def test_all_problems_of_a_file_are_listed_at_once(tmp_path, entry):
 
 def test_a_kind_of_weather_brings_tyres_to_a_vehicle_that_has_none_for_it(tmp_path, entry):
     catalogue = tmp_path / "weather"
-    shutil.copytree(WEATHER, catalogue)
+    shutil.copytree(WEATHER.folder, catalogue)
     snow = entry["families"].pop("snow")
     path = saved(tmp_path, entry)
     with pytest.raises(
         InputError, match=r"has no tyre family for weather snow, only for dry, rain: add families\.snow"
     ):
-        load_vehicle(path, catalogue).find_tyre_family("snow")
+        load("vehicle", path, WeatherFolder(catalogue)).find_tyre_family("snow")
     look = yaml.safe_load((catalogue / "snow.yaml").read_text())
     (catalogue / "snow.yaml").write_text(yaml.safe_dump(look | {"tyre": snow}))
     assert (
-        load_vehicle(path, catalogue).find_tyre_family("snow")
-        == load_vehicle("paper-reference").families["snow"]
+        load("vehicle", path, WeatherFolder(catalogue)).find_tyre_family("snow")
+        == load("vehicle", "paper-reference").families["snow"]
     )
-    own = load_vehicle("paper-reference", catalogue)
+    own = load("vehicle", "paper-reference", WeatherFolder(catalogue))
     assert own.find_tyre_family("snow") is own.families["snow"]
 
 
 def test_a_family_of_no_kind_of_weather_is_refused(tmp_path, entry):
     entry["families"]["hail"] = entry["families"]["snow"]
     with pytest.raises(InputError, match=r"families\.hail: must be dry, rain"):
-        load_vehicle(saved(tmp_path, entry))
+        load("vehicle", saved(tmp_path, entry))

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from benchmarks.synthetic_street import Clip
-from catalogs.gates import load_gates
+from catalogs.entries import load
 from tasks.errors import InputError
 from tasks.eval.body_agreement import BodyClaim, compare_body, pose_body
 from tasks.eval.false_rigs import FALSE_RIGS, show_rig
@@ -33,7 +33,7 @@ def claim_of(clip: Clip) -> BodyClaim:
 
 
 def judge(motion: RecoveredMotion, clip: Clip) -> PoseVerdict:
-    return judge_pose(motion, clip.pitch, clip.station, load_gates(), claim_of(clip))
+    return judge_pose(motion, clip.pitch, clip.station, load("gate file"), claim_of(clip))
 
 
 def pitch_by(clip: Clip, angle: Floats | float) -> Floats:

@@ -8,9 +8,8 @@ import pytest
 from benchmarks.physics_judge.__main__ import draw_braked_clip, judge
 from benchmarks.physics_judge.clips import TYRE, StudyClip, draw_clip, make_clip
 from benchmarks.physics_judge.errors import ERRORS
+from catalogs.entries import load
 from catalogs.scenario import Scenario
-from catalogs.tyres import load_tyre
-from catalogs.vehicles import load_vehicle
 from tasks.eval.physics.audit import audit_clip
 from tasks.eval.physics.constants import DT
 from tasks.eval.physics.tyres import find_curve
@@ -58,7 +57,7 @@ def test_an_injected_error_breaks_a_law_that_names_its_place_and_size(
 
 @pytest.mark.parametrize("car", ["multibody-grown", "bmw-m8"])
 def test_a_wheel_inertia_that_is_five_per_cent_off_breaks_the_wheels_torque_balance(car: str) -> None:
-    clip = make_clip(STOP, load_vehicle(car), "coupled", duration_s=6.0)
+    clip = make_clip(STOP, load("vehicle", car), "coupled", duration_s=6.0)
     assert not judge(clip)
     broken = {law.name: law.size for law in judge(clip, ERRORS["wheel inertia 5 % high"](clip))}
     assert broken["wheel torque balance, f"] == pytest.approx(1 - 1 / 1.05, rel=0.1)
@@ -66,7 +65,7 @@ def test_a_wheel_inertia_that_is_five_per_cent_off_breaks_the_wheels_torque_bala
 
 @pytest.mark.parametrize("effect", ["relaxation_length", "fade"])
 def test_a_law_that_an_effect_takes_away_is_named_and_all_others_are_judged(effect: str) -> None:
-    vehicle = load_vehicle("multibody-staged")
+    vehicle = load("vehicle", "multibody-staged")
     plain = make_clip(STOP, vehicle, "coupled", duration_s=3.0)
     clip = make_clip(STOP, replace(vehicle, effects={effect: 0.2}), "coupled", duration_s=3.0)
     verdict = audit_clip(clip.ticks, clip.frames, clip.facts, clip.constants)
@@ -78,15 +77,15 @@ def test_a_law_that_an_effect_takes_away_is_named_and_all_others_are_judged(effe
 
 
 def test_the_judges_magic_formula_is_that_of_the_property_file() -> None:
-    vehicle = replace(load_vehicle("paper-reference"), tyre=load_tyre(TYRE))
+    vehicle = replace(load("vehicle", "paper-reference"), tyre=load("tyre", TYRE))
     clip = make_clip(STOP, vehicle, "coupled", duration_s=1.0)
     curve = find_curve(clip.facts, clip.constants)
     tyre = compute_surface_response(vehicle, "rain", clip.facts["surface_friction"]).tyre
     assert isinstance(tyre, MagicFormulaTyre)
     assert curve.target_slip == pytest.approx(tyre.target_slip, abs=1e-12)
-    for slip, load in ((0.01, 2000.0), (0.05, 8000.0), (0.9, 40000.0)):
-        expected = compute_magic_formula_friction(slip, load, tyre)
-        assert curve.friction(np.array(slip), np.array(load)) == pytest.approx(expected, abs=1e-12)
+    for slip, wheel_load in ((0.01, 2000.0), (0.05, 8000.0), (0.9, 40000.0)):
+        expected = compute_magic_formula_friction(slip, wheel_load, tyre)
+        assert curve.friction(np.array(slip), np.array(wheel_load)) == pytest.approx(expected, abs=1e-12)
 
 
 def test_a_break_is_found_at_the_tick_where_it_is(braked_clips: dict[str, StudyClip]) -> None:

@@ -4,13 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import load
 from tasks.campaign.campaign import Run, Tolerances
 from tasks.identification.inference.forward import RunModel, predict_channels, prepare_run
 
-VEHICLE = load_vehicle("paper-reference")
-SURFACE = load_surface("dense-asphalt")
+VEHICLE = load("vehicle", "paper-reference")
+SURFACE = load("surface", "dense-asphalt")
 NOISE = np.array([0.03, 0.05, 0.1, 0.1, 0.015, 0.1, 0.1])
 TOLERANCES = Tolerances(
     session=(0.02, 0.01, 0.02, 0.005, 0.04, 0.02, 0.0015),

@@ -10,9 +10,7 @@ import pytest
 from scipy.stats import binom
 
 from catalogs.effects.truths import load_sizes, load_truths
-from catalogs.studies.closing import load_closing_study
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import load
 from flows.measured import closing_benchmark
 from flows.measured.closing_benchmark_summary import pair_outcome, summarise_benchmark
 from manifests.provenance import source_hashes
@@ -25,7 +23,7 @@ from tasks.identification.benchmark import (
 )
 
 ROOT = Path(closing_benchmark.__file__).parents[2]
-VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
+VEHICLE, SURFACE = load("vehicle", "paper-reference"), load("surface", "dense-asphalt")
 
 
 def test_the_same_seed_gives_the_same_campaign_and_another_does_not() -> None:
@@ -162,7 +160,7 @@ def test_a_form_counts_by_its_port_and_variable_and_a_set_by_the_truth_in_it(
 
 def test_every_truth_is_in_two_pairs_and_no_pair_comes_twice() -> None:
     library = tuple(truth for truth in load_truths() if truth.in_library)
-    pairs = [frozenset(truth.name for truth in pair) for pair in load_closing_study().pairs(library)]
+    pairs = [frozenset(truth.name for truth in pair) for pair in load("closing study").pairs(library)]
     assert len(set(pairs)) == len(pairs) == len(library)
     assert {name: sum(name in pair for pair in pairs) for name in set().union(*pairs)} == {
         truth.name: 2 for truth in library

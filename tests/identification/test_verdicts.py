@@ -10,8 +10,7 @@ import pytest
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from catalogs.effects.truths import load_truths
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import load
 from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
 from tasks.campaign.planned_runs import RICH, RunPlan, make_planned_run, plan_experiments
 from tasks.identification.benchmark import TOLERANCES, make_synthetic_campaign
@@ -23,7 +22,7 @@ from tasks.vehicle.effects.forms import Form
 from tasks.vehicle.effects.table import build_parameter_vector
 from tasks.vehicle.parameters import Vehicle
 
-VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
+VEHICLE, SURFACE = load("vehicle", "paper-reference"), load("surface", "dense-asphalt")
 FEW = (
     "aerodynamic_drag", "brake_lag", "pad_drag", "retuned_pressure_gain", "rolling_resistance", "sensor_gravity_leak",
 )  # fmt: skip
@@ -240,6 +239,6 @@ class TestACarThatIsGrown:
 
     @pytest.mark.minutes
     def test_a_calibrated_vehicle_is_judged_with_all_that_calibration_gave_it(self) -> None:
-        grown = load_vehicle("multibody-grown")
+        grown = load("vehicle", "multibody-grown")
         assert {"stick_ratio", "enveloping_length", "scrub_stiffness"} <= set(grown.effects)
         assert names(judged({"lag": 0.08}, vehicle=grown, driven=grown)) == ["brake_lag"]

@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from catalogs.entries import CATALOGUE, entry_names
-from catalogs.vehicles import vehicle_numbers
+from catalogs.vehicles import open_vehicle
 from reference_pages import catalogues
 from reference_pages.markdown import format_cell, format_table, format_value
 
@@ -38,7 +38,7 @@ def test_vehicles_stand_side_by_side_to_the_last_digit_the_papers_first() -> Non
     assert names[0] == "paper-reference" and set(names) == set(entry_names("vehicle"))
     rows = {row[0].strip("`"): row[2:] for row in rows_of(table)}
     for column, name in enumerate(names):
-        for number, entry in vehicle_numbers(name).items():
+        for number, entry in open_vehicle(name).numbers.items():
             assert float(rows[number][column]) == entry.value, f"{name} {number}"
 
 

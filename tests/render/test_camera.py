@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from catalogs.cameras import load_camera
+from catalogs.entries import load
 from tasks.render.camera import body_poses, world_to_camera
 from tasks.scene.route import route_from_positions
 
 ROUTE = route_from_positions(np.stack([np.arange(100.0), np.zeros(100), np.zeros(100)], axis=1))
-CAMERA = load_camera("dashcam-480x320")
+CAMERA = load("camera", "dashcam-480x320")
 CG = {"cg_behind_front_axle": 1.2, "cg_height": 0.55}
 
 

@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 import yaml
 
-from catalogs.cameras import load_camera
-from catalogs.entries import find_entry
+from catalogs.entries import find_entry, load
 from tasks.errors import InputError
 from tasks.eval.poses.undistort import undistort_frames as seen_by_pinhole
 from tasks.render.lens import Lens, distort_rays, pixel_directions, undistort_points
@@ -44,17 +43,17 @@ def test_a_polynomial_that_turns_back_inside_the_picture_is_refused(tmp_path):
     entry["k1"] = {"value": -0.9, "unit": "1", "source": "none"}
     (tmp_path / "bent.yaml").write_text(yaml.safe_dump(entry))
     with pytest.raises(InputError, match="must spread the whole picture"):
-        load_camera(tmp_path / "bent.yaml")
+        load("camera", tmp_path / "bent.yaml")
 
 
 def test_only_the_camera_that_asks_for_it_has_lens_and_shutter():
     for name in ("dashcam-480x320", "dashcam-480x320-noisy", "dashcam-1280x720"):
-        assert load_camera(name).plain
-    rolling = load_camera("dashcam-480x320-rolling")
+        assert load("camera", name).plain
+    rolling = load("camera", "dashcam-480x320-rolling")
     assert rolling.lens == Lens(k1=-0.3691481, k2=0.1968681, p1=1.353473e-3, p2=5.677587e-4, k3=-0.06770705)
     # 45 full frames a second
     assert rolling.line_delay_s * rolling.height == pytest.approx(1 / 45, rel=1e-3)
-    assert rolling.motion_blur and rolling.exposure_s == load_camera("dashcam-480x320").exposure_s
+    assert rolling.motion_blur and rolling.exposure_s == load("camera", "dashcam-480x320").exposure_s
 
 
 def test_the_judges_take_the_lens_out_again():

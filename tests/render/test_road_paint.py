@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catalogs.hazard_markings import load_marking
+from catalogs.entries import load
 from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.errors import InputError
 from tasks.render.road_paint import paint_feature
@@ -14,7 +14,7 @@ from tests.render.test_road_edit import relief_of
 from tests.render.weather.scenes import ASPHALT, road
 
 HAZARD = RoadHazard(center_m=8.1, length_m=2.0, height_m=0.1)
-MARKING = load_marking("zebra-yellow-black")
+MARKING = load("hazard marking", "zebra-yellow-black")
 
 
 def read_colours(cloud):
@@ -65,4 +65,4 @@ def test_paint_in_the_shade_is_as_much_darker_as_the_road_there():
 
 def test_a_marking_that_is_not_there_lists_those_that_are():
     with pytest.raises(InputError, match="zebra-yellow-black"):
-        load_marking("dragons-teeth")
+        load("hazard marking", "dragons-teeth")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from catalogs.cameras import load_camera
+from catalogs.entries import load
 from tasks.render.sensor import Sensor, apply_sensor
 
 GREY = np.full((200, 300, 3), 0.25, np.float32)
@@ -11,7 +11,7 @@ GREY = np.full((200, 300, 3), 0.25, np.float32)
 
 def test_a_plain_sensor_leaves_the_picture_alone():
     assert apply_sensor(GREY, Sensor(), 1, 0) is GREY
-    assert load_camera("dashcam-480x320").sensor == Sensor()
+    assert load("camera", "dashcam-480x320").sensor == Sensor()
 
 
 def test_a_step_of_exposure_doubles_the_light():
@@ -42,6 +42,6 @@ def test_light_beyond_the_well_is_cut_off():
 
 
 def test_the_noisy_camera_of_the_catalogue_differs_in_its_sensor_only():
-    plain, noisy = load_camera("dashcam-480x320"), load_camera("dashcam-480x320-noisy")
+    plain, noisy = load("camera", "dashcam-480x320"), load("camera", "dashcam-480x320-noisy")
     assert noisy.sensor == Sensor(full_well=10_000, read_noise=5)
     assert np.array_equal(plain.K, noisy.K) and np.array_equal(plain.T_rig_camera, noisy.T_rig_camera)

@@ -5,10 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catalogs.buses import load_bus
-from catalogs.protocols import load_protocol
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import load
 from tasks.campaign.events import Event, RecordedRun
 from tasks.campaign.selection import select_events
 from tasks.studies.brake_dive import (
@@ -22,7 +19,11 @@ from tasks.studies.brake_dive import (
 from tasks.studies.bus_drive import drive_motion
 from tasks.studies.leave_one_out import leave_one_drive_out, macro_mean, score_of
 
-VEHICLE, SURFACE, BUS = load_vehicle("paper-reference"), load_surface("dense-asphalt"), load_bus("a2d2-like")
+VEHICLE, SURFACE, BUS = (
+    load("vehicle", "paper-reference"),
+    load("surface", "dense-asphalt"),
+    load("bus", "a2d2-like"),
+)
 STRAIGHT = replace(
     BUS, style=replace(BUS.style, curve_share=0.0, rough_share=0.0, dragging_share=0.0, lift_share=0.0, slope=0.0,
                        start_speed=(8.0, 15.0), peak_pressure=(0.4, 1.6))
@@ -36,7 +37,7 @@ def events() -> tuple[Event, ...]:
         motion = drive_motion(VEHICLE, 0.82, STRAIGHT, events=4, seed=1, drive=number)
         columns = {name: values[::10] for name, values in motion.items()}
         drives.append(RecordedRun(name=f"d{number}", drive=f"d{number}", interval=0.01, columns=columns))
-    retained = select_events(drives, load_protocol("brake-dive")).retained
+    retained = select_events(drives, load("protocol", "brake-dive")).retained
     assert len(retained) >= 6
     return retained
 

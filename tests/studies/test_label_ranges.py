@@ -5,10 +5,8 @@ from math import isnan
 import numpy as np
 import pytest
 
+from catalogs.entries import load
 from catalogs.scenario import Scenario
-from catalogs.studies import load_sensitivity_study
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle
 from flows.making.driving import controls_of, hazard_of, ranges_of, weather_of
 from tasks.studies.label_ranges import DRIVEN_PERCENTILES, label_ranges, sampled_friction
 from tasks.surface.state import SurfaceState
@@ -21,7 +19,7 @@ STOP = {"initial_speed_km_h": 60.0, "peak_pressure_mpa": 2.3, "brake_onset_s": 0
 
 @pytest.fixture(scope="module")
 def entries():
-    return load_vehicle("paper-reference"), load_surface("dense-asphalt"), load_sensitivity_study()[0]
+    return load("vehicle", "paper-reference"), load("surface", "dense-asphalt"), load("sensitivity study")[0]
 
 
 def ranges(scenario: Scenario, entries, duration_s: float = 8.0) -> dict[str, float]:

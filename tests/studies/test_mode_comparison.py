@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.vehicle_modes import HEADER, compute_differences, format_table
-from catalogs.low_speed import load_low_speed
+from catalogs.entries import load
 from tasks.studies.mode_comparison import mode_difference
 from tests.vehicle.conftest import command
 
@@ -55,7 +55,7 @@ def test_the_documented_dive_of_slow_stops_is_the_computed_one(drive):
     speeds, times, paper, coupled = (numbers(lines[start + i])[1] for i in (0, 2, 3, 4))
     for speed, time, *peaks in zip(speeds, times, paper, coupled, strict=True):
         rides = [
-            drive(speed_km_h=speed, mode=mode, duration=4.0, steady=load_low_speed())
+            drive(speed_km_h=speed, mode=mode, duration=4.0, steady=load("low-speed rule"))
             for mode in ("paper", "coupled")
         ]
         assert rides[0].stop_time - 1 == pytest.approx(time, abs=0.006)

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from catalogs.bump_studies import load_bump_study
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import load
 from tasks.studies.brake_dive import pitch_mode
 from tasks.studies.road_bump import (
     Passage,
@@ -18,7 +17,7 @@ from tasks.studies.sensor_agreement import measure_sensor_agreement
 from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
 from tasks.vehicle.parameters import Vehicle
 
-VEHICLE = load_vehicle("paper-reference")
+VEHICLE = load("vehicle", "paper-reference")
 INTERVAL = 0.01
 HUMP = RoadHazard(center_m=6.0, length_m=3.7, height_m=0.05)
 
@@ -113,4 +112,4 @@ def test_angle_and_rate_of_one_motion_agree_and_a_scale_is_seen() -> None:
 
 
 def test_the_study_that_ships_can_be_read() -> None:
-    assert [window.name for window in load_bump_study("comma2k19").windows][-1] == "rough patch"
+    assert [window.name for window in load("bump study", "comma2k19").windows][-1] == "rough patch"

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catalogs.studies import load_sensitivity_study
-from catalogs.surfaces import load_surface
+from catalogs.entries import load
 from tasks.studies.sensitivity import PrintedFigure, beside_print, latin_hypercube, sensitivity_study
 
 ARCHIVE_SCATTER_M = 0.00137
@@ -15,13 +14,13 @@ ARCHIVE_SCATTER_M = 0.00137
 
 @pytest.fixture(scope="module")
 def study(vehicle):
-    protocol, _ = load_sensitivity_study()
-    return sensitivity_study(vehicle, load_surface("dense-asphalt"), protocol)
+    protocol, _ = load("sensitivity study")
+    return sensitivity_study(vehicle, load("surface", "dense-asphalt"), protocol)
 
 
 def test_all_printed_figures_are_met_to_their_digits(study):
     """An Euler step that scatters by a millimetre may tip a last digit on a processor with another ``exp``."""
-    rows = beside_print(study, load_sensitivity_study()[1])
+    rows = beside_print(study, load("sensitivity study")[1])
     assert len(rows) == 17 and sum(row["unit"] == "m" for row in rows) == 7
     for row in rows:
         scatter = ARCHIVE_SCATTER_M if row["unit"] == "m" else 0.001
@@ -56,7 +55,7 @@ def test_each_stratum_of_the_hypercube_is_drawn_once():
 
 def test_the_published_coast_drag_would_miss_the_printed_distances(vehicle):
     """Why the study's drag is 0: with the table's 0.004 m/s2 Rain-50 stops 6 cm short."""
-    protocol, printed = load_sensitivity_study()
+    protocol, printed = load("sensitivity study")
     short = replace(
         protocol,
         coast_deceleration=0.004,
@@ -66,7 +65,7 @@ def test_the_published_coast_drag_would_miss_the_printed_distances(vehicle):
             "snow": replace(protocol.weathers["snow"], sampled_rates=4, nominal_rates=4),
         },
     )
-    result = sensitivity_study(vehicle, load_surface("dense-asphalt"), short)
+    result = sensitivity_study(vehicle, load("surface", "dense-asphalt"), short)
     rows = {row["figure"]: row for row in beside_print(result, printed[:1])}
     assert not rows["rain50_stop_m.nominal"]["agrees"]
 

@@ -5,9 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catalogs.stop_studies import load_stop_study
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import load
 from tasks.campaign.campaign import CHANNELS
 from tasks.campaign.events import RecordedRun
 from tasks.identification.inference.forward import predict_channels
@@ -17,7 +15,7 @@ from tasks.studies.stop_study import Rung, _model, compute_uncalibrated_errors, 
 from tasks.studies.stop_swing import Swing, fit_swing, swing_acceleration, with_swing
 from tasks.vehicle.effects.table import build_parameter_vector
 
-VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
+VEHICLE, SURFACE = load("vehicle", "paper-reference"), load("surface", "dense-asphalt")
 INTERVAL = 0.01
 TRUTH = {"pressure_gain": 0.2, "lag": 0.08, "wheel_radius": -0.02, "wheel_speed_delay": 0.06}
 
@@ -191,5 +189,5 @@ def test_the_rebound_is_measured_about_the_pitch_at_rest() -> None:
 
 
 def test_every_study_that_ships_can_be_read() -> None:
-    study = load_stop_study("bmw-m8")
+    study = load("stop study", "bmw-m8")
     assert study.train != study.held_out and len(study.ladder) == 6

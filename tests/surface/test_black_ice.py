@@ -3,12 +3,8 @@
 import numpy as np
 import pytest
 
-from catalogs.entries import entry_names
-from catalogs.grids import load_grid
+from catalogs.entries import entry_names, load
 from catalogs.scenario import Scenario, find_scenario_problems
-from catalogs.studies import load_sensitivity_study
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle
 from flows.making.plan import make_plan
 from manifests.canonical import sha256_of
 from manifests.frozen_run import parameters_that_matter
@@ -20,7 +16,7 @@ from tasks.vehicle.brake import BrakeCommand
 from tasks.vehicle.parameters import compute_surface_response
 from tasks.vehicle.rollout import MODES, Controls, simulate_scenario
 
-ASPHALT = load_surface("dense-asphalt")
+ASPHALT = load("surface", "dense-asphalt")
 ICE = surface_state(Weather(kind="ice"), ASPHALT)
 SPEED = 30 / 3.6
 STOP = Controls(
@@ -43,13 +39,13 @@ def test_its_friction_and_the_range_of_its_labels_are_those_of_the_literature():
     """Wet black ice 0.05 to 0.10, black ice from 0.15 on (Wallman & Astrom 2001, VTI meddelande 911A, p. 36)."""
     low, high = ASPHALT.bounds["ice_friction"]
     assert (low, ICE.friction, high) == (0.05, 0.10, 0.15)
-    drawn = sampled_friction(Weather(kind="ice"), ASPHALT, load_sensitivity_study()[0])
+    drawn = sampled_friction(Weather(kind="ice"), ASPHALT, load("sensitivity study")[0])
     assert low <= drawn.min() < 0.052 and 0.148 < drawn.max() <= high
 
 
 def test_the_tyre_on_ice_is_burckhardts_with_a_top():
     """c1 and c2 of Burckhardt 1993; c3 moves the top from infinity to 3.1 % slip and takes 2 % off a locked wheel."""
-    vehicle = load_vehicle("paper-reference")
+    vehicle = load("vehicle", "paper-reference")
     c1, c2, c3 = vehicle.find_tyre_family("ice").burckhardt
     assert (c1, c2) == (0.05, 306.39)
     tyre = compute_surface_response(vehicle, "ice", ICE.friction).tyre
@@ -65,7 +61,7 @@ def test_the_tyre_on_ice_is_burckhardts_with_a_top():
 @pytest.mark.parametrize("name", entry_names("vehicle"))
 def test_every_car_takes_several_times_the_way_on_ice_with_its_abs_at_work(name, mode):
     dry = SurfaceState(kind="dry", friction=0.82)
-    vehicle = load_vehicle(name)
+    vehicle = load("vehicle", name)
     on_ice, on_dry = (
         simulate_scenario(vehicle, surface, STOP, FLAT_ROAD, mode=mode, duration_s=16.0)
         for surface in (ICE, dry)
@@ -80,7 +76,7 @@ def test_every_car_takes_several_times_the_way_on_ice_with_its_abs_at_work(name,
 
 
 def test_a_grid_with_ice_freezes_the_entry_of_ice_and_tags_it_as_not_calibrated():
-    grid = load_grid("ice")
+    grid = load("grid", "ice")
     assert {tag for (_, scenario), (_, tag) in zip(grid.scenarios, grid.tags, strict=True)
             if scenario.weather == "ice"} == {"beyond-calibration"}  # fmt: skip
     plan, inputs = make_plan("ice", "cpu")

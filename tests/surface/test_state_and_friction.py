@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from catalogs.surfaces import load_surface
+from catalogs.entries import load
 from tasks.surface.state import SurfaceParameters, SurfaceState
 from tasks.surface.weather import Weather, surface_state
 
-ASPHALT = load_surface("dense-asphalt")
+ASPHALT = load("surface", "dense-asphalt")
 
 
 def of(weather: Weather, parameters: SurfaceParameters = ASPHALT) -> tuple[SurfaceState, float]:

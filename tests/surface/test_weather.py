@@ -4,10 +4,9 @@ from dataclasses import fields, replace
 
 import pytest
 
-from catalogs.physical_limits import PhysicalLimits, load_physical_limits
+from catalogs.entries import load
+from catalogs.physical_limits import PhysicalLimits
 from catalogs.scenario import Scenario, find_scenario_problems
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle
 from flows.making.driving import weather_of
 from tasks.campaign.planned_runs import RunPlan, make_planned_run
 from tasks.errors import InputError
@@ -15,7 +14,7 @@ from tasks.eval.physics.constants import SURFACE_FORMS, derive_surface
 from tasks.surface.state import SurfaceParameters, SurfaceState
 from tasks.surface.weather import DRY, WEATHERS, Weather, find_weather, list_by_code, surface_state
 
-ASPHALT = load_surface("dense-asphalt")
+ASPHALT = load("surface", "dense-asphalt")
 
 
 def sound(kind: str) -> Scenario:
@@ -30,7 +29,7 @@ def sound(kind: str) -> Scenario:
 
 @pytest.mark.parametrize("kind", WEATHERS)
 def test_a_row_says_what_its_scenarios_give(kind):
-    row, limits = WEATHERS[kind], load_physical_limits()
+    row, limits = WEATHERS[kind], load("table of physical limits")
     assert row.name == kind and find_scenario_problems(sound(kind)) == []
     wrong = Scenario(
         weather=kind,
@@ -90,7 +89,7 @@ def test_a_kind_may_grip_as_another_does_and_leave_codes_free(monkeypatch):
     """Without a tyre family of its own; an FMU refuses the codes that no kind has."""
     gravel = replace(WEATHERS["dry"], name="gravel", code=7, grips_as="dry")
     monkeypatch.setitem(WEATHERS, "gravel", gravel)
-    vehicle = load_vehicle("paper-reference")
+    vehicle = load("vehicle", "paper-reference")
     assert vehicle.find_tyre_family("gravel") is vehicle.find_tyre_family("dry")
     assert vehicle.find_weathers() == ["dry", "rain", "snow", "ice", "gravel"]
     assert list_by_code() == ("dry", "rain", "snow", "ice", "", "", "gravel")

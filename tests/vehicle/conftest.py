@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import load
 from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.brake import BrakeCommand
@@ -18,7 +18,7 @@ Drive = Callable[..., Rollout]
 
 @pytest.fixture(scope="session")
 def vehicle() -> Vehicle:
-    return load_vehicle("paper-reference")
+    return load("vehicle", "paper-reference")
 
 
 def command(peak: float = 2.3, *, onset: float | None = 1.0, **changes: float | None) -> BrakeCommand:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from catalogs.physical_limits import load_physical_limits
+from catalogs.entries import load
 from catalogs.scenario import Scenario, find_scenario_problems
 from tasks.surface.road_profile import RoadHazard
 from tasks.vehicle.rollout import MODES
@@ -16,7 +16,7 @@ HARDEST_G = 3.0
 
 def draw_allowed(vehicle, count: int) -> list[tuple[RoadHazard, float]]:
     """Features and speeds [m/s] over the whole allowed range, half of them on its edges."""
-    draw, limits = np.random.default_rng(20261127), load_physical_limits()
+    draw, limits = np.random.default_rng(20261127), load("table of physical limits")
     found: list[tuple[RoadHazard, float]] = []
     while len(found) < count:
         length, speed = 10 ** draw.uniform(-1, 1.5), 10 ** draw.uniform(0.3, 2.1)

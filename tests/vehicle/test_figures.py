@@ -6,8 +6,7 @@ from math import isnan, pi
 import numpy as np
 import pytest
 
-from catalogs.entries import entry_names
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import entry_names, load
 from tasks.vehicle.figures import FIGURES, compute_figures
 
 
@@ -35,7 +34,7 @@ def half_car_modes(v):
 
 @pytest.mark.parametrize("name", entry_names("vehicle"))
 def test_frequencies_and_damping_are_close_to_those_of_the_whole_half_car(name):
-    vehicle = load_vehicle(name)
+    vehicle = load("vehicle", name)
     found, (frequencies, ratios) = compute_figures(vehicle), half_car_modes(vehicle)
     body = sorted(
         (found[f"{motion}_frequency"], found[f"{motion}_damping_ratio"]) for motion in ("heave", "pitch")
@@ -46,7 +45,7 @@ def test_frequencies_and_damping_are_close_to_those_of_the_whole_half_car(name):
 
 
 def test_the_papers_car_has_these_figures():
-    assert compute_figures(load_vehicle("paper-reference")) == pytest.approx(
+    assert compute_figures(load("vehicle", "paper-reference")) == pytest.approx(
         {
             "mass": 1308, "unsprung_share": 108 / 1308, "wheelbase": 2.7, "static_front_load": 7069.74,
             "static_rear_load": 5761.74, "static_front_share": 0.5509684, "cg_height_over_wheelbase": 0.55 / 2.7,
@@ -61,7 +60,7 @@ def test_the_papers_car_has_these_figures():
 
 
 def test_a_figure_beyond_what_floats_hold_is_nan():
-    tiny = replace(load_vehicle("paper-reference"), sprung_mass=1e-300, cg_to_front_axle=1e-300)
+    tiny = replace(load("vehicle", "paper-reference"), sprung_mass=1e-300, cg_to_front_axle=1e-300)
     huge = replace(tiny, cg_to_front_axle=1e300)
     assert isnan(compute_figures(tiny)["dynamic_index"]) and isnan(compute_figures(huge)["pitch_frequency"])
     assert compute_figures(tiny).keys() == FIGURES.keys()

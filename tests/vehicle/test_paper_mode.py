@@ -6,8 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from catalogs.low_speed import load_low_speed
-from catalogs.surfaces import load_surface
+from catalogs.entries import load
 from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
 from tasks.surface.weather import Weather, surface_state
 from tasks.vehicle import reference
@@ -28,7 +27,7 @@ def stop_of(vehicle, family, friction, *, speed_km_h=60.0, step=5e-4):
 
 
 def friction_of(kind, rate):
-    surface = load_surface("dense-asphalt")
+    surface = load("surface", "dense-asphalt")
     weather = Weather(kind=kind, precipitation_mm_h=rate, snow_accumulation_h=1.0)
     return surface_state(weather, surface).friction
 
@@ -163,7 +162,7 @@ def test_passes_go_on_until_the_station_settles(vehicle, monkeypatch):
 
     def change(*drive):
         return run_paper_mode(
-            vehicle, response, *drive, StepGrid(steps=8230, step=5e-4), load_low_speed()
+            vehicle, response, *drive, StepGrid(steps=8230, step=5e-4), load("low-speed rule")
         ).last_change
 
     assert change(10.6 / 3.6, False, brake, hump) < SETTLED

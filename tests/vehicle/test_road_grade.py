@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from catalogs.low_speed import load_low_speed
+from catalogs.entries import load
 from tasks.errors import InputError
 from tasks.surface.road_profile import FLAT_ROAD, RoadGrade
 from tasks.surface.state import SurfaceState
@@ -24,7 +24,14 @@ def drive(
     """Hold 60 km/h for a second on a dry road, then brake."""
     controls = Controls(initial_speed=60 / 3.6, brake=command(peak), hold_speed_until_brake=hold)
     return simulate_scenario(
-        car, DRY, controls, FLAT_ROAD, mode=mode, duration_s=duration, steady=load_low_speed(), grade=grade
+        car,
+        DRY,
+        controls,
+        FLAT_ROAD,
+        mode=mode,
+        duration_s=duration,
+        steady=load("low-speed rule"),
+        grade=grade,
     )
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import load
 from tasks.errors import InputError
 from tasks.surface.road_profile import RoadGrade, RoadHazard
 from tasks.vehicle.brake import compute_brake_pressure
@@ -51,7 +51,7 @@ def test_a_command_and_its_pressure_at_the_samples_drive_alike(run):
 
 def test_a_stop_far_beyond_the_grip_under_noisy_pressure_hangs_neither_on_the_step_nor_on_rounding():
     """The anti-lock band of this car is 2 % of slip wide; within 2 ms its brakes swing the wheel by more."""
-    car, noise = load_vehicle("bmw-m8"), np.random.default_rng(3).normal(size=170)
+    car, noise = load("vehicle", "bmw-m8"), np.random.default_rng(3).normal(size=170)
     pressure = np.clip((np.arange(170) - 10) / 90, 0, 1) * 12 * (1 + 0.1 * noise)
 
     def wheel_speed(substeps: int, friction: float = 0.82):

@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catalogs.low_speed import load_low_speed
+from catalogs.entries import load
 from catalogs.scenario import Scenario
 from catalogs.studies import load_conditions
-from catalogs.surfaces import load_surface
 from flows.making.driving import controls_of, hazard_of, weather_of
 from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
 from tasks.surface.state import SurfaceState
@@ -21,7 +20,7 @@ from tasks.vehicle.parameters import Vehicle, compute_surface_response
 from tasks.vehicle.rollout import Controls, Rollout, simulate_scenario
 from tests.vehicle.conftest import command
 
-STEADY = load_low_speed()
+STEADY = load("low-speed rule")
 SURFACES = (("dry", 0.82), ("rain", 0.5), ("snow", 0.51), ("snow", 0.42), ("snow", 0.24))
 BRAKED = [one.scenario for one in load_conditions() if one.scenario.peak_pressure_mpa]
 """The conditions of Appendix C that brake."""
@@ -69,7 +68,7 @@ def drive_condition(
 ) -> Rollout:
     """Drive with so much more friction and initial speed [m/s]."""
     controls = controls_of(scenario)
-    surface = surface_state(weather_of(scenario), load_surface("dense-asphalt"))
+    surface = surface_state(weather_of(scenario), load("surface", "dense-asphalt"))
     return simulate_scenario(
         vehicle, replace(surface, friction=surface.friction + more[0]),
         replace(controls, initial_speed=controls.initial_speed + more[1]), hazard_of(scenario), mode="paper",

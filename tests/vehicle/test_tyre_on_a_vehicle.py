@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catalogs.surfaces import load_surface
-from catalogs.tyres import load_tyre
+from catalogs.entries import load
 from manifests.provenance import SOURCE_ROOT
 from tasks.identification.inference.forward import predict_channels, prepare_run
 from tasks.vehicle.effects.table import PARAMETER_INDEX
@@ -24,7 +23,7 @@ SURFACES = [("dry", 0.82), ("rain", 0.347126), ("rain", 0.5), ("snow", 0.24), ("
 @pytest.fixture(scope="module")
 def car(vehicle):
     """The reference vehicle on the book's tyres."""
-    return replace(vehicle, tyre=load_tyre("pacejka-205-60r15"))
+    return replace(vehicle, tyre=load("tyre", "pacejka-205-60r15"))
 
 
 @pytest.mark.parametrize(("family", "friction"), SURFACES)
@@ -68,7 +67,7 @@ def test_the_force_of_each_tick_is_the_curves_at_its_slip_and_load(drive, car):
 def test_an_effect_is_found_in_a_car_on_the_magic_formula(car):
     """The one model serves identification too: three Newton steps find a tyre that grips 4 % less than its surface."""
     run = replace(plain_run(20.0, 2.3), weather="rain", precipitation_mm_h=50.0)
-    model = prepare_run(run, car, load_surface("dense-asphalt"))
+    model = prepare_run(run, car, load("surface", "dense-asphalt"))
     unit = np.zeros(len(PARAMETER_INDEX))
     unit[PARAMETER_INDEX["friction"]] = 1.0
     measured, found = predict_channels(model, -0.04 * unit), 0.0

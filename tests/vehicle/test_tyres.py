@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from catalogs.tyres import load_tyre
+from catalogs.entries import load
 from tasks.vehicle.tyres.contract import compute_tyre_friction, compute_tyre_slope
 from tasks.vehicle.tyres.magic_formula import (
     compute_lateral_friction,
@@ -24,7 +24,7 @@ LOAD = 4000.0
 
 @pytest.fixture(scope="module")
 def book():
-    return load_tyre("pacejka-205-60r15")
+    return load("tyre", "pacejka-205-60r15")
 
 
 def coefficients(name: str) -> dict[str, float]:
@@ -77,7 +77,7 @@ def test_mf61_agrees_with_mfeval_in_combined_slip_camber_and_pressure(
 )  # fmt: skip
 def test_mf52_agrees_with_mfeval_under_camber_and_a_scaled_nominal_load(load, slip, angle, camber, fx, fy):
     """MFeval.jl, useMode 221, by the fixtures of github.com/robertscholz22/autonomousim (commit a14080a)."""
-    tyre = load_tyre(FILES / "mf52-chrono-sedan.tir")
+    tyre = load("tyre", FILES / "mf52-chrono-sedan.tir")
     np.testing.assert_allclose(compute_tyre_forces(slip, angle, camber, load, tyre), (fx, fy), rtol=1e-8)
 
 

@@ -8,9 +8,9 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from catalogs.entries import entry_folder, entry_names, find_entry
-from catalogs.tyres import LARGEST_TIR, load_tyre, parse_tyre
-from catalogs.vehicles import load_vehicle
+from catalogs.documents import LARGEST_YAML
+from catalogs.entries import entry_folder, entry_names, find_entry, load
+from catalogs.tyres import parse_tyre
 from flows.making.plan import make_plan
 from manifests.explain import find_input_differences
 from tasks.errors import InputError
@@ -36,16 +36,16 @@ def problems(content: bytes) -> list[str]:
 
 def test_every_tyre_of_the_catalogue_is_read_and_a_wrong_name_lists_them():
     assert "pacejka-205-60r15" in entry_names("tyre")
-    assert all(isinstance(load_tyre(name), MagicFormula) for name in entry_names("tyre"))
+    assert all(isinstance(load("tyre", name), MagicFormula) for name in entry_names("tyre"))
     with pytest.raises(
         InputError, match=r"slick: no such tyre; give a .tir file or one of: .*pacejka-205-60r15"
     ):
-        load_tyre("slick")
+        load("tyre", "slick")
 
 
 def test_coefficients_stand_in_their_places():
     """Table A3.1: PKX1 21.51, PKY1 -14.95, RVY6 -10.71 at 4000 N."""
-    tyre = load_tyre(entry_folder("tyre") / "pacejka-205-60r15.tir")
+    tyre = load("tyre", entry_folder("tyre") / "pacejka-205-60r15.tir")
     assert (tyre.nominal_load, tyre.longitudinal.pkx1, tyre.lateral.pky1) == (4000.0, 21.51, -14.95)
     assert tyre.combined.rvy6 == -10.71 and tyre.lateral.pky4 == 2.0
 
@@ -111,9 +111,9 @@ def test_all_faults_are_told_at_once():
 
 
 def test_a_file_without_bounds_is_not_read(tmp_path):
-    (tmp_path / "big.tir").write_bytes(b"$" * (LARGEST_TIR + 1))
-    with pytest.raises(InputError, match="a tyre must have at most 1048576 bytes"):
-        load_tyre(tmp_path / "big.tir")
+    (tmp_path / "big.tir").write_bytes(b"$" * (LARGEST_YAML + 1))
+    with pytest.raises(InputError, match="a tyre must have at most 8388608 bytes"):
+        load("tyre", tmp_path / "big.tir")
 
 
 @given(st.binary(max_size=200), st.integers(0, len(BOOK)), st.integers(0, 40))
@@ -135,11 +135,11 @@ def own_vehicle(folder: Path, tyre: object) -> Path:
 
 
 def test_a_vehicle_names_its_tyre_in_the_catalogue_or_beside_itself(tmp_path):
-    assert load_vehicle("paper-reference").tyre is None
+    assert load("vehicle", "paper-reference").tyre is None
     path = own_vehicle(tmp_path, "pacejka-205-60r15")
-    assert load_vehicle(path).tyre == load_tyre("pacejka-205-60r15")
+    assert load("vehicle", path).tyre == load("tyre", "pacejka-205-60r15")
     (tmp_path / "pacejka-205-60r15.tir").write_bytes(changed(("PDX1", "PDX1 = 0.9")))
-    assert load_vehicle(path).tyre.longitudinal.pdx1 == 0.9
+    assert load("vehicle", path).tyre.longitudinal.pdx1 == 0.9
 
 
 @pytest.mark.parametrize(
@@ -152,7 +152,7 @@ def test_a_vehicle_names_its_tyre_in_the_catalogue_or_beside_itself(tmp_path):
 )
 def test_a_tyre_that_is_none_is_refused(tmp_path, name, words):
     with pytest.raises(InputError, match=re.escape(words)):
-        load_vehicle(own_vehicle(tmp_path, name))
+        load("vehicle", own_vehicle(tmp_path, name))
 
 
 def test_a_dataset_keeps_the_tyre_beside_its_vehicle_and_names_what_differs(tmp_path):
@@ -164,7 +164,7 @@ def test_a_dataset_keeps_the_tyre_beside_its_vehicle_and_names_what_differs(tmp_
     kept.mkdir()
     for name in ("vehicle.yaml", "mine.tir"):
         (kept / name).write_bytes(inputs[name])
-    assert load_vehicle(kept / "vehicle.yaml").tyre == load_tyre(tmp_path / "mine.tir")
+    assert load("vehicle", kept / "vehicle.yaml").tyre == load("tyre", tmp_path / "mine.tir")
     (tmp_path / "mine.tir").write_bytes(changed(("PDX1", "PDX1 = 0.9")))
     other, others = make_plan("demo", "cpu", car, pictures=False)
     assert {clip.clip_id for clip in plan.clips}.isdisjoint(clip.clip_id for clip in other.clips)

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from catalogs.entries import load
 from catalogs.learned_judges import load_judges
 from catalogs.sentences import cap_problems
-from catalogs.video_protocols import VideoProtocol, load_video_protocol
+from catalogs.video_protocols import VideoProtocol
 from flows.judging.claims import read_claim
 from flows.judging.evaluation_means import average_within_seeds
 from flows.judging.foreign_sources import read_camera
@@ -61,7 +62,7 @@ def judge_video_set(
         For every file that cannot be read, or that no clip of the protocol has; or for another window.
     """
     results = Outputs(out, "judge-set", "judge-set.json", "judge-set.md", MOTION)
-    chosen = load_video_protocol(protocol)
+    chosen = load("video protocol", protocol)
     smoothing = int(chosen.smoothing_window.value) if window is None else window
     known = [width or 0 for width in WINDOWS]
     if smoothing not in known:

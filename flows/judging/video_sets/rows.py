@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from catalogs.gates import load_foreign_gates
+from catalogs.entries import load
 from flows.judging.evaluation_rows import figure_row
 from flows.judging.judged_clip import Row
 from flows.judging.video_sets.compared_motion import (
@@ -76,7 +76,7 @@ def claim_rows(judged: JudgedSet, seen: SetMotion) -> Iterator[Row]:
         return
     try:
         at = sample_claim(claim, seen.times)
-        figures = judge_motion(_cut_motion(seen.motion, at.rows), at, load_foreign_gates())
+        figures = judge_motion(_cut_motion(seen.motion, at.rows), at, load("foreign gate file"))
         note = ""
     except InputError as fault:
         figures, note = dict.fromkeys(JUDGED), str(fault)

@@ -7,8 +7,7 @@ import pytest
 
 from benchmarks.known_truth.coverage import ScalarOutcome, format_coverage
 from benchmarks.known_truth.traces import add_errors, draw_truth, list_development_cases, make_known_cases
-from catalogs.calibration import load_procedure
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import load
 from tasks.identification.calibration.identifiability import DETERMINED, compute_identifiability
 from tasks.identification.calibration.scalars import list_calibration_scalars, read_scalar, set_scalars
 from tasks.identification.calibration.staged import calibrate_vehicle
@@ -18,12 +17,12 @@ LONGITUDINAL = {"coast_deceleration", "efficiency", "slip_stiffness"}
 
 @pytest.fixture(scope="module")
 def start():
-    return load_vehicle("paper-reference")
+    return load("vehicle", "paper-reference")
 
 
 @pytest.fixture(scope="module")
 def longitudinal():
-    procedure, interval = load_procedure("paper-staged")
+    procedure, interval = load("calibration procedure", "paper-staged")
     stages = tuple(stage for stage in procedure.stages if set(stage.groups) <= LONGITUDINAL)
     return replace(procedure, stages=stages), 4 * interval
 
@@ -75,7 +74,7 @@ def test_the_conditions_are_those_of_the_frozen_run():
     assert len(cases) == 19 and sum(case.hazard_height_m == 0 for case in cases) == 9
     knots = {
         (f, mu)
-        for f, table in load_vehicle("paper-reference").families.items()
+        for f, table in load("vehicle", "paper-reference").families.items()
         for mu in table.surface_friction
     }
     assert {(case.weather, case.surface_coefficient) for case in cases} == knots

@@ -7,7 +7,7 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
-from catalogs.channel_maps import load_channel_map
+from catalogs.entries import load
 from catalogs.recordings import read_signals, summarise_signals
 from flows.cli import app
 from flows.measured.importing import import_measurements
@@ -22,7 +22,7 @@ def read(folder: Path, text: bytes, rest: str = "") -> dict[str, list[float]]:
     content = yaml.safe_load(MAP) | yaml.safe_load(WANTED + rest)
     content["not_measured"] = sorted(yaml.safe_load(MAP)["channels"].keys() - {"speed"})
     (folder / "map.yaml").write_text(yaml.safe_dump(content))
-    channel_map, _ = load_channel_map(folder / "map.yaml")
+    channel_map, _ = load("channel map", folder / "map.yaml")
     signals = read_signals(folder / "log.csv", channel_map)
     return {"t": signals["v"].time.tolist(), "v": signals["v"].values.tolist()}
 
@@ -84,7 +84,7 @@ AIM = '"Format","AiM"\n\n"t","v","slope"\n"s","[km/h]","\u00b0"\n\n"0.0","10","1
 def test_a_row_of_units_is_read_where_the_map_tells_of_it(tmp_path: Path, encoding: str) -> None:
     rest = "csv: {skip_rows: 2, units_row: true}\n"
     assert read(tmp_path, AIM.encode(encoding), rest) == {"t": [0.0, 1.0], "v": [10.0, 11.0]}
-    channel_map, _ = load_channel_map(tmp_path / "map.yaml")
+    channel_map, _ = load("channel map", tmp_path / "map.yaml")
     rows = summarise_signals(tmp_path / "log.csv", channel_map)
     assert [(row.signal, row.unit, row.samples) for row in rows] == [
         ("t", "s", 2),

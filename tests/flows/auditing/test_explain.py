@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import load
 from flows.auditing.explain import explain_frame, format_text
 from flows.making.generate import generate_dataset
 from flows.store.layout import Layout
@@ -138,7 +138,7 @@ def test_equation_numbers_are_those_of_the_paper(outside_data):
 def test_the_brake_moment_is_the_papers_with_its_printed_mass_and_height(toy_dataset):
     """Eq. S16 with m_s = 1200 kg and h_cg = 0.55 m (Table frozen_physical_params), gamma of the dry family."""
     steps = {s["symbol"]: s for s in explain_frame(str(toy_dataset.root), "dry/flat", 8)["steps"]}
-    (gamma,) = set(load_vehicle("paper-reference").families["dry"].pitch_scale)
+    (gamma,) = set(load("vehicle", "paper-reference").families["dry"].pitch_scale)
     deceleration = -steps["dv/dt"]["stored"]
     assert deceleration > 4
     assert steps["M_b"]["recomputed"] == pytest.approx(gamma * 1200 * 0.55 * deceleration, rel=1e-12)

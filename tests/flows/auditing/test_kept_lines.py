@@ -2,9 +2,9 @@
 
 import pytest
 
-from catalogs.entries import find_entry
+from catalogs.entries import find_entry, load
 from catalogs.tyres import tyre_entries
-from catalogs.vehicles import load_vehicle, vehicle_provenance
+from catalogs.vehicles import open_vehicle
 from flows.auditing.kept_lines import list_lines, scale_line
 
 
@@ -13,11 +13,13 @@ def test_one_number_of_a_vehicle_changes_and_no_other_and_a_frozen_one_is_sealed
     source = find_entry("vehicle", name)
     content = source.read_bytes()
     (tmp_path / source.name).write_bytes(scale_line("vehicle.yaml", content, ("cg_height",), 1.01))
-    before, after = load_vehicle(name), load_vehicle(tmp_path / source.name)
+    before, after = load("vehicle", name), load("vehicle", tmp_path / source.name)
     assert after.cg_height == pytest.approx(1.01 * before.cg_height)
     changed = [field for field in vars(before) if getattr(before, field) != getattr(after, field)]
     assert changed == ["cg_height"]
-    assert (vehicle_provenance(name) is None) == (vehicle_provenance(tmp_path / source.name) is None)
+    assert (open_vehicle(name).provenance is None) == (
+        open_vehicle(tmp_path / source.name).provenance is None
+    )
 
 
 def test_knots_bounds_and_a_zero_are_changed_too():

@@ -8,7 +8,7 @@ from types import ModuleType
 
 import pytest
 
-from catalogs.cameras import load_camera
+from catalogs.entries import load
 from flows.exporting import export as module
 from flows.exporting.camera import describe_camera
 from flows.exporting.export import export_dataset, import_writer
@@ -121,7 +121,7 @@ def test_the_card_names_run_units_camera_and_clips(export, toy_dataset):
 
 
 def test_a_camera_is_described_with_its_lens_and_its_shutter():
-    told = describe_camera(load_camera("dashcam-480x320-rolling"))
+    told = describe_camera(load("camera", "dashcam-480x320-rolling"))
     assert json.loads(json.dumps(told)) == told
     assert (told["width"], told["height"], told["K"][0]) == (480, 320, [400.0, 0.0, 240.0])
     # KITTI, D_02 of 2011-09-26, in OpenCV's order k1, k2, p1, p2, k3
@@ -130,7 +130,7 @@ def test_a_camera_is_described_with_its_lens_and_its_shutter():
 
 
 def test_card_samples_and_annotations_describe_the_same_camera(export, toy_dataset):
-    told = describe_camera(load_camera(toy_dataset.inputs / "camera.yaml"))
+    told = describe_camera(load("camera", toy_dataset.inputs / "camera.yaml"))
     assert json.loads((export("webdataset") / "musync-export.json").read_text())["camera"] == told
     with tarfile.open(export("webdataset") / "clip-00000.tar") as shard:
         sample = next(name for name in shard.getnames() if name.endswith(".json"))

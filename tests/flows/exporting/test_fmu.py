@@ -9,8 +9,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from catalogs.entries import entry_names
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import entry_names, load
 from flows.exporting.fmu import write_fmu
 from manifests.provenance import SOURCE_ROOT
 from reference_pages.fmu import write_input_table
@@ -53,7 +52,7 @@ def car_file(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def vehicle(car_file):
-    return load_vehicle(car_file)
+    return load("vehicle", car_file)
 
 
 @pytest.fixture(scope="module")
@@ -271,7 +270,7 @@ def test_all_that_is_wrong_with_the_command_is_told_at_once(tmp_path, monkeypatc
 @pytest.mark.parametrize("name", [name for name in entry_names("vehicle") if name != "multibody-staged"])
 def test_every_vehicle_of_the_catalogue_stops_in_every_weather_as_in_its_own_rollout(name, tmp_path):
     write_fmu(name, out=str(tmp_path / "car.fmu"))
-    vehicle = load_vehicle(name)
+    vehicle = load("vehicle", name)
     for number, weather in enumerate(("dry", "rain", "snow", "ice"), 1):
         car = Car(
             tmp_path / "car.fmu", tmp_path / weather, weather=number, road_friction=0.37, brake_pressure=2.0

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import load
 from flows.exporting.fmu_binary import FRAME, find_compiler, find_own_platform, format_header
 from tasks.vehicle.model.embedded_variables import INPUTS
 
@@ -16,7 +16,7 @@ pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compile
 
 def test_the_frame_has_the_functions_of_the_standards_own_headers(tmp_path):
     (tmp_path / "model.h").write_text(
-        format_header(load_vehicle("multibody-grown"), [0.0] * len(INPUTS), "guid")
+        format_header(load("vehicle", "multibody-grown"), [0.0] * len(INPUTS), "guid")
     )
     headers = Path(fmpy.__file__).parent / "c-code"
     words = [

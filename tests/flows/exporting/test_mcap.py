@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from catalogs.cameras import load_camera
+from catalogs.entries import load
 from tasks.conventions import TICK_CHANNELS
 from tests.flows.exporting.conftest import BRAKING, HUMP
 
@@ -55,7 +55,7 @@ def test_transforms_are_the_rig_s_poses_and_pitch_about_y_is_nose_down(read, sto
 
 
 def test_pictures_depth_and_camera_are_those_stored(read, stored, toy_dataset):
-    camera = load_camera(toy_dataset.inputs / "camera.yaml")
+    camera = load("camera", toy_dataset.inputs / "camera.yaml")
     for label, clip in stored.items():
         topics = read[0][label]
         for frame in range(11):

@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from benchmarks.synthetic_street import Clip, drive_clip
-from catalogs.gates import load_foreign_gates
+from catalogs.entries import load
 from flows.judging import foreign_sources
 from flows.judging.claims import read_claim
 from flows.judging.foreign import judge_video, measure_retention
@@ -243,10 +243,10 @@ def test_a_short_wrong_swing_is_not_hidden_by_a_long_quiet_clip() -> None:
     )  # fmt: skip
     for factor, good in ((1.0, True), (0.7, False), (-1.0, False)):
         claim = VideoClaim(time=times, pitch=factor * swing, station=10 * times)
-        verdict = judge_motion(drifting, sample_claim(claim, times), load_foreign_gates())
+        verdict = judge_motion(drifting, sample_claim(claim, times), load("foreign gate file"))
         assert verdict["pitch_judged"] and verdict["passed"] == good
     quiet = VideoClaim(time=times, pitch=nothing, station=10 * times)
-    assert not judge_motion(drifting, sample_claim(quiet, times), load_foreign_gates())["pitch_judged"]
+    assert not judge_motion(drifting, sample_claim(quiet, times), load("foreign gate file"))["pitch_judged"]
 
 
 def test_retention_sees_what_an_editor_kept_and_what_it_lost(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from catalogs.cameras import load_camera
+from catalogs.entries import load
 from flows.judging.claims import read_claim
 from flows.judging.foreign_sources import ForeignCamera, read_camera, scale_intrinsics
 from tasks.errors import InputError
@@ -61,7 +61,7 @@ def test_a_camera_holds_what_a_camera_can_have(tmp_path: Path, content: str, wor
 def test_a_camera_of_the_catalogue_looks_where_its_mount_says(tmp_path: Path) -> None:
     entry = Path("catalogs/cameras/dashcam-480x320.yaml").read_text()
     (tmp_path / "K.yaml").write_text(entry + "pitch_down: {value: 5, unit: deg, source: tilted}\n")
-    ours, theirs = read_camera(tmp_path / "K.yaml"), load_camera(tmp_path / "K.yaml")
+    ours, theirs = read_camera(tmp_path / "K.yaml"), load("camera", tmp_path / "K.yaml")
     np.testing.assert_allclose(ours.mount, theirs.T_rig_camera)
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from catalogs.grids import load_grid
+from catalogs.entries import load
 from flows.making import pictures, replay
 from flows.making.plan import freeze_grid
 from tasks.errors import InputError
@@ -14,7 +14,7 @@ from tests.toy_street import write_toy_grid
 
 
 def planned(**settings):
-    grid = load_grid("demo")
+    grid = load("grid", "demo")
     return freeze_grid(replace(grid, settings=grid.settings.model_copy(update=settings)), "demo", "cpu")[0]
 
 

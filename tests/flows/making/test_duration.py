@@ -5,11 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from catalogs.entries import entry_names
-from catalogs.grids import GridFile, load_grid
-from catalogs.low_speed import load_low_speed
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import entry_names, load
+from catalogs.grids import GridFile
 from flows.auditing.explain import explain_frame
 from flows.judging.physics import audit_physics, clip_columns, clip_facts
 from flows.making.driving import simulate_drive
@@ -90,13 +87,18 @@ def test_a_dataset_without_the_new_labels_is_read_as_before(dataset, tmp_path):
 
 @pytest.mark.parametrize("name", entry_names("grid"))
 def test_every_braking_clip_of_a_grid_that_ships_has_its_stop(name):
-    grid = load_grid(name)
+    grid = load("grid", name)
     settings = grid.settings
-    vehicle, surface = load_vehicle(settings.vehicle), load_surface(settings.surface)
+    vehicle, surface = load("vehicle", settings.vehicle), load("surface", settings.surface)
     for label, scenario in grid.scenarios:
         if scenario.peak_pressure_mpa:
             ride = simulate_drive(
-                scenario, vehicle, surface, settings.vehicle_mode, settings.telemetry_s, load_low_speed()
+                scenario,
+                vehicle,
+                surface,
+                settings.vehicle_mode,
+                settings.telemetry_s,
+                load("low-speed rule"),
             )[1]
             assert np.isfinite([ride.stop_time, ride.stopping_distance]).all(), label
 
@@ -117,7 +119,7 @@ def test_a_length_that_cannot_be_is_refused(duration, rule):
 
 def test_rule_and_length_decide_the_ids_of_clips_and_coupled_mode_has_no_rule(tmp_path):
     path = write_toy_grid(tmp_path, GRID)
-    grid = load_grid(path)
+    grid = load("grid", path)
 
     def id_of(**changes):
         changed = grid.settings.model_copy(update=changes)

@@ -6,8 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 import flows.making.freezing
-from catalogs.entries import find_entry
-from catalogs.grids import load_grid
+from catalogs.entries import find_entry, load
 from catalogs.studies import load_conditions
 from flows.cli import app
 from flows.judging.physics import audit_physics
@@ -52,7 +51,7 @@ def test_the_runs_that_the_paper_and_the_demo_need_ship():
 def test_a_frozen_run_that_ships_is_not_stale(name):
     frozen = read_frozen(name)
     stale = problems_of(frozen)
-    now = keep_rules(load_grid(name), frozen)
+    now = keep_rules(load("grid", name), frozen)
     if frozen["grid"] != frozen_settings(now.settings):
         stale.append(f"catalogs/grids/{name}.yaml is no longer the grid that was frozen")
     assert not stale, (
@@ -64,7 +63,7 @@ def test_the_multibody_grids_are_the_conditions_of_the_appendix():
     """A condition that brakes holds its speed until then (docs of the reference traces)."""
     ours = {}
     for name in ("multibody-development", "multibody-held-out"):
-        ours |= {label: scenario.as_row() for label, scenario in load_grid(name).scenarios}
+        ours |= {label: scenario.as_row() for label, scenario in load("grid", name).scenarios}
     theirs = {
         c.name: c.scenario.as_row() | {"hold_speed": c.scenario.peak_pressure_mpa > 0}
         for c in load_conditions()
@@ -165,7 +164,7 @@ def test_a_grid_of_one_s_own_is_frozen_into_a_file_and_made_again_from_it(tmp_pa
 
 def test_freezing_again_changes_nothing():
     before = read_frozen(SMALL)
-    run = frozen_run(keep_rules(load_grid(SMALL), before))
+    run = frozen_run(keep_rules(load("grid", SMALL), before))
     assert all(before[key] == run[key] for key in ("grid", "parameters", "clips"))
     assert freeze_run(SMALL)["frozen"][0]["changed"] is False
 
@@ -177,7 +176,7 @@ def test_a_record_without_the_rule_means_the_literal_one_and_frames_to_the_end(s
 
 
 def test_a_steady_run_says_so_and_is_made_again_steady(small, tmp_path):
-    run = frozen_run(load_grid(SMALL))
+    run = frozen_run(load("grid", SMALL))
     assert run["grid"]["low_speed"] == "steady"
     assert set(run["parameters"]["low_speed.yaml"]) == {"held_share", "explicit_limit"}
     assert [clip["seed"] for clip in run["clips"]] == [clip["seed"] for clip in small["clips"]]

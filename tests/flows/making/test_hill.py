@@ -7,16 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from catalogs.grids import load_grid
-from catalogs.road_grade import ROAD_GRADE, load_kept_grade
+from catalogs.entries import load
+from catalogs.road_grade import ROAD_GRADE
 from catalogs.scenes import write_scene
 from flows.auditing.audit import audit_dataset
-from flows.auditing.driven_lines import Asked, drive_clip, is_driven, load_entries
+from flows.auditing.driven_lines import Asked, drive_clip, is_driven
 from flows.auditing.explain import explain_frame
 from flows.auditing.kept_lines import list_lines
 from flows.auditing.repair import repair_dataset
 from flows.judging.physics import audit_physics, clip_columns, clip_facts
 from flows.judging.physics_constants import read_constants
+from flows.making.catalogue import Catalogue
 from flows.making.freezing import frozen_run
 from flows.making.generate import generate_dataset
 from flows.making.plan import make_plan, read_plan
@@ -79,7 +80,7 @@ def test_the_stop_is_shorter_uphill_and_its_label_ranges_are_on_the_same_hill(hi
 
 def test_the_grade_stands_in_the_ticks_and_in_the_inputs_of_a_hill_alone(hill, level):
     ticks = clip_of(hill)[0]
-    np.testing.assert_array_equal(ticks["road_grade"], load_kept_grade(hill.inputs).at(ticks["station"]))
+    np.testing.assert_array_equal(ticks["road_grade"], Catalogue(hill.inputs).grade.at(ticks["station"]))
     assert 0.03 < ticks["road_grade"].max() < 0.08
     assert ROAD_GRADE in json.loads(hill.manifest.read_bytes())["inputs"]
     assert ROAD_GRADE not in json.loads(level.manifest.read_bytes())["inputs"]
@@ -97,7 +98,7 @@ def test_without_the_scene_the_motion_follows_from_the_inputs(hill):
     asked = Asked(
         scenario=plan.clips[0].scenario, mode="paper", variant="full", duration_s=plan.duration_s, route=None
     )
-    again = drive_clip(asked, load_entries(hill.inputs, "full"))
+    again = drive_clip(asked, Catalogue(hill.inputs))
     names = [channel.name for channel in TICK_CHANNELS]
     recorded = json.loads(hill.manifest.read_bytes())["clips"][0]["content"]["ticks"]
     assert columns_hash(again.ride.columns, names) == recorded
@@ -110,7 +111,7 @@ def test_without_the_scene_the_motion_follows_from_the_inputs(hill):
 
 
 def test_the_frozen_run_of_a_hill_has_the_telemetry_of_its_dataset(hill):
-    frozen = frozen_run(load_grid(str(hill.root.parent / "grid.yaml")))
+    frozen = frozen_run(load("grid", str(hill.root.parent / "grid.yaml")))
     assert (
         frozen["clips"][0]["ticks"] == json.loads(hill.manifest.read_bytes())["clips"][0]["content"]["ticks"]
     )

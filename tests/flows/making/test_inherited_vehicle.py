@@ -1,6 +1,6 @@
 """A dataset of a vehicle that extends another one keeps all of the car, and its clips are of all of the car."""
 
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import load
 from flows.making.plan import make_plan
 from manifests.explain import find_input_differences
 
@@ -14,7 +14,7 @@ def test_the_copy_in_a_dataset_is_whole_and_a_change_of_the_other_vehicle_change
     kept = tmp_path / "inputs" / "car.yaml"
     kept.parent.mkdir()
     kept.write_bytes(inputs["vehicle.yaml"])
-    assert load_vehicle(kept) == load_vehicle(car)
+    assert load("vehicle", kept) == load("vehicle", car)
     assert not [name for name in inputs if "base" in name]
     base.write_text(text.format(1600))
     other, others = make_plan("demo", "cpu", str(car), pictures=False)

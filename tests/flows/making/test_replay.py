@@ -6,8 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from catalogs.entries import entry_names
-from catalogs.grids import load_grid
+from catalogs.entries import entry_names, load
 from flows.making import replay
 from flows.making.driving import simulate_drive
 from flows.making.pictures import render_frames
@@ -73,6 +72,6 @@ def test_each_scenario_of_a_grid_that_ships_is_held_against_itself_whatever_seed
 
     monkeypatch.setattr(replay, "_run_clip", run)
     camera = SimpleNamespace(camera=SimpleNamespace(sensor=Sensor()))
-    monkeypatch.setattr(replay, "load_catalogue", lambda *given: camera)
+    monkeypatch.setattr(replay, "Catalogue", lambda *given: camera)
     result = replay.replay_audit(name, seeds=3)
-    assert result["problems"] == [] and result["runs"] == 3 * len(load_grid(name).scenarios)
+    assert result["problems"] == [] and result["runs"] == 3 * len(load("grid", name).scenarios)

@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from catalogs.grids import load_grid
+from catalogs.entries import load
 from catalogs.scenes import write_scene
 from flows.making.bends import list_tight_bends
 from flows.making.generate import generate_dataset
+from flows.making.grid_entries import read_entries
 from flows.making.plan import make_plan
 from flows.reading.describe import validate_grid
 from flows.store.sealed import read_manifest
@@ -75,7 +76,8 @@ def test_a_car_that_stands_before_the_bend_is_not_refused(tmp_path):
     stop = "{weather: snow, precipitation_mm_h: 1, snow_accumulation_h: 1, initial_speed_km_h: 45"
     brake = ", peak_pressure_mpa: 2.3, ramp_s: 0.1, brake_onset_s: 0}"
     grid = write_bend(tmp_path, f"brakes: {stop}{brake}", f"coasts: {stop}}}")
-    assert [bend.label for bend in list_tight_bends(load_grid(grid))] == ["coasts"]
+    asked = load("grid", grid)
+    assert [bend.label for bend in list_tight_bends(asked, read_entries(asked.settings))] == ["coasts"]
 
 
 def test_a_grid_without_such_clips_drives_none(tmp_path, monkeypatch):

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from catalogs.cameras import load_camera
+from catalogs.entries import load
 from catalogs.scenes import write_scene
 from flows.making.scenes import render_pose, scene_import
 from tasks.errors import InputError
@@ -15,7 +15,7 @@ from tests.toy_street import toy_street
 @pytest.fixture
 def pose(tmp_path):
     write_scene(toy_street(), tmp_path / "scene", {})
-    view = world_to_camera(load_camera("dashcam-480x320").T_rig_camera)
+    view = world_to_camera(load("camera", "dashcam-480x320").T_rig_camera)
     content = {
         "viewmat": view.tolist(),
         "K": [[80, 0, 48], [0, 80, 32], [0, 0, 1]],

@@ -8,19 +8,17 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from catalogs.grids import FaultyGrid, GridFile, load_grid
-from catalogs.low_speed import load_low_speed
+from catalogs.entries import load
+from catalogs.grids import FaultyGrid, GridFile
 from catalogs.scenes import write_scene
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle
 from flows.auditing.audit import audit_dataset
-from flows.auditing.driven_lines import Asked, drive_clip, is_driven, load_entries, move_lines
+from flows.auditing.driven_lines import Asked, drive_clip, is_driven, move_lines
 from flows.auditing.explain import explain_frame
 from flows.auditing.kept_lines import list_lines
 from flows.auditing.repair import repair_dataset
 from flows.exporting.export import export_dataset
 from flows.judging.physics import audit_physics, clip_columns, clip_facts
-from flows.making.catalogue import catalogue_of
+from flows.making.catalogue import Catalogue, catalogue_of
 from flows.making.driving import simulate_drive
 from flows.making.freezing import frozen_run, problems_of
 from flows.making.generate import generate_dataset
@@ -101,7 +99,12 @@ def test_appearance_only_drives_as_the_dry_car_and_looks_as_the_snow(made):
     scenario = read_plan(layout.root).clips[0].scenario
     dry = replace(scenario, weather="dry", precipitation_mm_h=0.0, snow_accumulation_h=0.0)
     _, ride = simulate_drive(
-        dry, load_vehicle("paper-reference"), load_surface("dense-asphalt"), "paper", 6.0, load_low_speed()
+        dry,
+        load("vehicle", "paper-reference"),
+        load("surface", "dense-asphalt"),
+        "paper",
+        6.0,
+        load("low-speed rule"),
     )
     for name, column in ride.columns.items():
         np.testing.assert_array_equal(ticks_of(layout)[name], column, err_msg=name)
@@ -126,12 +129,12 @@ def test_fixed_mu_stops_alike_at_two_rates_and_keeps_its_rates_with_the_dataset(
 
 def test_the_rates_of_fixed_mu_are_those_kept_with_the_dataset(made, tmp_path):
     """A catalogue that changes later changes no dataset that is made again."""
-    from catalogs.studies.ablation import cut_coupling, load_kept_families
+    from catalogs.studies.ablation import cut_coupling
 
     for name in ("ablation.yaml", "study.yaml"):
         content = (made["fixed-mu"].inputs / name).read_text()
         (tmp_path / name).write_text(content.replace("rain: {value: 10", "rain: {value: 20"))
-    families = load_kept_families(tmp_path, "fixed-mu")
+    families = Catalogue(tmp_path).families
     scenario = read_plan(made["fixed-mu"].root).clips[0].scenario
     assert cut_coupling(scenario, "fixed-mu", families).precipitation_mm_h == 20
     assert catalogue_of(made["fixed-mu"].root).families.rates_mm_h["rain"] == 10
@@ -148,8 +151,8 @@ def test_vertical_only_never_brakes(made):
 def test_without_the_low_speed_rule_the_stop_is_the_same_and_the_pitch_follows_the_deceleration(made):
     layout = made["no-low-speed-rule"]
     for number, clip in enumerate(read_plan(layout.root).clips):
-        vehicle, surface = load_vehicle("paper-reference"), load_surface("dense-asphalt")
-        _, sound = simulate_drive(clip.scenario, vehicle, surface, "paper", 6.0, load_low_speed())
+        vehicle, surface = load("vehicle", "paper-reference"), load("surface", "dense-asphalt")
+        _, sound = simulate_drive(clip.scenario, vehicle, surface, "paper", 6.0, load("low-speed rule"))
         ticks = ticks_of(layout, number)
         for name in ("speed", "station", "longitudinal_acceleration", "brake_torque_f", "wheel_speed_f"):
             np.testing.assert_array_equal(ticks[name], sound.columns[name], err_msg=name)
@@ -164,7 +167,7 @@ def test_without_the_low_speed_rule_the_stop_is_the_same_and_the_pitch_follows_t
 def test_a_rule_that_would_not_act_cannot_be_left_out(write_grid, setting):
     path = write_grid("no-low-speed-rule", WET, grid=GRID + setting)
     with pytest.raises(InputError, match="leaves out a rule of vehicle_mode: paper with low_speed: steady"):
-        freeze_grid(load_grid(path), "t", "cpu")
+        freeze_grid(load("grid", path), "t", "cpu")
 
 
 @pytest.mark.parametrize("variant", CUTS)
@@ -199,7 +202,7 @@ def test_lineage_drives_the_variant_and_finds_its_rates(made):
         duration_s=6.0,
         route=toy_street().route,
     )
-    drive = drive_clip(asked, load_entries(layout.inputs, "fixed-mu"))
+    drive = drive_clip(asked, Catalogue(layout.inputs))
     np.testing.assert_array_equal(drive.numbers["pitch"], ticks_of(layout, 1)["pitch"])
     lines = [line for line in list_lines("ablation.yaml", kept["ablation.yaml"]) if "rain" in line.place]
     (moved,) = move_lines(asked, kept, [line for line in lines if is_driven(line)], drive)
@@ -236,7 +239,7 @@ def test_a_sound_dataset_has_no_word_of_variants(made):
 
 
 def test_a_variant_changes_ids_and_is_named_as_the_difference(write_grid, made):
-    grid = load_grid(write_grid("full", WET))
+    grid = load("grid", write_grid("full", WET))
     plans = {}
     for variant in ("full", *CUTS):
         settings = grid.settings.model_copy(update={"variant": variant})
@@ -253,20 +256,20 @@ def test_a_variant_changes_ids_and_is_named_as_the_difference(write_grid, made):
 
 def test_a_frozen_run_keeps_its_variant_and_a_replay_drives_it(write_grid):
     path = write_grid("appearance-only", SNOW)
-    run = frozen_run(load_grid(path))
+    run = frozen_run(load("grid", path))
     assert run["grid"]["variant"] == "appearance-only"
-    bare = frozen_run(load_grid(write_grid("", SNOW, grid=GRID.replace("variant: {variant}\n", ""))))
+    bare = frozen_run(load("grid", write_grid("", SNOW, grid=GRID.replace("variant: {variant}\n", ""))))
     assert "variant" not in bare["grid"] and bare["clips"][0]["ticks"] != run["clips"][0]["ticks"]
     assert problems_of(run) == []
-    assert problems_of(frozen_run(load_grid(write_grid("no-low-speed-rule", WET)))) == []
+    assert problems_of(frozen_run(load("grid", write_grid("no-low-speed-rule", WET)))) == []
     assert replay_audit(write_grid("fixed-mu", SNOW), seeds=2)["verified"]
 
 
 def test_an_unknown_variant_is_refused_and_traces_are_of_no_variant(write_grid, tmp_path):
     with pytest.raises(FaultyGrid, match="variant"):
-        load_grid(write_grid("half", SNOW))
+        load("grid", write_grid("half", SNOW))
     assert GridFile(name="t", scenarios={"a": {}}).variant == "full"
     path = write_grid("vertical-only", SNOW)
     assert "variant vertical-only" in validate_grid(path)["warning"]
     with pytest.raises(InputError, match="variant must be full where --poses"):
-        freeze_grid(replace(load_grid(path), poses=tmp_path), "t", "cpu")
+        freeze_grid(replace(load("grid", path), poses=tmp_path), "t", "cpu")

@@ -13,8 +13,8 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle, vehicle_provenance
+from catalogs.entries import load
+from catalogs.vehicles import open_vehicle
 from flows.cli import app
 from flows.making.plan import make_plan
 from flows.measured import closing
@@ -29,7 +29,7 @@ from tasks.identification.benchmark import TOLERANCES, make_synthetic_campaign
 from tasks.identification.decision.answer import ChannelError, NamedEffect, OpenOdds, Parameter, Verdict
 from tasks.identification.inference.disturbance import Disturbance
 
-VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
+VEHICLE, SURFACE = load("vehicle", "paper-reference"), load("surface", "dense-asphalt")
 HOSTILE = "lagging <img src=x onerror=alert(1)>"
 SHORT = tuple(
     RunPlan(speed=speed, peak=peak, duration=2.6, disc_rise=rise)
@@ -328,12 +328,12 @@ def test_the_grown_vehicle_has_the_effect_the_retuned_number_and_where_they_come
     assert text is not None and missing == []
     path = tmp_path / "grown.yaml"
     path.write_text(text)
-    grown = load_vehicle(path)
+    grown = load("vehicle", path)
     assert grown.effects == {"drag_area": 0.7}
     assert grown.brake_gain == pytest.approx(1.1 * VEHICLE.brake_gain)
     assert grown.families["dry"].efficiency == pytest.approx((0.95 * 1.01,))
     assert grown.sprung_mass == VEHICLE.sprung_mass
-    provenance = vehicle_provenance(path)
+    provenance = open_vehicle(path).provenance
     assert provenance is not None and provenance.mode == "coupled"
     assert provenance.data_sha256["campaign"] == "c" * 64 and "FOUND" in provenance.procedure
     assert "95 % interval 0.63 to 0.77" in text

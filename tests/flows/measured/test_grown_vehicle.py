@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from catalogs.entries import entry_folder, find_entry
-from catalogs.vehicles import load_vehicle, vehicle_content, vehicle_provenance
+from catalogs.entries import entry_folder, find_entry, load
+from catalogs.vehicles import open_vehicle
 from flows.measured.grown_vehicle import grown_vehicle, tyre_beside
 from manifests.canonical import sha256_of_file
 from tasks.identification.decision.answer import NamedEffect, Parameter, Verdict
@@ -54,7 +54,7 @@ def grown(base: str, verdict: Verdict, path: Path) -> Path:
 def test_what_a_second_campaign_finds_comes_on_top_of_what_the_first_found(tmp_path: Path) -> None:
     once = grown("paper-reference", verdict_of(drag(0.5), "spring"), tmp_path / "once.yaml")
     twice = grown(str(once), verdict_of(drag(0.2), "autumn"), tmp_path / "twice.yaml")
-    assert load_vehicle(twice).effects["drag_area"] == 0.7
+    assert load("vehicle", twice).effects["drag_area"] == 0.7
     assert "spring" in twice.read_text() and "autumn" in twice.read_text()
 
 
@@ -83,10 +83,10 @@ def test_what_grows_from_a_vehicle_that_extends_another_is_whole_and_has_the_has
     car.write_text("extends: paper-reference\nsprung_mass: {value: 1500, unit: kg, source: scales}\n")
     elsewhere.mkdir()
     path = grown(str(car), verdict_of(drag(0.5), "spring"), elsewhere / "grown.yaml")
-    base = vehicle_provenance(path).base_sha256
+    base = open_vehicle(path).provenance.base_sha256
     assert b"extends" not in path.read_bytes()
-    assert load_vehicle(path) == replace(load_vehicle(car), name="grown", effects={"drag_area": 0.5})
-    assert base == hashlib.sha256(vehicle_content(car)).hexdigest() != sha256_of_file(car)
+    assert load("vehicle", path) == replace(load("vehicle", car), name="grown", effects={"drag_area": 0.5})
+    assert base == hashlib.sha256(open_vehicle(car).content).hexdigest() != sha256_of_file(car)
 
 
 def test_the_tyre_that_the_extended_vehicle_has_beside_it_goes_with_what_grows(tmp_path: Path) -> None:

@@ -11,8 +11,8 @@ import pytest
 import yaml
 
 from catalogs.effects import LIBRARY_FILE, load_effects
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle, vehicle_provenance
+from catalogs.entries import load
+from catalogs.vehicles import open_vehicle
 from flows.measured.grown_vehicle import grown_vehicle
 from tasks.campaign.campaign import Run
 from tasks.identification.decision.excitation import find_reached_range
@@ -27,7 +27,7 @@ from tasks.vehicle.effects.table import build_parameter_vector
 from tasks.vehicle.rollout import Controls, simulate_scenario
 from tests.flows.measured.findings import found_effect, found_form, grown_file, verdict_of
 
-VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
+VEHICLE, SURFACE = load("vehicle", "paper-reference"), load("surface", "dense-asphalt")
 TIME = np.arange(300) * 0.01
 MANOEUVRES = {
     "dry": (Weather(kind="dry"), 25.0, 1.6, 0.0),
@@ -109,7 +109,7 @@ def largest_change(theta, slots=()):
 @pytest.mark.parametrize("effect", [e for e in LIBRARY if e.name not in OF_THE_ROAD], ids=lambda e: e.name)
 def test_every_effect_of_the_library_drives_in_a_dataset_as_it_was_fitted(effect, tmp_path):
     values = sizes(effect)
-    car = load_vehicle(grown_file(tmp_path / "grown.yaml", found_effect(effect, values), reached={}))
+    car = load("vehicle", grown_file(tmp_path / "grown.yaml", found_effect(effect, values), reached={}))
     theta = build_parameter_vector(values)
     for manoeuvre in MANOEUVRES:
         assert np.all(difference(manoeuvre, car, theta) < ROUNDING), manoeuvre
@@ -135,7 +135,7 @@ def test_a_grade_belongs_to_the_road():
 def test_a_vehicle_that_calibration_grew_grows_further_and_keeps_what_it_had(tmp_path):
     (lag,) = (e for e in LIBRARY if e.name == "brake_lag")
     (rolling,) = (e for e in LIBRARY if e.name == "rolling_resistance")
-    base = load_vehicle("multibody-grown")
+    base = load("vehicle", "multibody-grown")
     found = verdict_of(
         found_effect(lag, {"lag": 0.08}), found_effect(rolling, {"rolling_coefficient": 0.004})
     )
@@ -143,10 +143,10 @@ def test_a_vehicle_that_calibration_grew_grows_further_and_keeps_what_it_had(tmp
     assert text is not None and missing == []
     path = tmp_path / "grown.yaml"
     path.write_text(text)
-    car = load_vehicle(path)
+    car = load("vehicle", path)
     rolls = base.effects["rolling_coefficient"] + 0.004
     assert car.effects == {**base.effects, "lag": 0.08, "rolling_coefficient": rolls}
-    kept, before = vehicle_provenance(path), vehicle_provenance("multibody-grown")
+    kept, before = open_vehicle(path).provenance, open_vehicle("multibody-grown").provenance
     assert kept.bounds["stick_above"] == before.bounds["stick_above"]
     assert difference("hump", car, build_parameter_vector({"lag": 0.08}))[0] > 0.01
     model, fitted = fitted_run(
@@ -175,12 +175,12 @@ def test_a_form_that_was_found_is_in_the_vehicle_with_its_range_and_where_it_com
     low, high = find_reached_range([model], PLAIN, (), "pressure")
     assert low == 0.0 and high == pytest.approx(1.6)
     path = grown_file(tmp_path / "grown.yaml", found, reached={"pressure": (low, high)})
-    (form,) = load_vehicle(path).forms
+    (form,) = load("vehicle", path).forms
     assert form == make_form_in_range(found.name, (0.05, 0.2), low, high) and form.name == found.name
-    provenance = vehicle_provenance(path)
+    provenance = open_vehicle(path).provenance
     assert provenance is not None and f"{found.name}: b" in provenance.bounds
     assert "95 % interval 0.18 to 0.22" in " ".join(path.read_text().split())
-    assert np.all(difference("dry", load_vehicle(path), PLAIN, (form.slot,)) < ROUNDING)
+    assert np.all(difference("dry", load("vehicle", path), PLAIN, (form.slot,)) < ROUNDING)
 
 
 def test_the_range_that_runs_reach_is_that_of_the_model():

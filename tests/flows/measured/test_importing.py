@@ -9,9 +9,8 @@ import pytest
 import yaml
 
 from catalogs.campaigns import read_campaign
-from catalogs.channel_maps import load_channel_map
 from catalogs.channel_maps.tolerances import RunTolerances, Tolerances, load_assumed_tolerances
-from catalogs.entries import entry_names
+from catalogs.entries import entry_names, load
 from flows.commands.measured_results import shorten_import
 from flows.measured.importing import import_measurements
 from tasks.campaign.campaign import CHANNELS
@@ -184,7 +183,7 @@ def test_conditions_of_a_run_complete_the_common_ones(tmp_path: Path) -> None:
 
 def test_every_map_that_ships_can_be_read() -> None:
     names = entry_names("channel map")
-    assert names and all(load_channel_map(name)[0].channels for name in names)
+    assert names and all(load("channel map", name)[0].channels for name in names)
 
 
 def test_the_measured_sets_come_in_through_their_maps(tmp_path: Path, outside_data: Path) -> None:

@@ -6,9 +6,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from catalogs.entries import entry_names
-from catalogs.plausible_vehicle import load_plausible_vehicle
-from catalogs.vehicles import load_tolerances, load_vehicle
+from catalogs.entries import entry_names, load
+from catalogs.vehicles import open_vehicle
 from flows.measured.vehicle_template import DATA_SHEET
 from tests.flows.shell import run_command
 
@@ -28,9 +27,9 @@ def musync(tmp_path, monkeypatch, capsys):
 @pytest.mark.parametrize("base", entry_names("vehicle"))
 def test_the_template_is_the_car_that_it_extends_with_usual_tolerances(musync, base):
     assert musync("vehicle", "new", "--from", base, "--out", "cars/my-car.yaml").code == 0
-    assert load_vehicle("cars/my-car.yaml") == replace(load_vehicle(base), name="my-car")
-    usual = {name: n.value for name, n in load_plausible_vehicle().usual_tolerances.items()}
-    assert load_tolerances("cars/my-car.yaml") == pytest.approx(usual, rel=0.05)
+    assert load("vehicle", "cars/my-car.yaml") == replace(load("vehicle", base), name="my-car")
+    usual = {name: n.value for name, n in load("table of plausible figures").usual_tolerances.items()}
+    assert open_vehicle("cars/my-car.yaml").tolerances == pytest.approx(usual, rel=0.05)
     assert usual.keys() == DATA_SHEET.keys()
 
 
@@ -43,8 +42,8 @@ def test_a_template_over_a_file_of_ones_own_keeps_its_tolerances_and_its_name(mu
     assert json.loads(done.out)["extends"] == "a b.yaml"
     written = (tmp_path / "mine.yaml").read_text()
     assert written.startswith("# Anna's car: ") and 'source: "TO FILL IN; a"' in written
-    assert load_vehicle("mine.yaml") == replace(load_vehicle("a b.yaml"), name="mine")
-    assert load_tolerances("mine.yaml")["cg_height"] == pytest.approx(0.15)
+    assert load("vehicle", "mine.yaml") == replace(load("vehicle", "a b.yaml"), name="mine")
+    assert open_vehicle("mine.yaml").tolerances["cg_height"] == pytest.approx(0.15)
 
 
 def test_nothing_is_overwritten_and_all_that_is_wrong_is_told_at_once(musync, tmp_path):

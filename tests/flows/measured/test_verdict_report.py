@@ -11,8 +11,7 @@ import pytest
 
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import load
 from flows.measured.closing import tell_search, verdict_json
 from flows.measured.residuals import predict_runs
 from flows.measured.verdict_figures import format_plain_unit, make_brake_curve
@@ -23,7 +22,7 @@ from tasks.identification.benchmark import make_synthetic_campaign
 from tasks.identification.decision.verdict import Outcome, judge_runs
 from tests.browsers import find_barriers, open_chromium
 
-VEHICLE, SURFACE = load_vehicle("paper-reference"), load_surface("dense-asphalt")
+VEHICLE, SURFACE = load("vehicle", "paper-reference"), load("surface", "dense-asphalt")
 STOPS = tuple(
     RunPlan(speed=speed, peak=peak, duration=2.6, disc_rise=20.0)
     for speed, peak in ((16.0, 1.2), (20.0, 1.8), (12.0, 0.8))

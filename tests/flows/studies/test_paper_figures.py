@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import load
 from flows.measured.dive_figure import draw_dives
 from flows.studies.sensitivity_figure import draw_sensitivity
 from flows.studies.trajectory_figure import draw_trajectories
@@ -60,7 +60,7 @@ def test_a_model_that_is_its_own_reference_leaves_nothing_over():
         peak_pressure_mpa=2.3, onset_s=0.1, ramp_s=0.5, onset_station_m=None, hold_s=None, release_s=0.5
     )
     ride = simulate_scenario(
-        load_vehicle("paper-reference"), SurfaceState(kind="dry", friction=0.82),
+        load("vehicle", "paper-reference"), SurfaceState(kind="dry", friction=0.82),
         Controls(initial_speed=10.0, brake=brake, hold_speed_until_brake=True), FLAT_ROAD, mode="paper", duration_s=1.0,
     )  # fmt: skip
     told = ride.columns

@@ -10,8 +10,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from catalogs.entries import load
 from catalogs.references import ReferenceCase
-from catalogs.vehicles import load_vehicle
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Mode, simulate_scenario
@@ -33,7 +33,7 @@ Make = Callable[..., Path]
 
 @pytest.fixture(scope="session")
 def vehicle() -> Vehicle:
-    return load_vehicle("paper-reference")
+    return load("vehicle", "paper-reference")
 
 
 @pytest.fixture

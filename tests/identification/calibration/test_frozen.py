@@ -8,10 +8,9 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
-from catalogs.calibration import load_procedure
 from catalogs.effects import load_effects
-from catalogs.entries import entry_names, find_entry
-from catalogs.vehicles import load_vehicle, vehicle_provenance
+from catalogs.entries import entry_names, find_entry, load
+from catalogs.vehicles import open_vehicle
 from flows.cli import app
 from flows.measured.calibration import calibrate_on_traces
 from flows.studies.vehicle_model import measure_agreement
@@ -44,7 +43,7 @@ def frozen(vehicle, make_traces, tmp_path):
 
 def test_a_frozen_file_says_where_its_numbers_come_from(frozen):
     traces, path = frozen
-    provenance = vehicle_provenance(path)
+    provenance = open_vehicle(path).provenance
     assert provenance is not None
     assert (provenance.mode, provenance.base, provenance.split) == (
         "coupled",
@@ -59,7 +58,7 @@ def test_a_frozen_file_says_where_its_numbers_come_from(frozen):
 
 def test_frozen_values_are_read_back_in_their_units(frozen):
     _, path = frozen
-    entry, car = yaml.safe_load(path.read_text()), load_vehicle(path)
+    entry, car = yaml.safe_load(path.read_text()), load("vehicle", path)
     assert car.effects == {"drag_area": entry["effects"]["drag_area"]["value"]}
     assert np.rad2deg(car.static_pitch) == pytest.approx(entry["static_pitch"]["value"], rel=1e-12)
     assert car.wheelbase == pytest.approx(2.7, abs=1e-9)
@@ -73,7 +72,7 @@ def test_an_edited_frozen_file_is_refused(frozen, edit):
     assert edit[0] in text or edit[0] == "value: 1200"
     path.write_text(text.replace(*edit, 1))
     with pytest.raises(InputError, match="must be as it was frozen"):
-        load_vehicle(path)
+        load("vehicle", path)
 
 
 def test_the_page_of_an_agreement_has_a_drawing_and_a_row_for_each_case(frozen, tmp_path):
@@ -112,7 +111,7 @@ def test_agreement_drives_a_frozen_vehicle_in_the_mode_it_was_fitted_in(frozen):
 def test_every_vehicle_of_the_catalogue_loads_with_its_seal():
     assert "paper-reference" in entry_names("vehicle")
     for name in entry_names("vehicle"):
-        load_vehicle(name)
+        load("vehicle", name)
 
 
 def spoil(folder, case="wet", **columns):
@@ -216,7 +215,7 @@ def test_a_faulty_procedure_is_told_by_place_and_rule(tmp_path, harm, sentence):
     path = tmp_path / "faulty.yaml"
     path.write_text(yaml.safe_dump(entry))
     with pytest.raises(InputError) as failure:
-        load_procedure(path)
+        load("calibration procedure", path)
     assert sentence in str(failure.value)
 
 
@@ -226,7 +225,7 @@ def test_a_vehicle_that_close_loop_grew_is_calibrated_further_and_keeps_what_it_
     grown = grown_file(
         tmp_path / "grown.yaml", found, found_effect(lag, {"lag": 0.08}), reached={"pressure": (0.0, 3.6)}
     )
-    truth = replace(load_vehicle(grown), effects={"lag": 0.08, "drag_area": 0.6})
+    truth = replace(load("vehicle", grown), effects={"lag": 0.08, "drag_area": 0.6})
     entry = yaml.safe_load(find_entry("calibration procedure", "coupled-grown").read_text())
     entry["stages"] = [
         {"name": "air", "groups": ["drag_area"], "responses": ["speed"], "kinds": ["flat"], "phase": "event"}
@@ -241,7 +240,7 @@ def test_a_vehicle_that_close_loop_grew_is_calibrated_further_and_keeps_what_it_
         procedure=str(tmp_path / "air.yaml"),
         name="car",
     )
-    car = load_vehicle(tmp_path / "out" / "car.yaml")
+    car = load("vehicle", tmp_path / "out" / "car.yaml")
     assert car.forms == truth.forms and car.effects["lag"] == 0.08
     assert car.effects["drag_area"] == pytest.approx(0.6, abs=0.1)
 
@@ -266,5 +265,5 @@ def test_a_vehicle_that_extends_another_is_frozen_whole(vehicle, make_traces, tm
         str(traces), out=str(tmp_path / "out"), vehicle=str(base), procedure=str(procedure), name="car"
     )
     path = tmp_path / "out" / "car.yaml"
-    assert load_vehicle(path).sprung_mass == 1210 and b"extends" not in path.read_bytes()
-    assert vehicle_provenance(path).base_sha256 != sha256_of_file(base)
+    assert load("vehicle", path).sprung_mass == 1210 and b"extends" not in path.read_bytes()
+    assert open_vehicle(path).provenance.base_sha256 != sha256_of_file(base)

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from catalogs.references import trace_file
-from catalogs.vehicles import vehicle_provenance
+from catalogs.vehicles import open_vehicle
 from flows.studies.vehicle_model import measure_agreement
 from manifests.canonical import sha256_of_file
 
@@ -36,6 +36,6 @@ def test_the_shipped_vehicle_was_fitted_to_the_development_cases_only(outside_da
     folder = outside_data / "reference" / "multibody"
     cases = json.loads((folder / "cases.json").read_text())
     development = {c["case"] for c in cases if c["split"] == "development"}
-    provenance = vehicle_provenance(name)
+    provenance = open_vehicle(name).provenance
     assert provenance is not None
     assert provenance.data_sha256 == {case: sha256_of_file(trace_file(folder, case)) for case in development}

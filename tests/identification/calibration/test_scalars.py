@@ -1,12 +1,12 @@
 import pytest
 
-from catalogs.calibration import load_procedure
+from catalogs.entries import load
 from tasks.errors import InputError
 from tasks.identification.calibration.scalars import list_calibration_scalars, read_scalar, set_scalars
 
 
 def test_the_paper_s_procedure_moves_its_40_scalars(vehicle):
-    procedure, _ = load_procedure("paper-staged")
+    procedure, _ = load("calibration procedure", "paper-staged")
     scalars = list_calibration_scalars(vehicle, procedure.groups)
     by_group = {group: sum(s.group == group for s in scalars) for group in procedure.groups}
     # paper, Table frozen_calibration_count
@@ -19,7 +19,7 @@ def test_the_paper_s_procedure_moves_its_40_scalars(vehicle):
 
 @pytest.mark.parametrize("name", ["paper-staged", "coupled-retuned", "coupled-grown"])
 def test_every_value_that_is_set_is_read_back_and_moves_nothing_else(vehicle, name):
-    procedure, _ = load_procedure(name)
+    procedure, _ = load("calibration procedure", name)
     scalars = list_calibration_scalars(vehicle, procedure.groups)
     for scalar in scalars:
         value = read_scalar(vehicle, scalar) + procedure.bounds[scalar.group].step

@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 import yaml
 
-from catalogs.calibration import load_procedure
-from catalogs.entries import find_entry
+from catalogs.entries import find_entry, load
 from catalogs.references import read_reference
 from flows.measured.calibration import calibrate_on_traces, calibration_case
 from flows.studies.vehicle_model import agreement_of
@@ -69,7 +68,7 @@ def test_known_tyre_and_pitch_values_come_back_from_noisy_traces(vehicle, make_t
             stage(["static_pitch", "pitch_scale"], ["pitch"]),
         ],
     )
-    procedure, interval = load_procedure(name)
+    procedure, interval = load("calibration procedure", name)
     fitted, records = run_stages(vehicle, cases_of(folder, vehicle, procedure, interval), procedure)
     assert np.rad2deg(fitted.static_pitch) == pytest.approx(0.3, abs=0.01)
     for family, knot in (("rain", 2), ("snow", 1)):
@@ -88,7 +87,7 @@ def test_effects_of_the_coupled_mode_come_back_from_noisy_traces(vehicle, make_t
     name = procedure_file(
         tmp_path, "coupled-grown", [stage(list(effects), ["speed", "pitch", "wheel_load"], every, "event")]
     )
-    procedure, interval = load_procedure(name)
+    procedure, interval = load("calibration procedure", name)
     fitted, _ = run_stages(vehicle, cases_of(folder, vehicle, procedure, interval), procedure)
     assert fitted.effects["rolling_coefficient"] == pytest.approx(0.02, abs=0.002)
     assert fitted.effects["slope_moment"] == pytest.approx(1.5, abs=0.1)
@@ -99,7 +98,7 @@ def test_effects_of_the_coupled_mode_come_back_from_noisy_traces(vehicle, make_t
 def test_a_scalar_that_rests_on_a_bound_is_named(vehicle, make_traces, tmp_path, upper_deg, named):
     folder = make_traces(dataclasses.replace(vehicle, static_pitch=np.deg2rad(0.3)), "paper")
     name = procedure_file(tmp_path, "paper-staged", [stage(["static_pitch"], ["pitch"])])
-    procedure, interval = load_procedure(name)
+    procedure, interval = load("calibration procedure", name)
     bound = dataclasses.replace(procedure.bounds["static_pitch"], upper=np.deg2rad(upper_deg))
     bounded = dataclasses.replace(procedure, bounds=procedure.bounds | {"static_pitch": bound})
     _, record = run_stage(vehicle, cases_of(folder, vehicle, bounded, interval), bounded.stages[0], bounded)
@@ -107,7 +106,7 @@ def test_a_scalar_that_rests_on_a_bound_is_named(vehicle, make_traces, tmp_path,
 
 
 def test_a_scalar_to_which_no_run_answers_stays_where_it_was(vehicle, make_traces):
-    procedure, interval = load_procedure("paper-staged")
+    procedure, interval = load("calibration procedure", "paper-staged")
     efficiency = next(s for s in procedure.stages if "efficiency" in s.groups)
     cases = cases_of(make_traces(vehicle, "paper"), vehicle, procedure, interval)
     fitted, _ = run_stage(vehicle, cases, efficiency, procedure)
@@ -118,7 +117,7 @@ def test_a_scalar_to_which_no_run_answers_stays_where_it_was(vehicle, make_trace
 
 
 def test_an_unseen_scalar_goes_to_the_value_about_which_the_prior_lies(vehicle, make_traces, changed):
-    procedure, interval = load_procedure("paper-staged")
+    procedure, interval = load("calibration procedure", "paper-staged")
     efficiency = next(s for s in procedure.stages if "efficiency" in s.groups)
     cases = cases_of(make_traces(vehicle, "paper", ("wet",)), vehicle, procedure, interval)
     moved = changed(vehicle, "dry", "efficiency", 0, 1.1)
@@ -131,7 +130,7 @@ def test_an_unseen_scalar_goes_to_the_value_about_which_the_prior_lies(vehicle, 
 
 
 def test_the_sparse_jacobian_is_that_of_differences_of_every_case(vehicle, make_traces):
-    procedure, interval = load_procedure("paper-staged")
+    procedure, interval = load("calibration procedure", "paper-staged")
     slip = next(s for s in procedure.stages if s.groups == ("slip_stiffness",))
     cases = cases_of(make_traces(vehicle, "paper"), vehicle, procedure, interval)
     scalars = list_calibration_scalars(vehicle, slip.groups)
@@ -147,7 +146,7 @@ def test_the_sparse_jacobian_is_that_of_differences_of_every_case(vehicle, make_
 
 
 def test_neighbouring_knots_of_a_family_are_held_together_and_no_others(vehicle):
-    procedure, _ = load_procedure("coupled-grown")
+    procedure, _ = load("calibration procedure", "coupled-grown")
     rows = build_smoothness_rows(
         list_calibration_scalars(vehicle, ("efficiency", "slip_stiffness")), procedure
     )
@@ -200,7 +199,7 @@ def test_stages_that_hold_each_others_scalars_know_less_than_a_joint_fit():
 
 
 def test_a_stage_is_taken_as_far_as_all_cases_together_are_no_worse(vehicle, make_traces):
-    procedure, interval = load_procedure("paper-staged")
+    procedure, interval = load("calibration procedure", "paper-staged")
     truth = dataclasses.replace(vehicle, static_pitch=np.deg2rad(0.3))
     cases = cases_of(make_traces(truth, "paper", ("wet",), noise=0.0), vehicle, procedure, interval)
     record = StageRecord(stage="any", turn=0, before=2.0, after=1.0, moved=0.4, at_bounds=())
@@ -231,9 +230,8 @@ def test_the_same_traces_give_the_same_bytes(vehicle, make_traces, tmp_path):
 
 
 def _any_vehicle():
-    from catalogs.vehicles import load_vehicle
 
-    return load_vehicle("paper-reference")
+    return load("vehicle", "paper-reference")
 
 
 def test_with_scalars_of_nothing_is_the_vehicle(vehicle):

@@ -5,8 +5,7 @@ from math import atan, pi, sin
 import numpy as np
 import pytest
 
-from catalogs.surfaces import load_surface
-from catalogs.vehicles import load_vehicle
+from catalogs.entries import load
 from studies.double_track.brakes import BUILD, DUMP, HOLD, OFF, control_wheel
 from studies.double_track.car import Surroundings, build_car
 from studies.double_track.declared import find_surface, read_declared, read_vehicle, values_of
@@ -59,7 +58,7 @@ def integral(values):
 
 def test_static_loads_carry_the_weight_and_balance_about_the_centre_of_gravity():
     car = build_car({}, Surroundings(surface=SURFACES[0]))[0]
-    vehicle = load_vehicle("paper-reference")
+    vehicle = load("vehicle", "paper-reference")
     loads = car["static_load"]
     assert loads.sum() == pytest.approx(vehicle.mass * vehicle.gravity, rel=1e-12)
     assert (loads[:2].sum(), loads[2:].sum()) == pytest.approx(vehicle.static_axle_loads, rel=1e-12)
@@ -182,8 +181,8 @@ def test_friction_by_weather_is_that_of_the_mapping_and_near_the_judged_curve(ro
         precipitation_mm_h=row["rate"],
         snow_accumulation_h=float(row["weather"] == "snow"),
     )
-    state = surface_state(weather, load_surface("dense-asphalt"))
-    tyre = compute_surface_response(load_vehicle("paper-reference"), row["weather"], state.friction).tyre
+    state = surface_state(weather, load("surface", "dense-asphalt"))
+    tyre = compute_surface_response(load("vehicle", "paper-reference"), row["weather"], state.friction).tyre
     assert row["peak"] == pytest.approx(tyre.peak, abs=1e-6)
     assert row["target_slip"] == pytest.approx(tyre.target_slip, abs=1e-5)
     assert row["snow_depth_mm"] == pytest.approx(state.snow_depth_mm)

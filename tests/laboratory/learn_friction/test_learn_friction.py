@@ -7,7 +7,7 @@ import pytest
 import torch
 
 import musync
-from catalogs.grids import load_grid
+from catalogs.entries import load
 from flows.making.generate import generate_dataset
 from studies.learn_friction.__main__ import GRID, open_made, paint_grid
 from studies.learn_friction.baselines import describe_command, fit_ridge, predict_by_ridge
@@ -59,7 +59,7 @@ def test_no_drive_is_in_both_splits(drawn: Samples) -> None:
 
 
 def test_the_shipped_grid_holds_out_whole_drives_farther_on(drawn: Samples) -> None:
-    grid = load_grid(GRID)
+    grid = load("grid", GRID)
     onsets: dict[str, set[float]] = {"train": set(), "test": set()}
     rates: dict[str, set[tuple[str, float]]] = {"train": set(), "test": set()}
     for (_, scenario), (split, _) in zip(grid.scenarios, grid.tags, strict=True):
@@ -82,7 +82,7 @@ def paint(samples: Samples) -> Samples:
 def worlds(tmp_path_factory) -> tuple[musync.Dataset, musync.Dataset]:
     """Telemetry of one drive of the shipped grid, dry and on snow, and the same of the appearance-only world."""
     folder, opened = tmp_path_factory.mktemp("worlds"), []
-    for name, grid in (("sound", load_grid(GRID)), ("painted", paint_grid())):
+    for name, grid in (("sound", load("grid", GRID)), ("painted", paint_grid())):
         rows = [
             number
             for number, (label, _) in enumerate(grid.scenarios)

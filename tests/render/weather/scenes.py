@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from catalogs.surfaces import load_surface
+from catalogs.entries import load
 from tasks.conventions import SemanticClass
 from tasks.render.camera import world_to_camera
 from tasks.render.environment import environment_view
@@ -18,7 +18,7 @@ from tasks.surface.state import SurfaceParameters, SurfaceState
 
 ASPHALT = 0.17
 FOCAL_PX = 120.0
-PAVEMENT = load_surface("dense-asphalt")
+PAVEMENT = load("surface", "dense-asphalt")
 TEXTURE_MM = PAVEMENT.texture_depth_mm
 
 

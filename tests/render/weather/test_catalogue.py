@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from catalogs.weather.grip import FOLDER
+from catalogs.weather.grip import WEATHER, WeatherFolder
 from catalogs.weather.look import load_weather
 from tasks.errors import InputError
 from tasks.surface.weather import WEATHERS
@@ -22,12 +22,12 @@ def leaves(entries, place=""):
 
 @pytest.fixture
 def copy(tmp_path) -> Path:
-    for path in FOLDER.glob("*.yaml"):
+    for path in WEATHER.folder.glob("*.yaml"):
         shutil.copy(path, tmp_path)
     return tmp_path
 
 
-@pytest.mark.parametrize("path", sorted(FOLDER.glob("*.yaml")), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", sorted(WEATHER.folder.glob("*.yaml")), ids=lambda path: path.stem)
 def test_every_value_has_unit_and_source(path):
     for name, entry in leaves(yaml.safe_load(path.read_text())):
         assert set(entry) - {"bounds"} == {"value", "unit", "source"}, name
@@ -76,18 +76,18 @@ def test_all_mistakes_are_told_at_once(copy):
     (copy / "sky.yaml").write_text("a: [")
     (copy / "snow.yaml").rename(copy / "hail.yaml")
     with pytest.raises(InputError) as caught:
-        load_weather(copy)
+        load_weather(WeatherFolder(copy))
     text = "\n".join(caught.value.problems)
     for part in (
-        "rain.yaml: particles: slope must be a finite number; it is 'steep'",
-        "rain.yaml: particles: classes must be a whole number from 1 to 100; it is 2.5",
-        "rain.yaml: particles: colour is not a known value; known are kind, intercept",
-        "rain.yaml: particles: flutter_m is missing",
-        "air.yaml: wind_m_s must be a list of finite numbers; it is 3.0",
-        "air.yaml: near: nearest_m must have value, unit and source",
-        "air.yaml: near: fade_share: source must be a word; it is ''",
-        "air.yaml: near: farthest_m: unit must be a word; it is 7",
-        "air.yaml: haze_visual_range_m must be a finite number; it is inf",
+        "rain.yaml: particles.slope.value: must be a valid number; it is 'steep'",
+        "rain.yaml: particles.classes.value: must be a valid integer; it is 2.5",
+        "rain.yaml: particles.colour: unknown key",
+        "rain.yaml: particles.flutter_m is missing",
+        "air.yaml: wind_m_s.value: must be a valid tuple; it is 3.0",
+        "air.yaml: near.nearest_m.source is missing",
+        "air.yaml: near.fade_share.source: String should have at least 1 character; it is ''",
+        "air.yaml: near.farthest_m.unit: must be a valid string; it is 7",
+        "air.yaml: haze_visual_range_m.value: must be a finite number; it is inf",
         "sky.yaml: a weather catalogue's file must be valid YAML",
         "hail.yaml: must be of a kind of weather, which are rain, snow",
     ):
@@ -96,7 +96,7 @@ def test_all_mistakes_are_told_at_once(copy):
 
 
 def test_an_unedited_copy_is_the_same_catalogue(copy, parameters):
-    assert load_weather(copy) == parameters
+    assert load_weather(WeatherFolder(copy)) == parameters
 
 
 def test_the_pavements_numbers_in_a_kept_copy_of_before_are_not_read(copy, parameters):
@@ -109,7 +109,7 @@ def test_the_pavements_numbers_in_a_kept_copy_of_before_are_not_read(copy, param
         assert name not in owner
         owner[name] = {"value": 7, "unit": "mm", "source": "the paper"}
         (copy / f"{kind}.yaml").write_text(yaml.safe_dump(entry))
-    assert load_weather(copy) == parameters
+    assert load_weather(WeatherFolder(copy)) == parameters
 
 
 @pytest.mark.parametrize("kind", [kind for kind, row in WEATHERS.items() if row.overcast])
@@ -120,4 +120,4 @@ def test_every_kind_under_cloud_has_an_entry(kind, parameters):
 def test_a_kind_without_an_entry_is_named(copy):
     (copy / "snow.yaml").unlink()
     with pytest.raises(InputError, match=r"weather snow: the weather catalogue has no snow\.yaml"):
-        load_weather(copy).find_look("snow")
+        load_weather(WeatherFolder(copy)).find_look("snow")

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catalogs.surfaces import load_surface
+from catalogs.entries import load
 from tasks.errors import InputError
 from tasks.render.weather.controls import air_controls, road_controls
 from tasks.surface.anchors import adjacent_anchors
@@ -23,7 +23,7 @@ ANCHORS = (2.0, 10.0, 25.0, 50.0)
 
 @pytest.fixture(scope="module")
 def surface():
-    return load_surface("dense-asphalt")
+    return load("surface", "dense-asphalt")
 
 
 def states(kind, surface):

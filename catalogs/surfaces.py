@@ -1,16 +1,13 @@
 """Pavements: what lies on a road in a given weather, and how it grips."""
 
 from dataclasses import fields
-from pathlib import Path
 from typing import Annotated
 
 from pydantic import model_validator
 
-from catalogs.entries import find_entry
-from catalogs.quantities import Bounded, CatalogueEntry, Scalar, read_entry, require_quantity
+from catalogs.quantities import Bounded, CatalogueEntry, Scalar, require_quantity
 from catalogs.sentences import shorten
-from catalogs.weather.grip import FOLDER as WEATHER
-from catalogs.weather.grip import weather_numbers
+from catalogs.weather.grip import WEATHER, WeatherFolder
 from tasks.errors import InputError
 from tasks.surface.state import SurfaceParameters
 
@@ -53,28 +50,17 @@ class SurfaceEntry(CatalogueEntry):
             raise ValueError("; ".join(problems))
         return self
 
-
-def load_surface(name_or_path: str | Path, weather: Path = WEATHER) -> SurfaceParameters:
-    """Read a surface by its name in the catalogue or from a YAML file.
-
-    Parameters
-    ----------
-    name_or_path : name, or path ending in .yaml
-    weather : folder of the weather catalogue, whose kinds bring numbers that they have on any pavement
-
-    Raises
-    ------
-    InputError
-        Listing every problem of the files, or the names that exist.
-    """
-    entry = read_entry(SurfaceEntry, find_entry("surface", name_or_path), "surface")
-    brought = weather_numbers(weather)
-    known = {field.name for field in fields(SurfaceParameters)} - set(SurfaceEntry.model_fields) - {"bounds"}
-    if unknown := sorted(set(brought) - known):
-        raise InputError(
-            f"{shorten(weather)}: surface: {', '.join(unknown)}: no numbers that a kind of weather brings;"
-            f" there are {', '.join(sorted(known)) or 'none'}"
+    def build(self, weather: WeatherFolder = WEATHER) -> SurfaceParameters:
+        """The surface with the numbers that kinds of weather have on any pavement."""
+        brought = weather.surface_numbers
+        known = (
+            {field.name for field in fields(SurfaceParameters)} - set(SurfaceEntry.model_fields) - {"bounds"}
         )
-    numbers = {name: getattr(entry, name) for name in SurfaceEntry.model_fields} | brought
-    bounds = {name: number.bounds for name, number in numbers.items() if isinstance(number, Bounded)}
-    return SurfaceParameters(**{name: number.value for name, number in numbers.items()}, bounds=bounds)
+        if unknown := sorted(set(brought) - known):
+            raise InputError(
+                f"{shorten(weather.folder)}: surface: {', '.join(unknown)}: no numbers that a kind of weather brings;"
+                f" there are {', '.join(sorted(known)) or 'none'}"
+            )
+        numbers = {name: getattr(self, name) for name in SurfaceEntry.model_fields} | brought
+        bounds = {name: number.bounds for name, number in numbers.items() if isinstance(number, Bounded)}
+        return SurfaceParameters(**{name: number.value for name, number in numbers.items()}, bounds=bounds)

@@ -4,10 +4,7 @@ import re
 from collections.abc import Mapping
 from itertools import product
 from math import isfinite
-from pathlib import Path
 
-from catalogs.documents import read_content
-from catalogs.entries import find_entry
 from catalogs.sentences import cap_problems, shorten, shorten_value
 from tasks.errors import InputError
 from tasks.vehicle.tyres.magic_formula import (
@@ -19,8 +16,6 @@ from tasks.vehicle.tyres.magic_formula import (
 from tasks.vehicle.tyres.magic_formula_tyre import MOST_LOAD_CHANGE
 from tasks.vehicle.tyres.scaling import NAMES, fold_scaling
 
-LARGEST_TIR = 2**20
-"""Bytes of a tyre property file [1]: those of MF-Tool have 20 kB."""
 VERSIONS = {"6": "MF 5.2", "52": "MF 5.2", "61": "MF 6.1", "62": "MF 6.1"}
 """Version of the forces' equations by FITTYP; what 6.2 adds to 6.1 is the overturning moment, not a force."""
 UNITS = {
@@ -37,22 +32,6 @@ SECTIONS = {
 """Sections that are read; others say nothing about the forces, and may hold tables."""
 _KEY = re.compile(r"[A-Z][A-Z0-9_]*")
 _COMMENT = re.compile(r"""^((?:[^'"$!]|'[^']*'|"[^"]*")*)[$!].*$""")
-
-
-def load_tyre(name_or_path: str | Path) -> MagicFormula:
-    """Read a tyre by its name in the catalogue or from a property file.
-
-    Parameters
-    ----------
-    name_or_path : name, or path ending in .tir
-
-    Raises
-    ------
-    InputError
-        Listing every problem of the file, or the names that exist.
-    """
-    source = find_entry("tyre", name_or_path)
-    return parse_tyre(read_content(source, "tyre", LARGEST_TIR), source)
 
 
 def parse_tyre(content: bytes, place: object) -> MagicFormula:

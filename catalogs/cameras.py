@@ -1,14 +1,12 @@
 """Cameras: picture size, focal length, and where they sit on the vehicle."""
 
-from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field
 from scipy.spatial.transform import Rotation
 
-from catalogs.entries import find_entry
-from catalogs.quantities import CatalogueEntry, Scalar, Text, read_entry, require_quantity
+from catalogs.quantities import CatalogueEntry, Scalar, Text, require_quantity
 from tasks.render.camera import Camera
 from tasks.render.lens import Lens
 from tasks.render.readout import sensor_field
@@ -54,44 +52,34 @@ class CameraEntry(CatalogueEntry):
     )
     motion_blur: bool = False
 
-
-def load_camera(name_or_path: str | Path) -> Camera:
-    """Read a camera by its name in the catalogue or from a YAML file.
-
-    Parameters
-    ----------
-    name_or_path : name, or path ending in .yaml
-
-    Raises
-    ------
-    InputError
-        Listing every problem of the file, or the names that exist.
-    """
-    entry = read_entry(CameraEntry, find_entry("camera", name_or_path), "camera")
-    width, height, f = int(entry.width.value), int(entry.height.value), entry.focal_length.value
-    mount = np.eye(4)
-    mount[:3, :3] = (
-        Rotation.from_euler("y", entry.pitch_down.value, degrees=True).as_matrix() @ LOOKING_FORWARD
-    )
-    mount[:3, 3] = (-entry.behind_front_axle.value, entry.left_of_centre.value, entry.height_above_road.value)
-    k = {name: getattr(entry, name).value for name in ("k1", "k2", "p1", "p2", "k3")}
-    camera = Camera(
-        name=entry.name,
-        width=width,
-        height=height,
-        K=np.array([[f, 0.0, width / 2], [0.0, f, height / 2], [0.0, 0.0, 1.0]]),
-        T_rig_camera=mount,
-        exposure_s=entry.exposure.value,
-        sensor=Sensor(
-            exposure_ev=entry.exposure_compensation.value,
-            full_well=None if entry.full_well is None else entry.full_well.value,
-            read_noise=entry.read_noise.value,
-        ),
-        lens=Lens(**k) if any(k.values()) else None,
-        line_delay_s=entry.line_delay.value,
-        motion_blur=entry.motion_blur,
-    )
-    sensor_field(
-        camera
-    )  # a lens that does not spread the whole picture is refused here, not in the first clip
-    return camera
+    def build(self) -> Camera:
+        """The camera itself; a lens that does not spread the whole picture is refused here, not in the first clip."""
+        width, height, f = int(self.width.value), int(self.height.value), self.focal_length.value
+        mount = np.eye(4)
+        mount[:3, :3] = (
+            Rotation.from_euler("y", self.pitch_down.value, degrees=True).as_matrix() @ LOOKING_FORWARD
+        )
+        mount[:3, 3] = (
+            -self.behind_front_axle.value,
+            self.left_of_centre.value,
+            self.height_above_road.value,
+        )
+        k = {name: getattr(self, name).value for name in ("k1", "k2", "p1", "p2", "k3")}
+        camera = Camera(
+            name=self.name,
+            width=width,
+            height=height,
+            K=np.array([[f, 0.0, width / 2], [0.0, f, height / 2], [0.0, 0.0, 1.0]]),
+            T_rig_camera=mount,
+            exposure_s=self.exposure.value,
+            sensor=Sensor(
+                exposure_ev=self.exposure_compensation.value,
+                full_well=None if self.full_well is None else self.full_well.value,
+                read_noise=self.read_noise.value,
+            ),
+            lens=Lens(**k) if any(k.values()) else None,
+            line_delay_s=self.line_delay.value,
+            motion_blur=self.motion_blur,
+        )
+        sensor_field(camera)
+        return camera

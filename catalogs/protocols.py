@@ -1,12 +1,10 @@
 """Evaluation protocols as data: windows, thresholds and selection rules with their sources."""
 
-from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from catalogs.entries import find_entry
-from catalogs.quantities import CatalogueEntry, Number, Scalar, Table, Text, read_entry, require_quantity
+from catalogs.quantities import CatalogueEntry, Number, Scalar, Table, Text, require_quantity
 from tasks.campaign.events import Protocol, Rule
 from tasks.campaign.selection import QUANTITIES
 
@@ -64,37 +62,28 @@ class ProtocolEntry(CatalogueEntry):
             raise ValueError("; ".join(problems))
         return self
 
+    def build(self) -> Protocol:
+        """The protocol itself."""
 
-def load_protocol(name_or_path: str | Path = "brake-dive") -> Protocol:
-    """Read a protocol by its name in the catalogue or from a YAML file.
+        def pair(window: Table) -> tuple[float, float]:
+            return window.value[0], window.value[1]
 
-    Raises
-    ------
-    InputError
-        Listing every problem of the file, or the protocols that exist.
-    """
-    path = find_entry("protocol", name_or_path)
-    entry = read_entry(ProtocolEntry, path, "protocol")
-
-    def pair(window: Table) -> tuple[float, float]:
-        return window.value[0], window.value[1]
-
-    return Protocol(
-        onset_pressure=entry.onset_pressure.value,
-        merge_gap=entry.merge_gap.value,
-        analysis=pair(entry.analysis_window),
-        baseline=pair(entry.baseline_window),
-        evaluation=pair(entry.evaluation_window),
-        quality=pair(entry.quality_window),
-        fixed_damping_ratio=entry.fixed_damping_ratio.value,
-        rules=tuple(
-            Rule(
-                name=rule.name,
-                criterion=rule.criterion,
-                limit=rule.at_least if rule.at_least is not None else rule.at_most or 0.0,
-                is_minimum=rule.at_least is not None,
-                paper_fails=rule.paper_fails,
-            )
-            for rule in entry.rules
-        ),
-    )
+        return Protocol(
+            onset_pressure=self.onset_pressure.value,
+            merge_gap=self.merge_gap.value,
+            analysis=pair(self.analysis_window),
+            baseline=pair(self.baseline_window),
+            evaluation=pair(self.evaluation_window),
+            quality=pair(self.quality_window),
+            fixed_damping_ratio=self.fixed_damping_ratio.value,
+            rules=tuple(
+                Rule(
+                    name=rule.name,
+                    criterion=rule.criterion,
+                    limit=rule.at_least if rule.at_least is not None else rule.at_most or 0.0,
+                    is_minimum=rule.at_least is not None,
+                    paper_fails=rule.paper_fails,
+                )
+                for rule in self.rules
+            ),
+        )

@@ -1,13 +1,11 @@
 """Protocols by which video editors are judged: tasks, prompts, models, and the figures printed of them."""
 
-from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from catalogs.entries import find_entry
 from catalogs.names import Name, WeatherName
-from catalogs.quantities import CatalogueEntry, Number, Scalar, Table, Text, read_entry, require_quantity
+from catalogs.quantities import CatalogueEntry, Number, Scalar, Table, Text, require_quantity
 
 Count = Annotated[Scalar, require_quantity("1", minimum=1)]
 Time = Annotated[Scalar, require_quantity("s", above=0)]
@@ -95,14 +93,3 @@ class VideoProtocol(CatalogueEntry):
     def printed_figures(self) -> dict[str, dict[str, PrintedFigure]]:
         """Printed figures by model and metric, without their source."""
         return {model: figures for model, figures in self.printed.items() if not isinstance(figures, str)}
-
-
-def load_video_protocol(name_or_path: str | Path = "paper") -> VideoProtocol:
-    """Read a protocol by its name in the catalogue or from a YAML file.
-
-    Raises
-    ------
-    InputError
-        Listing every problem of the file, or the protocols that exist.
-    """
-    return read_entry(VideoProtocol, find_entry("video protocol", name_or_path), "video protocol")

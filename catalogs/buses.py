@@ -1,12 +1,10 @@
 """Vehicle buses to emit: signals with rate, resolution and noise, and the drives that they carry."""
 
-from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field, field_validator, model_validator
 
-from catalogs.entries import find_entry
-from catalogs.quantities import CatalogueEntry, Scalar, Table, Text, read_entry, require_quantity
+from catalogs.quantities import CatalogueEntry, Scalar, Table, Text, require_quantity
 from tasks.campaign.channels import CHANNELS_BY_NAME, unit_factor
 from tasks.studies.brake_dive import DiveModel
 from tasks.studies.bus_drive import Bus, BusSignal, DriveStyle
@@ -77,38 +75,30 @@ class BusEntry(CatalogueEntry):
     events: EventsEntry
     signals: Annotated[tuple[SignalEntry, ...], Field(min_length=1)]
 
+    def build(self) -> Bus:
+        """The bus itself."""
+        events = self.events
 
-def load_bus(name_or_path: str | Path = "a2d2-like") -> Bus:
-    """Read a bus by its name in the catalogue or from a YAML file.
+        def pair(table: Table, factor: float = 1.0) -> tuple[float, float]:
+            return table.value[0] * factor, table.value[1] * factor
 
-    Raises
-    ------
-    InputError
-        Listing every problem of the file, or the buses that exist.
-    """
-    entry = read_entry(BusEntry, find_entry("bus", name_or_path), "bus")
-    events = entry.events
-
-    def pair(table: Table, factor: float = 1.0) -> tuple[float, float]:
-        return table.value[0] * factor, table.value[1] * factor
-
-    return Bus(
-        truth=DiveModel(
-            # the rollout makes its own pitch moment, so the car has no such gain
-            pitch_gain=1.0,
-            **{name: getattr(entry.truth, name).value for name in TruthEntry.model_fields},
-        ),
-        style=DriveStyle(
-            start_speed=pair(events.start_speed, unit_factor("km/h", "m/s")),
-            peak_pressure=pair(events.peak_pressure, unit_factor("bar", "MPa")),
-            ramp=pair(events.ramp),
-            hold=pair(events.hold),
-            release=pair(events.release),
-            curve_share=events.curve_share.value,
-            rough_share=events.rough_share.value,
-            dragging_share=events.dragging_share.value,
-            lift_share=events.lift_share.value,
-            slope=events.slope.value,
-        ),
-        signals=tuple(BusSignal(**signal.model_dump()) for signal in entry.signals),
-    )
+        return Bus(
+            truth=DiveModel(
+                # the rollout makes its own pitch moment, so the car has no such gain
+                pitch_gain=1.0,
+                **{name: getattr(self.truth, name).value for name in TruthEntry.model_fields},
+            ),
+            style=DriveStyle(
+                start_speed=pair(events.start_speed, unit_factor("km/h", "m/s")),
+                peak_pressure=pair(events.peak_pressure, unit_factor("bar", "MPa")),
+                ramp=pair(events.ramp),
+                hold=pair(events.hold),
+                release=pair(events.release),
+                curve_share=events.curve_share.value,
+                rough_share=events.rough_share.value,
+                dragging_share=events.dragging_share.value,
+                lift_share=events.lift_share.value,
+                slope=events.slope.value,
+            ),
+            signals=tuple(BusSignal(**signal.model_dump()) for signal in self.signals),
+        )

@@ -1,12 +1,10 @@
 """Studies of road features in a recording: which run, and where to look."""
 
-from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from catalogs.entries import find_entry
-from catalogs.quantities import CatalogueEntry, Number, Text, read_entry
+from catalogs.quantities import CatalogueEntry, Number, Text
 
 
 class BumpWindow(CatalogueEntry):
@@ -30,14 +28,3 @@ class BumpStudy(CatalogueEntry):
 
     run: Text
     windows: Annotated[tuple[BumpWindow, ...], Field(min_length=1)]
-
-
-def load_bump_study(name_or_path: str | Path) -> BumpStudy:
-    """Read a study by its name in the catalogue or from a YAML file.
-
-    Raises
-    ------
-    InputError
-        Listing every problem of the file, or the studies that exist.
-    """
-    return read_entry(BumpStudy, find_entry("bump study", name_or_path), "bump study")

@@ -1,12 +1,10 @@
 """Studies of one stop predicted from another: which runs, and what is added to the model in which order."""
 
-from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field, field_validator
 
-from catalogs.entries import find_entry
-from catalogs.quantities import CatalogueEntry, Scalar, Text, read_entry, require_quantity
+from catalogs.quantities import CatalogueEntry, Scalar, Text, require_quantity
 from tasks.studies.stop_study import Rung
 from tasks.vehicle.effects.table import PARAMETERS
 
@@ -68,14 +66,3 @@ class StopStudy(CatalogueEntry):
             )
             for rung in self.rungs
         )
-
-
-def load_stop_study(name_or_path: str | Path) -> StopStudy:
-    """Read a study by its name in the catalogue or from a YAML file.
-
-    Raises
-    ------
-    InputError
-        Listing every problem of the file, or the studies that exist.
-    """
-    return read_entry(StopStudy, find_entry("stop study", name_or_path), "stop study")

@@ -2,13 +2,11 @@
 
 from functools import cache
 from math import inf, radians
-from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from catalogs.entries import find_entry
-from catalogs.quantities import CatalogueEntry, Number, Scalar, Text, read_entry, require_quantity
+from catalogs.quantities import CatalogueEntry, Number, Scalar, Text, require_quantity
 from catalogs.vehicles import vehicle_units
 from tasks.identification.calibration.procedure import Bounds, Procedure, Stage
 from tasks.identification.calibration.residual import Phase, Response, Yardstick
@@ -104,39 +102,25 @@ class ProcedureEntry(CatalogueEntry):
             raise ValueError(f"every group of a stage needs bounds; {', '.join(missing)} has none")
         return self
 
-
-def load_procedure(name_or_path: str | Path) -> tuple[Procedure, float]:
-    """Read a procedure, and the spacing of the samples that count [s].
-
-    Parameters
-    ----------
-    name_or_path : name, or path ending in .yaml
-
-    Raises
-    ------
-    InputError
-        Listing every problem of the file.
-    """
-    entry = read_entry(
-        ProcedureEntry, find_entry("calibration procedure", name_or_path), "calibration procedure"
-    )
-    procedure = Procedure(
-        mode=entry.mode,
-        stages=tuple(Stage(**dict(stage)) for stage in entry.stages),
-        passes=int(entry.passes.value),
-        evaluations=int(entry.evaluations.value),
-        tolerance=entry.tolerance.value if entry.tolerance else None,
-        bounds={group: _convert_bounds(bounds) for group, bounds in entry.bounds.items()},
-        yardstick=Yardstick(
-            scales={name: scale.value for name, scale in entry.scales},
-            start_s=entry.start.value,
-            settle_s=entry.settle.value,
-            tail_speed=entry.tail_speed.value,
-            slip_speed=entry.slip_speed.value,
-            margin_s=entry.margin.value,
-        ),
-    )
-    return procedure, entry.interval.value
+    def build(self) -> tuple[Procedure, float]:
+        """Return the procedure, and the spacing of the samples that count [s]."""
+        procedure = Procedure(
+            mode=self.mode,
+            stages=tuple(Stage(**dict(stage)) for stage in self.stages),
+            passes=int(self.passes.value),
+            evaluations=int(self.evaluations.value),
+            tolerance=self.tolerance.value if self.tolerance else None,
+            bounds={group: _convert_bounds(bounds) for group, bounds in self.bounds.items()},
+            yardstick=Yardstick(
+                scales={name: scale.value for name, scale in self.scales},
+                start_s=self.start.value,
+                settle_s=self.settle.value,
+                tail_speed=self.tail_speed.value,
+                slip_speed=self.slip_speed.value,
+                margin_s=self.margin.value,
+            ),
+        )
+        return procedure, self.interval.value
 
 
 def _convert_bounds(entry: BoundsEntry) -> Bounds:
