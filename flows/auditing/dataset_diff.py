@@ -42,7 +42,7 @@ def compare_datasets(a: str, b: str, *, out: str | None = None) -> dict[str, Any
     InputError
         If a folder is no sealed dataset, or its inputs are missing.
     """
-    results = Outputs(out, "diff", "diff.json", "diff.txt")
+    results = Outputs(out, "lab diff", "diff.json", "diff.txt")
     old, new = open_for_reading(a), open_for_reading(b)
     before, after = read_manifest(old), read_manifest(new)
     why = find_input_differences(before, after, _read_inputs(old, before), _read_inputs(new, after))

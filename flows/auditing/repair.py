@@ -56,7 +56,7 @@ def repair_dataset(
         runner.
     """
     check_runner(runner, scheduler)
-    results = Outputs(out, "repair", "repair.json")
+    results = Outputs(out, "lab repair", "repair.json")
     with open_for_writing(dataset, want_everything) as layout:
         result = _repair_locked(layout, runner, workers, scheduler)
     results.write_json("repair.json", result)

@@ -78,7 +78,7 @@ def evaluate_dataset(
         raise InputError(
             "--metric speaks of the lengths in --trajectories, and there are none: give their folder too"
         )
-    results = Outputs(out, "evaluate", "evaluation.json", "evaluation.parquet", "evaluation.html")
+    results = Outputs(out, "lab evaluate", "evaluation.json", "evaluation.parquet", "evaluation.html")
     layout = open_for_reading(dataset)
     manifest, root = read_manifest(layout), layout.root
     require_frames(manifest, layout)

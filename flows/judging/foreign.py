@@ -39,7 +39,7 @@ def judge_video(
     InputError
         Every file that cannot be read, in one sentence each.
     """
-    results = Outputs(out, "judge", "judgement.json")
+    results = Outputs(out, "lab judge", "judgement.json")
     footage, told, lens = _read_all((read_footage, video), (read_claim, claim), (read_camera, camera))
     at = sample_claim(told, footage.times)
     recovered = footage.motion(lens, at.rows, metric=metric)
@@ -89,7 +89,7 @@ def measure_retention(
         For every file that cannot be read or is given twice, clips of different length, an event outside them, or a
         lost track.
     """
-    results = Outputs(out, "retention", "retention.json")
+    results = Outputs(out, "lab retention", "retention.json")
     names = (source, source_braking, edited, edited_braking)
     twice = [name for name in dict.fromkeys(names) if names.count(name) > 1]
     if twice:

@@ -68,7 +68,7 @@ def audit_physics(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     InputError
         If the folder is no finished dataset, or a table lacks columns.
     """
-    results = Outputs(out, "audit-physics", "physics.json")
+    results = Outputs(out, "lab audit-physics", "physics.json")
     root = open_for_reading(dataset, want_telemetry).root
     plan = Plan.of(read_plan_record(Layout(root)), Layout(root).plan)
     refuse_traced(plan.inputs, dataset, "lab audit-physics")

@@ -68,7 +68,7 @@ def replay_audit(
     """
     if seeds < 2 or frames < 2:
         raise InputError(f"seeds and frames must be at least 2; they are {seeds} and {frames}")
-    results = Outputs(out, "replay-audit", "replay.json")
+    results = Outputs(out, "lab replay-audit", "replay.json")
     checked, name = load("grid", grid), select_backend(backend).name
     runs: list[Replay] = []
     count = len(checked.scenarios)

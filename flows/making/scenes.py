@@ -135,7 +135,7 @@ def render_pose(scene: str, pose: str, out: str, *, backend: str = "auto") -> di
         "normal": gbuffer.normal,
         "class": gbuffer.class_id,
     }
-    results = Outputs(out, "render", "rgb.png", *(f"{name}.npy" for name in buffers))
+    results = Outputs(out, "scene render", "rgb.png", *(f"{name}.npy" for name in buffers))
     results.write("rgb.png", encode_png(picture))
     for name, buffer in buffers.items():
         content = BytesIO()

@@ -61,7 +61,7 @@ def calibrate_on_traces(
     if problem := find_name_problem(name):
         raise InputError(f"--name must {problem}")
     beside = tyre_beside(vehicle)
-    results = Outputs(out, "calibrate", f"{name}.yaml", "calibration.json", *beside)
+    results = Outputs(out, "vehicle calibrate", f"{name}.yaml", "calibration.json", *beside)
     start = load("vehicle", vehicle)
     steps, interval = load("calibration procedure", procedure)
     reference = read_reference(Path(traces), split=split)

@@ -52,7 +52,7 @@ def make_films(
     chosen = select_clips(rows, clips, dataset) if clips else rows
     refuse_changed_clips(layout, manifest, chosen, "frames")
     names = name_films(rows)
-    results = Outputs(out, "preview", *(names[row["clip_id"]] for row in chosen))
+    results = Outputs(out, "lab preview", *(names[row["clip_id"]] for row in chosen))
     films = []
     with progress_bar("films", len(chosen)) as advance:
         for row in chosen:

@@ -109,7 +109,7 @@ def make_report(dataset: str, *, out: str | None = None, clips: list[str] | None
 def _write_index(manifest: Mapping[str, Any], scripts: Sequence[str]) -> str:
     name = manifest["grid"]["name"]
     return fill_template(
-        "explorer.html", folder=PAGE, title=f"{name} – muSync report", heading=name, lead=[_summarise_run(manifest)],
+        "explorer.html", folder=PAGE, title=f"{name} – muSync report", heading=name, lead=[summarise_run(manifest)],
         above="", tone="", policy="", style=STYLE_SHEET.read_text(), scripts=scripts, filters=FILTERS,
         run=_list_manifest_facts(manifest),
     )  # fmt: skip
@@ -250,7 +250,13 @@ def _choose_folder(layout: Layout, out: str | None) -> Path:
     return folder
 
 
-def _summarise_run(manifest: Mapping[str, Any]) -> str:
+def summarise_run(manifest: Mapping[str, Any]) -> str:
+    """Return the first line of the page: clips, frames, scene, vehicle, and a warning where a coupling is cut.
+
+    Parameters
+    ----------
+    manifest : of the dataset
+    """
     grid = manifest["grid"]
     warning = warn_of_variant(recorded_grid(grid, "manifest").variant)
     return (

@@ -46,7 +46,7 @@ def draw_sheets(
         A folder holds no finished dataset with frames, the first one's grid has neither two weathers nor a road
         feature, another's has one weather only, no clip comes to the station, or what is shown is not as recorded.
     """
-    results = Outputs(out, "sheets", "weather.png", "hazards.png")
+    results = Outputs(out, "lab sheets", "weather.png", "hazards.png")
     (layout, manifest), *others = _open_finished([dataset, *(beside or ())])
     clips = manifest["clips"]
     features = pick_evenly([clip for clip in clips if clip["scenario"]["hazard_height_m"]], PREVIEW_CLIPS)

@@ -39,7 +39,7 @@ STOP_FIGURES = ("braking_time_error_s", "slip_distance_error_m")
 
 def run_sensitivity(*, out: str | None = None) -> dict[str, Any]:
     """The paper's Appendix E: envelopes and rank correlations, beside the printed figures."""
-    results = Outputs(out, "sensitivity", "sensitivity.json", "sensitivity.svg", "sensitivity.html")
+    results = Outputs(out, "lab sensitivity", "sensitivity.json", "sensitivity.svg", "sensitivity.html")
     protocol, printed = load("sensitivity study")
     vehicle, surface = load("vehicle", "paper-reference"), load("surface", "dense-asphalt")
     started = time.process_time()
@@ -83,7 +83,7 @@ def measure_agreement(
     """
     reference = read_reference(Path(traces))
     files = (f"{case.case}.svg" for case, _ in reference)
-    results = Outputs(out, "agreement", "agreement.json", "agreement.html", *files)
+    results = Outputs(out, "vehicle agreement", "agreement.json", "agreement.html", *files)
     file = open_vehicle(vehicle)
     model, provenance = file.build(), file.provenance
     chosen: Mode = mode or (provenance.mode if provenance else "paper")
@@ -204,7 +204,7 @@ def run_benchmarks(name: str | None = None, *, out: str | None = None) -> dict[s
     """
     if name is not None and name not in BENCHMARKS:
         raise InputError(f"bench {name}: no such benchmark; there are: {', '.join(BENCHMARKS)}")
-    results = Outputs(out, "bench", "bench.json")
+    results = Outputs(out, "lab bench", "bench.json")
     rows = [
         row
         for chosen in ([name] if name else BENCHMARKS)

@@ -65,7 +65,7 @@ def test_mf61_agrees_with_mfeval_in_combined_slip_camber_and_pressure(
 
 
 @pytest.mark.parametrize(
-    ("load", "slip", "angle", "camber", "fx", "fy"),
+    ("wheel_load", "slip", "angle", "camber", "fx", "fy"),
     [
         (6672.012988521558, -0.003474120845512968, -0.1308848743268327, 0.0, -340.18069636995875, 5991.585287879309),
         (6001.484634631965, 0.0, 0.0, 0.08263053012883335, 220.68668609516195, -594.6294246600282),
@@ -75,10 +75,14 @@ def test_mf61_agrees_with_mfeval_in_combined_slip_camber_and_pressure(
          -24.83236207040457, -1259.2901660456994),
     ],
 )  # fmt: skip
-def test_mf52_agrees_with_mfeval_under_camber_and_a_scaled_nominal_load(load, slip, angle, camber, fx, fy):
+def test_mf52_agrees_with_mfeval_under_camber_and_a_scaled_nominal_load(
+    wheel_load, slip, angle, camber, fx, fy
+):
     """MFeval.jl, useMode 221, by the fixtures of github.com/robertscholz22/autonomousim (commit a14080a)."""
     tyre = load("tyre", FILES / "mf52-chrono-sedan.tir")
-    np.testing.assert_allclose(compute_tyre_forces(slip, angle, camber, load, tyre), (fx, fy), rtol=1e-8)
+    np.testing.assert_allclose(
+        compute_tyre_forces(slip, angle, camber, wheel_load, tyre), (fx, fy), rtol=1e-8
+    )
 
 
 @pytest.mark.parametrize(

@@ -26,7 +26,7 @@ from flows.making.plan import freeze_grid, read_plan
 from flows.making.replay import replay_audit
 from flows.making.summaries import SUMMARIES
 from flows.reading.describe import describe_dataset, validate_grid
-from flows.reading.report import page_data
+from flows.reading.report import summarise_run
 from flows.store.frames import read_clip
 from flows.store.sealed import read_manifest
 from manifests.explain import find_input_differences
@@ -217,7 +217,7 @@ def test_everything_that_shows_a_cut_dataset_says_so(made, variant, tmp_path):
     assert manifest["grid"]["variant"] == variant
     assert set(pq.read_table(layout.telemetry / "clips.parquet")["variant"].to_pylist()) == {variant}
     assert words in describe_dataset(str(layout.root))["warning"]
-    assert words in page_data(manifest, set(), False)["summary"]
+    assert words in summarise_run(manifest)
     assert words in audit_physics(str(layout.root))["warning"]
     labels = [clip["label"] for clip in manifest["clips"]]
     for to, file in (("croissant", "croissant.json"), ("ro-crate", "ro-crate-metadata.json")):

@@ -120,5 +120,5 @@ def test_a_file_that_is_no_parquet_is_one_sentence(copy, content):
         lambda: data.telemetry("frames"),
         lambda: data.torch(window=4, quarantined=True),
     ):
-        with pytest.raises(InputError, match=r"musync (verify|repair)"):
+        with pytest.raises(InputError, match=r"musync (verify|lab repair)"):
             reader()
