@@ -29,6 +29,7 @@ const STYLE = {
   margin: { l: 56, r: 12, t: 26, b: 40 }, showlegend: false,
   paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { family: "system-ui, sans-serif", size: 11, color: "--soft" },
   hoverlabel: { bgcolor: "--card", bordercolor: "--line", font: { color: "--ink" } },
+  modebar: { bgcolor: "rgba(0,0,0,0)", color: "--soft", activecolor: "--ink" },
   template: { layout: {
     annotationdefaults: { font: { size: 12, color: "--ink" } },
     xaxis: { gridcolor: "--line", zeroline: false, title: { standoff: 5 }, hoverformat: ".2f" },
