@@ -69,6 +69,8 @@ def settle_told(
 ) -> tuple[list[OpenExplanation], Fit]:
     """Return the open explanations and the fit of the first, whose members are surely large when fitted alone too.
 
+    No form is told whose every coefficient has an interval that holds 0, the file's value.
+
     Parameters
     ----------
     finding : the runs and what was fitted to them
@@ -81,7 +83,11 @@ def settle_told(
         fitted = refine_fit(finding, fit_told(finding, first))
         large = []
         for member in first.told:
-            if member.effect is not None:
+            if member.effect is None:
+                _, coefficients = _list_parameters(member, first.explanation, fitted)
+                if all(number.ci_low <= 0.0 <= number.ci_high for number in coefficients):
+                    continue
+            else:
                 value, error = _find_first_number(member, member.effect, first.explanation, fitted)
                 if abs(value) - reach * error <= member.matters:
                     continue
