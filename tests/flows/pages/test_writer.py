@@ -164,8 +164,11 @@ def test_figures_are_drawn_for_the_screen_and_the_keys_and_keep_nobody_out(tmp_p
         assert set(shown) == {"one"}, "a line is hidden in all figures"
         page.set_viewport_size({"width": 1200, "height": 800})
         # asked again and again from here: the page's policy lets no text of the browser's own waiting be evaluated
-        while plot.evaluate("p => p.layout.grid.columns") != 2:
+        for _ in range(200):
+            if plot.evaluate("p => p.layout.grid.columns") == 2:
+                break
             page.wait_for_timeout(20)
+        assert plot.evaluate("p => p.layout.grid.columns") == 2
         assert find_barriers(browser, tmp_path / "page.html") == []
     assert [word for word in heard if not word.startswith(("file:", "data:"))] == []
 
