@@ -90,15 +90,23 @@ def check_joining(client: Any, address: str) -> Iterator[None]:
     address : of its scheduler
     """
     check = JoiningCheck(facts_here())
-    client.subscribe_topic(
-        TURNED_AWAY, lambda event: print_lines(f"--scheduler {address}: {event[1]}", error=True)
-    )
+    told = set(client.get_events(TURNED_AWAY))
+
+    def tell(event: tuple[float, str]) -> None:
+        if event not in told:
+            told.add(event)
+            print_lines(f"--scheduler {address}: {event[1]}", error=True)
+
+    client.subscribe_topic(TURNED_AWAY, tell)
     client.register_plugin(check)
     try:
         yield
     finally:
         client.unregister_worker_plugin(check.name)
         client.unsubscribe_topic(TURNED_AWAY)
+        # the scheduler keeps what it could not deliver in time
+        for event in client.get_events(TURNED_AWAY):
+            tell(event)
 
 
 class JoiningCheck(WorkerPlugin):
@@ -115,14 +123,13 @@ class JoiningCheck(WorkerPlugin):
         self.here = here
 
     async def setup(self, worker: Any) -> None:
-        """Hold the worker's facts against the driver's; Dask reads the worker's messages when this has returned."""
+        """Hold the worker's facts against the driver's, and have the scheduler tell of each difference."""
         problems = find_version_problems(self.here, {worker.address: facts_here()})
-        for problem in problems:
-            worker.log_event(TURNED_AWAY, f"{problem}; it was turned away")
-            # the event goes in a batch of its own time: a worker that is gone sends none
-            await asyncio.sleep(0.5)
         if problems:
             worker.status = Status.closing_gracefully  # begins nothing from here on
+            for problem in problems:
+                # a call with an answer: what a worker sends on the side is lost where it closes
+                await worker.scheduler.log_event(topic=TURNED_AWAY, msg=f"{problem}; it was turned away")
             await worker.scheduler.retire_workers(workers=[worker.address], close_workers=False, remove=True)
             # not from here: a worker that closes while it registers stays half open
             worker.loop.add_callback(worker.close, reason="it is not set up like the driver")
