@@ -7,14 +7,13 @@ import pytest
 from scipy.integrate import dblquad
 from scipy.stats import multivariate_normal
 
+from tasks.identification.decision.agreement import is_one_size
+from tasks.identification.decision.comparison import compare_explanations, temper_odds
 from tasks.identification.decision.odds import (
     RunGrams,
     can_stand_for,
-    compare_explanations,
     estimate_spread,
-    is_one_size,
     search_explanations,
-    temper_odds,
     weigh_explanation,
 )
 from tests.identification.explained import effect_of, form_of, grams_of

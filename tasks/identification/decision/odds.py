@@ -9,7 +9,6 @@ variance is that of DerSimonian and Laird (1986, doi:10.1016/0197-2456(86)90046-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import copysign, inf, log, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,10 +31,6 @@ SAME_VARIABLE = {"speed": "wheel_speed", "wheel_speed": "speed"}
 """Variables that differ by the slip of the tyres alone."""
 FEWEST = 3
 """Runs that must inform a direction for their scatter to say something [1]."""
-TOLD = 0.5
-"""Square of the smallest size that matters, over its variance by one run, from which the run tells a number [1]."""
-SURE = 3.0
-"""Standard errors by which a scatter of the runs is more than noise [1]."""
 INFORMED = 1e-6
 """Share of the best informed run's information from which a run informs a direction [1]."""
 
@@ -247,102 +242,6 @@ def can_stand_for(form: Candidate, known: Candidate) -> bool:
     return at_port and known.variable in (form.variable, "constant", SAME_VARIABLE.get(form.variable))
 
 
-def compare_explanations(
-    grams: RunGrams, one: Explanation, other: Explanation, signature_error: float
-) -> float:
-    """Return the logarithm of the odds of one explanation against another [1].
-
-    What the runs disagree about on the line from one to the other counts as a random effect there: two explanations
-    that half of the runs decide either way are not told apart, however much each run gains. The run that speaks most
-    for the better one does not count. No model has the signature of an effect exactly as the car does; what its
-    relative error leaves over is no evidence (model discrepancy, Kennedy and O'Hagan 2001,
-    doi:10.1111/1467-9868.00294).
-
-    Parameters
-    ----------
-    grams : of the runs
-    one, other : the explanations
-    signature_error : relative error of the signature of an effect [1]
-    """
-    used = np.flatnonzero((one.everything != 0.0) | (other.everything != 0.0))
-    information = grams.information[:, used[:, None], used[None, :]]
-    along = (other.everything - one.everything)[used]
-    left = grams.score[:, used] - information @ (one.everything - grams.centre)[used]
-    size, pull = np.einsum("i,rij,j->r", along, information, along), left @ along
-    plain = float(np.sum(0.5 * size - pull))
-    spread = estimate_spread(size, pull)
-    informed = size > 0.0
-    weight = np.zeros(len(size))
-    weight[informed] = 1.0 / (1.0 / size[informed] + spread)
-    place = np.divide(pull, size, out=np.zeros(len(size)), where=informed)
-    by_run = weight * (0.5 - place)
-    total = float(by_run.sum())
-    if len(by_run) >= FEWEST and total:
-        # no comparison hangs on one run
-        side = float(np.sign(total))
-        total = side * max(abs(total) - max(float((side * by_run).max()), 0.0), 0.0)
-    prior = sum(m.log_prior for m in one.members) - sum(m.log_prior for m in other.members)
-    whole = one.gain - other.gain + prior
-    odds = whole - plain + total
-    if odds * whole <= 0.0:
-        # of two that the runs do not tell apart neither is the better for its fewer numbers
-        return 0.0
-    return temper_odds(odds, max(one.gain, other.gain), find_shared_gain(grams, one, other), signature_error)
-
-
-def find_shared_gain(grams: RunGrams, one: Explanation, other: Explanation) -> float:
-    """Return what the members that two explanations share gain alone [1].
-
-    Parameters
-    ----------
-    grams : of the runs
-    one, other : the explanations
-    """
-    shared = weigh_explanation(grams, [m for m in one.members if m in other.members], spread=False)
-    return 0.0 if shared is None else shared.gain
-
-
-def temper_odds(log_odds: float, gain: float, shared: float, signature_error: float) -> float:
-    """Return the logarithm of odds without what errors of the signatures alone may make [1].
-
-    What the error of a shared signature leaves over either explanation may take up. That of their own signatures moves
-    the car along the line between them, and the odds are those of two normal distributions with that variance too.
-
-    Parameters
-    ----------
-    log_odds : by the runs' noise alone [1]
-    gain : rise of the log likelihood by the better explanation [1]
-    shared : by the members that both have [1]
-    signature_error : relative error of a signature in a model of the car [1]
-    """
-    square = signature_error**2
-    left = max(abs(log_odds) - square * max(shared, 0.0), 0.0)
-    return copysign(left / (1.0 + square * max(gain - max(shared, 0.0), 0.0)), log_odds)
-
-
-def is_one_size(grams: RunGrams, explanation: Explanation, member: Candidate, scatter: float) -> bool:
-    """Return whether a member has one size in all runs, but for a scatter and for noise (Cochran's Q at three sigma).
-
-    Parameters
-    ----------
-    grams : of the runs
-    explanation : that it belongs to
-    member : one of its members
-    scatter : standard deviation from run to run that the signature of an effect may have, over its size [1]
-    """
-    used = np.flatnonzero(explanation.everything != 0.0)
-    own = np.array(member.columns)
-    along = explanation.everything[own]
-    information = along @ grams.information[:, own[:, None], used]
-    size = grams.information[:, own[:, None], own] @ along @ along
-    pull = grams.score[:, own] @ along - information @ (explanation.everything - grams.centre)[used]
-    informed = size > INFORMED * max(float(size.max()), 1e-300)
-    weight, place = 1.0 / (1.0 / size[informed] + scatter**2), pull[informed] / size[informed]
-    left = place - float(weight @ place) / float(weight.sum())
-    freedom = len(left) - 1
-    return freedom < FEWEST - 1 or float(weight @ left**2) <= freedom + SURE * sqrt(2.0 * freedom)
-
-
 def keep_members(explanation: Explanation, members: Sequence[Candidate]) -> Explanation:
     """Return an explanation with some of its members alone, at the same values.
 
@@ -383,42 +282,6 @@ def estimate_spread(size: NDArray[np.float64], pull: NDArray[np.float64]) -> flo
     heterogeneity = float(weight @ (own - mean) ** 2)
     scale = sum_of_weights - float(weight @ weight) / sum_of_weights
     return max(0.0, (heterogeneity - (len(own) - 1)) / scale) if scale > 0.0 else 0.0
-
-
-def measure_disagreement(grams: RunGrams, explanation: Explanation) -> float:
-    """Return by how much the runs disagree with the model, whatever the explanation names [1].
-
-    Under a correct model the score of a run in the direction of any number is standard normal (Cochran 1954,
-    doi:10.2307/3001666). Returned is the median over the numbers of the table of its mean square over runs; 1 is noise.
-
-    Parameters
-    ----------
-    grams : of the runs
-    explanation : whose residual is taken
-    """
-    numbers = grams.columns.base[: -len(explanation.session)]
-    size = np.einsum("rii->ri", grams.information)[:, numbers]
-    used = np.flatnonzero(explanation.everything != 0.0)
-    moved = (explanation.everything - grams.centre)[used]
-    left = grams.score[:, numbers] - grams.information[:, numbers[:, None], used[None, :]] @ moved
-    matters = np.array(
-        [next(c.matters for c in grams.columns.candidates if c.columns == (n,)) for n in numbers]
-    )
-    told = size * matters**2 > TOLD
-    square = np.where(told, left**2 / np.maximum(size, 1e-300), 0.0).sum(axis=0)
-    count = told.sum(axis=0)
-    enough = count > FEWEST
-    return float(np.median(square[enough] / count[enough])) if enough.any() else 1.0
-
-
-def find_odds(log_odds: float) -> float:
-    """Return odds from their logarithm, without overflow [1].
-
-    Parameters
-    ----------
-    log_odds : logarithm of the odds [1]
-    """
-    return float(np.exp(min(log_odds, log(1e12)))) if log_odds > -inf else 0.0
 
 
 def _arrange(grams: RunGrams, members: Sequence[Candidate]) -> _Prior:

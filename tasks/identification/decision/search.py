@@ -15,6 +15,7 @@ from tasks.identification.decision.candidates import (
     tell_curve,
     tell_limit,
 )
+from tasks.identification.decision.comparison import compare_explanations
 from tasks.identification.decision.forms import (
     KNOTS,
     RIDGE,
@@ -27,7 +28,6 @@ from tasks.identification.decision.odds import (
     FEWEST,
     Explanation,
     RunGrams,
-    compare_explanations,
     keep_members,
     search_explanations,
 )

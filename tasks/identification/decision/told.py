@@ -7,17 +7,10 @@ from math import inf, log
 import numpy as np
 from scipy.special import ndtri
 
+from tasks.identification.decision.agreement import is_one_size
 from tasks.identification.decision.candidates import Candidate
-from tasks.identification.decision.odds import (
-    Explanation,
-    RunGrams,
-    can_stand_for,
-    compare_explanations,
-    find_shared_gain,
-    is_one_size,
-    temper_odds,
-    weigh_explanation,
-)
+from tasks.identification.decision.comparison import compare_explanations, find_shared_gain, temper_odds
+from tasks.identification.decision.odds import Explanation, RunGrams, can_stand_for, weigh_explanation
 from tasks.identification.rules import DecisionRules
 
 SIGNATURES = 2.0

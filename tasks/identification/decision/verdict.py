@@ -7,7 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.campaign import CHANNELS, FILE_NUMBERS, Campaign
+from tasks.identification.decision.agreement import measure_disagreement
 from tasks.identification.decision.answer import NamedEffect, OpenOdds, Verdict, find_kind
+from tasks.identification.decision.comparison import find_odds
 from tasks.identification.decision.correlation import correlate_residual_with_pressure
 from tasks.identification.decision.experiment import Experiment, plan_next_experiment
 from tasks.identification.decision.held_out import compute_held_out_errors
@@ -20,7 +22,6 @@ from tasks.identification.decision.naming import (
     name_members,
     settle_told,
 )
-from tasks.identification.decision.odds import find_odds, measure_disagreement
 from tasks.identification.decision.search import Finding, find_explanations
 from tasks.identification.decision.told import OpenExplanation, list_open_explanations, tell_members
 from tasks.identification.decision.words import (

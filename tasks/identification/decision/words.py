@@ -5,8 +5,9 @@ from math import log
 
 from tasks.identification.decision.answer import ChannelError, NamedEffect, OpenOdds, Verdict
 from tasks.identification.decision.candidates import Candidate
+from tasks.identification.decision.comparison import find_odds
 from tasks.identification.decision.held_out import is_lowered
-from tasks.identification.decision.odds import ALONG_ROAD, PORT_OF_NUMBER, Explanation, find_odds
+from tasks.identification.decision.odds import ALONG_ROAD, PORT_OF_NUMBER, Explanation
 from tasks.identification.decision.told import OpenExplanation
 from tasks.identification.inference.hypothesis import moves_speed
 from tasks.identification.rules import DecisionRules
