@@ -70,13 +70,13 @@ class RunProgress:
         if failed and not edge:
             return
         self._told = time.monotonic()
-        with _worth_less_than_the_run():
+        with _go_on_without_artifact():
             self._show(100.0 * done / total if total else 100.0, line)
 
     def show_pieces(self) -> None:
         """Write the table of the pieces of work, the last of them, that no table shows yet."""
         if self._pieces:
-            with _worth_less_than_the_run():
+            with _go_on_without_artifact():
                 key = PIECES.format("".join(c if c.isalnum() else "-" for c in self._title.lower()))
                 create_table_artifact(list(self._pieces), key=key, description=self._title)
             self._pieces.clear()
@@ -90,7 +90,7 @@ class RunProgress:
 
 
 @contextmanager
-def _worth_less_than_the_run() -> Iterator[None]:
+def _go_on_without_artifact() -> Iterator[None]:
     """Go on where Prefect takes no artifact: the run is worth more than its picture."""
     try:
         yield
