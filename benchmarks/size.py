@@ -9,7 +9,7 @@ other than -2, -1, 0, 1 and 2, a tuple of numbers or arithmetic of them.
 import ast
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -31,9 +31,9 @@ def list_sentences(text: str) -> Iterator[str]:
         yield from (line for line in SENTENCE_END.split(part) if len(line.split()) >= 4)
 
 
-def measure_documents() -> tuple[int, float]:
-    """Return the documents' words and the share of their sentences that are long [1]."""
-    texts = [path.read_text(encoding="utf-8") for path in DOCUMENTS]
+def measure_documents(documents: Iterable[Path] = DOCUMENTS) -> tuple[int, float]:
+    """Return the words of Markdown files and the share of their sentences that are long [1]."""
+    texts = [path.read_text(encoding="utf-8") for path in documents]
     lengths = [len(sentence.split()) for text in texts for sentence in list_sentences(text)]
     words = sum(any(map(str.isalnum, word)) for text in texts for word in text.split())
     return words, sum(n > LONG for n in lengths) / len(lengths)

@@ -4,7 +4,7 @@ import ast
 
 import pytest
 
-from benchmarks.size import count_constants, list_imports, list_sentences
+from benchmarks.size import count_constants, list_imports, list_sentences, measure_documents
 
 
 @pytest.mark.parametrize(
@@ -21,6 +21,12 @@ from benchmarks.size import count_constants, list_imports, list_sentences
 )
 def test_sentences_are_those_of_the_prose(text, lengths):
     assert [len(sentence.split()) for sentence in list_sentences(text)] == lengths
+
+
+def test_a_sentence_of_more_than_thirty_words_is_long_and_bars_of_tables_are_no_words(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text(f"{'Word ' * 29}end. {'Word ' * 30}end.\n\n| one | two |\n| --- | --- |\n")
+    assert measure_documents([page]) == (30 + 31 + 2, 0.5)
 
 
 def test_a_module_is_imported_by_name_or_from_its_package():
