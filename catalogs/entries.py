@@ -40,8 +40,6 @@ class Kind:
 
 KINDS = {
     "ablation": Kind("studies/ablation.yaml", "studies.ablation:AblationEntry"),
-    "bump study": Kind("bump_studies", "bump_studies:BumpStudy"),
-    "bus": Kind("buses", "buses:BusEntry"),
     "calibrated range": Kind("calibrated_range.yaml", "calibrated_range:CalibratedRange"),
     "calibration procedure": Kind("calibration", "calibration:ProcedureEntry"),
     "camera": Kind("cameras", "cameras:CameraEntry"),
@@ -54,9 +52,7 @@ KINDS = {
     "grid": Kind("grids", "grids:build_grid"),
     "hazard marking": Kind("hazard_markings", "hazard_markings:MarkingEntry"),
     "low-speed rule": Kind("low_speed.yaml", "low_speed:LowSpeedEntry"),
-    "protocol": Kind("protocols", "protocols:ProtocolEntry"),
     "sensitivity study": Kind("studies/surface-sensitivity.yaml", "studies:SensitivityEntry"),
-    "stop study": Kind("stop_studies", "stop_studies:StopStudy"),
     "surface": Kind("surfaces", "surfaces:SurfaceEntry"),
     "table of physical limits": Kind("physical_limits.yaml", "physical_limits:PhysicalLimits"),
     "table of plausible figures": Kind("plausible_vehicle.yaml", "plausible_vehicle:PlausibleVehicle"),

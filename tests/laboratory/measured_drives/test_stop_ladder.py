@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from catalogs.entries import load
+from studies.measured_drives.events import RecordedRun
+from studies.measured_drives.plans import load_plan
+from studies.measured_drives.stop import Stop, stop_errors, stop_of, stopping_distance
+from studies.measured_drives.stop_findings import measure_rebound, measure_saturation, slip_cycles
+from studies.measured_drives.stop_ladder import Rung, _model, compute_uncalibrated_errors, fit_ladder
+from studies.measured_drives.stop_swing import Swing, fit_swing, swing_acceleration, with_swing
 from tasks.campaign.campaign import CHANNELS
-from tasks.campaign.events import RecordedRun
 from tasks.identification.inference.forward import predict_channels
-from tasks.studies.stop import Stop, stop_errors, stop_of, stopping_distance
-from tasks.studies.stop_findings import measure_rebound, measure_saturation, slip_cycles
-from tasks.studies.stop_study import Rung, _model, compute_uncalibrated_errors, fit_ladder
-from tasks.studies.stop_swing import Swing, fit_swing, swing_acceleration, with_swing
 from tasks.vehicle.effects.table import build_parameter_vector
 
 VEHICLE, SURFACE = load("vehicle", "paper-reference"), load("surface", "dense-asphalt")
@@ -189,5 +190,5 @@ def test_the_rebound_is_measured_about_the_pitch_at_rest() -> None:
 
 
 def test_every_study_that_ships_can_be_read() -> None:
-    study = load("stop study", "bmw-m8")
+    study = load_plan("stop study", "bmw-m8")
     assert study.train != study.held_out and len(study.ladder) == 6

@@ -8,8 +8,8 @@ import pandas as pd
 import pytest
 import yaml
 
-from flows.measured.bump_study import bump_study
 from flows.measured.importing import import_measurements
+from studies.measured_drives.bump_study import bump_study
 from tasks.errors import InputError
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tasks.studies.sensor_agreement import measure_sensor_agreement
+from studies.measured_drives.sensor_agreement import measure_sensor_agreement
 
 
 @pytest.mark.parametrize("seconds", [4.0, 5.9, 6.1, 20.0])

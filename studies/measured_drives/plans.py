@@ -1,12 +1,41 @@
-"""Studies of one stop predicted from another: which runs, and what is added to the model in which order."""
+"""Plans of the studies, as YAML files: protocols, buses, and which runs and windows a stop or bump study takes."""
 
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
-from catalogs.quantities import CatalogueEntry, Scalar, Text, require_quantity
-from tasks.studies.stop_study import Rung
+from catalogs.documents import LARGEST_YAML, read_content
+from catalogs.quantities import CatalogueEntry, Number, Scalar, Text, parse_entry, require_quantity
+from studies.measured_drives.bus_file import BusEntry
+from studies.measured_drives.protocol_file import ProtocolEntry
+from studies.measured_drives.stop_ladder import Rung
 from tasks.vehicle.effects.table import PARAMETERS
+
+FOLDER = Path(__file__).parent
+
+
+class BumpWindow(CatalogueEntry):
+    """A stretch of the run with one road feature [s]."""
+
+    name: Text
+    from_s: Number
+    to_s: Number
+
+    @model_validator(mode="after")
+    def _is_an_interval(self) -> "BumpWindow":
+        if self.from_s + 1.0 > self.to_s:
+            raise ValueError(
+                f"window {self.name} must last 1 s or more; it goes from {self.from_s:g} to {self.to_s:g}"
+            )
+        return self
+
+
+class BumpStudy(CatalogueEntry):
+    """Content of a study file; the first window calibrates the car."""
+
+    run: Text
+    windows: Annotated[tuple[BumpWindow, ...], Field(min_length=1)]
 
 
 class RungEntry(CatalogueEntry):
@@ -66,3 +95,30 @@ class StopStudy(CatalogueEntry):
             )
             for rung in self.rungs
         )
+
+
+PLANS: dict[str, type[CatalogueEntry]] = {
+    "bump study": BumpStudy,
+    "bus": BusEntry,
+    "protocol": ProtocolEntry,
+    "stop study": StopStudy,
+}
+
+
+def load_plan(kind: str, name_or_path: str | Path) -> Any:
+    """Return a plan by the name of a file in this folder, or by its own file.
+
+    Parameters
+    ----------
+    kind : of `PLANS`
+    name_or_path : of the file
+
+    Raises
+    ------
+    InputError
+        Listing every problem of the file.
+    """
+    path = Path(name_or_path)
+    if path.suffix != ".yaml":
+        path = FOLDER / f"{name_or_path}.yaml"
+    return parse_entry(PLANS[kind], read_content(path, kind, LARGEST_YAML), path, kind).build()

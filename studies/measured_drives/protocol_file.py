@@ -5,8 +5,8 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from catalogs.quantities import CatalogueEntry, Number, Scalar, Table, Text, require_quantity
-from tasks.campaign.events import Protocol, Rule
-from tasks.campaign.selection import QUANTITIES
+from studies.measured_drives.events import Protocol, Rule
+from studies.measured_drives.selection import QUANTITIES
 
 Window = Annotated[Table, require_quantity("s")]
 Count = Annotated[Scalar, require_quantity("1", minimum=0)]

@@ -5,13 +5,14 @@ from typing import Any
 
 import numpy as np
 
-from catalogs.drives import read_drives
 from catalogs.entries import load
 from flows.store.outputs import Outputs
+from studies.measured_drives.brake_dive import pitch_mode
+from studies.measured_drives.drives import read_drives
+from studies.measured_drives.plans import load_plan
+from studies.measured_drives.road_bump import fit_feature, fit_feature_and_car, passage_of
+from studies.measured_drives.sensor_agreement import measure_sensor_agreement
 from tasks.errors import InputError
-from tasks.studies.brake_dive import pitch_mode
-from tasks.studies.road_bump import fit_feature, fit_feature_and_car, passage_of
-from tasks.studies.sensor_agreement import measure_sensor_agreement
 
 NEEDED = ("speed", "pitch", "pitch_rate", "vertical_acceleration", "longitudinal_acceleration")
 
@@ -38,8 +39,8 @@ def bump_study(
     InputError
         If the run or a channel is missing, or a window lies outside the run.
     """
-    results = Outputs(out, "lab bump-study", "bump_study.json")
-    plan = load("bump study", study)
+    results = Outputs(out, "bump-study", "bump_study.json")
+    plan = load_plan("bump study", study)
     recorded = read_drives(campaign, needed=NEEDED)
     drive = next((drive for drive in recorded.drives if drive.name == plan.run), None)
     if drive is None:

@@ -5,9 +5,9 @@ from typing import Annotated
 from pydantic import Field, field_validator, model_validator
 
 from catalogs.quantities import CatalogueEntry, Scalar, Table, Text, require_quantity
+from studies.measured_drives.brake_dive import DiveModel
+from studies.measured_drives.bus_drive import Bus, BusSignal, DriveStyle
 from tasks.campaign.channels import CHANNELS_BY_NAME, unit_factor
-from tasks.studies.brake_dive import DiveModel
-from tasks.studies.bus_drive import Bus, BusSignal, DriveStyle
 
 Positive = Annotated[float, Field(strict=True, gt=0)]
 Share = Annotated[Scalar, require_quantity("1", minimum=0, maximum=1)]

@@ -7,11 +7,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from studies.measured_drives.brake_dive import DiveModel, dive_of_deceleration, pitch_mode, with_model
+from studies.measured_drives.stop import (
+    MASKED_SPEED,
+    REBOUND_S,
+    Stop,
+    StopErrors,
+    rolling_radius,
+    stop_errors,
+)
+from studies.measured_drives.stop_swing import Swing, fit_swing, with_swing
 from tasks.campaign.campaign import CHANNELS, Run
 from tasks.identification.inference.forward import RunModel, predict_channels, prepare_run
-from tasks.studies.brake_dive import DiveModel, dive_of_deceleration, pitch_mode, with_model
-from tasks.studies.stop import MASKED_SPEED, REBOUND_S, Stop, StopErrors, rolling_radius, stop_errors
-from tasks.studies.stop_swing import Swing, fit_swing, with_swing
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.table import build_parameter_vector
 from tasks.vehicle.parameters import Vehicle

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from catalogs.entries import load
-from tasks.studies.brake_dive import pitch_mode
-from tasks.studies.road_bump import (
+from studies.measured_drives.brake_dive import pitch_mode
+from studies.measured_drives.plans import load_plan
+from studies.measured_drives.road_bump import (
     Passage,
     fit_feature,
     fit_feature_and_car,
@@ -13,7 +14,7 @@ from tasks.studies.road_bump import (
     ride_over,
     with_factors,
 )
-from tasks.studies.sensor_agreement import measure_sensor_agreement
+from studies.measured_drives.sensor_agreement import measure_sensor_agreement
 from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
 from tasks.vehicle.parameters import Vehicle
 
@@ -112,4 +113,4 @@ def test_angle_and_rate_of_one_motion_agree_and_a_scale_is_seen() -> None:
 
 
 def test_the_study_that_ships_can_be_read() -> None:
-    assert [window.name for window in load("bump study", "comma2k19").windows][-1] == "rough patch"
+    assert [window.name for window in load_plan("bump study", "comma2k19").windows][-1] == "rough patch"

@@ -6,7 +6,7 @@ from math import isnan, nan
 
 import numpy as np
 
-from tasks.campaign.events import Event, Protocol, RecordedRun, Rule, Window, find_events
+from studies.measured_drives.events import Event, Protocol, RecordedRun, Rule, Window, find_events
 
 
 @dataclass(frozen=True, kw_only=True)

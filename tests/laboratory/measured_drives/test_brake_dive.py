@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from catalogs.entries import load
-from tasks.campaign.events import Event, RecordedRun
-from tasks.campaign.selection import select_events
-from tasks.studies.brake_dive import (
+from studies.measured_drives.brake_dive import (
     DiveModel,
     dive_of_deceleration,
     fit_pitch,
@@ -16,13 +14,16 @@ from tasks.studies.brake_dive import (
     predict_event,
     with_model,
 )
-from tasks.studies.bus_drive import drive_motion
-from tasks.studies.leave_one_out import leave_one_drive_out, macro_mean, score_of
+from studies.measured_drives.bus_drive import drive_motion
+from studies.measured_drives.events import Event, RecordedRun
+from studies.measured_drives.leave_one_out import leave_one_drive_out, macro_mean, score_of
+from studies.measured_drives.plans import load_plan
+from studies.measured_drives.selection import select_events
 
 VEHICLE, SURFACE, BUS = (
     load("vehicle", "paper-reference"),
     load("surface", "dense-asphalt"),
-    load("bus", "a2d2-like"),
+    load_plan("bus", "a2d2-like"),
 )
 STRAIGHT = replace(
     BUS, style=replace(BUS.style, curve_share=0.0, rough_share=0.0, dragging_share=0.0, lift_share=0.0, slope=0.0,
@@ -37,7 +38,7 @@ def events() -> tuple[Event, ...]:
         motion = drive_motion(VEHICLE, 0.82, STRAIGHT, events=4, seed=1, drive=number)
         columns = {name: values[::10] for name, values in motion.items()}
         drives.append(RecordedRun(name=f"d{number}", drive=f"d{number}", interval=0.01, columns=columns))
-    retained = select_events(drives, load("protocol", "brake-dive")).retained
+    retained = select_events(drives, load_plan("protocol", "brake-dive")).retained
     assert len(retained) >= 6
     return retained
 

@@ -7,7 +7,8 @@ from math import nan
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.events import RecordedRun, find_pressure_episodes
+from studies.measured_drives.events import RecordedRun
+from tasks.campaign.segments import find_pressure_episodes
 
 ACTIVE = 0.12
 """Pressure from which the brake is on, as in the paper's Appendix C.5 [MPa]."""

@@ -16,8 +16,8 @@ from catalogs.campaign_files import (
 from catalogs.documents import read_content
 from catalogs.quantities import parse_entry
 from catalogs.sentences import cap_problems, shorten
+from studies.measured_drives.events import RecordedRun
 from tasks.campaign.channels import CHANNELS_BY_NAME, COLUMN_UNITS
-from tasks.campaign.events import RecordedRun
 from tasks.campaign.slow_channels import fill_between_samples
 from tasks.errors import InputError
 from tasks.surface.weather import Weather

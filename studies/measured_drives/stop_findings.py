@@ -7,8 +7,8 @@ from math import nan
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.studies.stop import REBOUND_S, Stop
-from tasks.studies.stop_swing import STANDING
+from studies.measured_drives.stop import REBOUND_S, Stop
+from studies.measured_drives.stop_swing import STANDING
 from tasks.vehicle.parameters import Vehicle
 
 SMOOTHING_S = 0.1

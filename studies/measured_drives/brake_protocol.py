@@ -6,16 +6,17 @@ from dataclasses import asdict
 from math import isnan
 from typing import Any
 
-from catalogs.drives import read_drives
 from catalogs.entries import load
-from flows.measured.dive_figure import draw_dives
 from flows.pages.figures import Figure
 from flows.pages.static import as_svg
 from flows.pages.writer import Section, Table, write_page
 from flows.store.outputs import Outputs
-from tasks.campaign.selection import Judged, select_events, tabulate_attrition
-from tasks.studies.brake_dive import pitch_mode, with_model
-from tasks.studies.leave_one_out import VARIANTS, Fold, Score, leave_one_drive_out, macro_mean
+from studies.measured_drives.brake_dive import pitch_mode, with_model
+from studies.measured_drives.dive_figure import draw_dives
+from studies.measured_drives.drives import read_drives
+from studies.measured_drives.leave_one_out import VARIANTS, Fold, Score, leave_one_drive_out, macro_mean
+from studies.measured_drives.plans import load_plan
+from studies.measured_drives.selection import Judged, select_events, tabulate_attrition
 from tasks.vehicle.parameters import Vehicle
 
 SCORE_UNITS = {
@@ -55,8 +56,8 @@ def brake_protocol(
     InputError
         If the campaign lacks what the protocol needs.
     """
-    results = Outputs(out, "lab brake-protocol", "brake_protocol.json", "attrition.csv", DIVES, PAGE)
-    rules = load("protocol", protocol)
+    results = Outputs(out, "brake-protocol", "brake_protocol.json", "attrition.csv", DIVES, PAGE)
+    rules = load_plan("protocol", protocol)
     recorded = read_drives(campaign)
     base = load("vehicle", vehicle or recorded.vehicle)
     selection = select_events(recorded.drives, rules)

@@ -4,15 +4,16 @@ from dataclasses import asdict
 from math import isnan
 from typing import Any
 
-from catalogs.drives import read_drives
 from catalogs.entries import load
 from flows.store.outputs import Outputs
+from studies.measured_drives.drives import read_drives
+from studies.measured_drives.events import RecordedRun
+from studies.measured_drives.plans import load_plan
+from studies.measured_drives.stop import Stop, StopErrors, stop_of, stopping_distance
+from studies.measured_drives.stop_findings import after_stop, measure_rebound, measure_saturation, slip_cycles
+from studies.measured_drives.stop_ladder import RungResult, compute_uncalibrated_errors, fit_ladder
 from tasks.campaign.campaign import CHANNELS
-from tasks.campaign.events import RecordedRun
 from tasks.errors import InputError
-from tasks.studies.stop import Stop, StopErrors, stop_of, stopping_distance
-from tasks.studies.stop_findings import after_stop, measure_rebound, measure_saturation, slip_cycles
-from tasks.studies.stop_study import RungResult, compute_uncalibrated_errors, fit_ladder
 
 NEEDED = (*CHANNELS, "brake_pressure", "brake_torque", "engine_torque")
 ERROR_UNITS = {
@@ -43,8 +44,8 @@ def stop_study(
     InputError
         If a run or a channel is missing, or a run holds no stop.
     """
-    results = Outputs(out, "lab stop-study", "stop_study.json")
-    plan = load("stop study", study)
+    results = Outputs(out, "stop-study", "stop_study.json")
+    plan = load_plan("stop study", study)
     recorded = read_drives(campaign)
     by_name = {drive.name: drive for drive in recorded.drives}
     problems: list[str] = []

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from studies.measured_drives.brake_dive import DiveModel, with_model
 from tasks.campaign.channels import CHANNELS_BY_NAME, unit_factor
 from tasks.campaign.signals import Signal
-from tasks.studies.brake_dive import DiveModel, with_model
 from tasks.surface.road_profile import FLAT_ROAD
 from tasks.surface.state import SurfaceState
 from tasks.surface.weather import DRY

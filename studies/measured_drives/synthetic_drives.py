@@ -6,8 +6,9 @@ from typing import Any
 
 from catalogs.entries import load
 from flows.store.layout import write_atomically
+from studies.measured_drives.bus_drive import bus_drive
+from studies.measured_drives.plans import load_plan
 from tasks.errors import InputError
-from tasks.studies.bus_drive import bus_drive
 
 LOGGED_UNITS = {
     "bar": "Unit_Bar", "km/h": "Unit_KiloMeterPerHour", "deg": "Unit_DegreOfArc", "deg/s": "Unit_DegreOfArcPerSecon",
@@ -50,7 +51,7 @@ def synthetic_drives(
         problems.append(f"{folder}: synthetic drives need a new or empty folder; this one holds other things")
     if problems:
         raise InputError(problems)
-    emitted, car = load("bus", bus), load("vehicle", vehicle)
+    emitted, car = load_plan("bus", bus), load("vehicle", vehicle)
     friction = load("surface", "dense-asphalt").dry_friction
     files = []
     for drive in range(1, drives + 1):

@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.events import Event
-from tasks.studies.brake_dive import DiveModel, Prediction, fit_brake_gain, fit_pitch, predict_event
+from studies.measured_drives.brake_dive import DiveModel, Prediction, fit_brake_gain, fit_pitch, predict_event
+from studies.measured_drives.events import Event
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.parameters import Vehicle
 

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from flows.measured.importing import import_measurements
-from flows.measured.stop_study import stop_study
 from manifests.provenance import SOURCE_ROOT
+from studies.measured_drives.stop_study import stop_study
 from tasks.errors import InputError
 
 EXCERPT = SOURCE_ROOT / "catalogs" / "measured" / "bmw_m8"

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from studies.measured_drives.events import Event
 from tasks.campaign.campaign import CHANNELS, Run
-from tasks.campaign.events import Event
 from tasks.identification.inference.forward import RunModel, prepare_run, simulate_run
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.table import EFFECT_TABLE, PARAMETER_INDEX

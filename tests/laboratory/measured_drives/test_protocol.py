@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from flows.measured.bus_drives import synthetic_drives
 from flows.measured.importing import import_measurements
-from flows.measured.protocol import brake_protocol
+from studies.measured_drives.brake_protocol import brake_protocol
+from studies.measured_drives.synthetic_drives import synthetic_drives
 from tasks.errors import InputError
 
 

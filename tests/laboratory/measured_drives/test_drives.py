@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from catalogs.drives import read_drives
+from studies.measured_drives.drives import read_drives
 from tasks.errors import InputError
 
 HEADER = {"campaign": "toy", "vehicle": "paper-reference", "sample_rate_hz": 50}

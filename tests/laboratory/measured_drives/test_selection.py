@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catalogs.entries import load
-from tasks.campaign.events import Event, RecordedRun
-from tasks.campaign.selection import QUANTITIES, judge_event, select_events, tabulate_attrition
+from studies.measured_drives.events import Event, RecordedRun
+from studies.measured_drives.plans import load_plan
+from studies.measured_drives.selection import QUANTITIES, judge_event, select_events, tabulate_attrition
 
-PROTOCOL = load("protocol", "brake-dive")
+PROTOCOL = load_plan("protocol", "brake-dive")
 INTERVAL = 0.01
 T = np.arange(400) * INTERVAL
 ONSET = 1.5

@@ -1,0 +1,117 @@
+"""Commands of the laboratory, which ``python -m studies`` runs as ``musync`` runs its own."""
+
+from flows.commands.command import CAMPAIGN_VEHICLE, OUT, Command, Result, define_argument, define_option
+
+MEASURED = "Drives of real cars"
+WIDE_COLUMNS = {
+    "criterion",
+    "fails_only_here",
+    "mean_trajectory",
+    "trained_on",
+    "rate_correlation",
+    "no_dive_rmse",
+}
+BUMP_FIGURES = ("rate_rmse", "rate_rms", "rate_correlation", "vertical_correlation", "peak_pitch")
+
+
+def shorten_brake_protocol(result: Result) -> Result:
+    """Return a brake protocol without its events and the widest columns of its tables."""
+    brief = {key: value for key, value in result.items() if key != "events"}
+    for table in ("attrition", "folds"):
+        brief[table] = [{k: v for k, v in row.items() if k not in WIDE_COLUMNS} for row in result[table]]
+    return brief
+
+
+def shorten_stop_study(result: Result) -> Result:
+    """Return a stop study with the held-out figures of each step."""
+    return result | {"rungs": [{"rung": row["rung"], **row["held_out"]} for row in result["rungs"]]}
+
+
+def shorten_bump_study(result: Result) -> Result:
+    """Return a bump study with a row for each window and car."""
+    rows = [
+        {
+            "window": row["window"],
+            "car": car,
+            **row[car]["feature"],
+            **{name: row[car][name] for name in BUMP_FIGURES},
+        }
+        for row in result["windows"]
+        for car in ("uncalibrated", "calibrated")
+    ]
+    return result | {"windows": rows}
+
+
+COMMANDS = (
+    Command(
+        name="brake-protocol",
+        group=MEASURED,
+        is_flow=False,
+        sentence="Select braking events by the paper's rules and predict each drive from the others (Appendix C.5).",
+        function="studies.measured_drives.brake_protocol:brake_protocol",
+        options=(
+            define_argument("campaign", str, "Campaign folder with brake pressure and pitch."),
+            define_option(
+                "protocol",
+                str,
+                "Protocol: YAML file, or the name of one in studies/measured_drives.",
+                "brake-dive",
+            ),
+            CAMPAIGN_VEHICLE,
+            define_option("all_events", bool, "Use every candidate event, whatever rules it breaks.", False),
+            OUT,
+        ),
+        brief=shorten_brake_protocol,
+    ),
+    Command(
+        name="stop-study",
+        group=MEASURED,
+        is_flow=False,
+        sentence="Calibrate on one stop of a car, predict another, and add what the model lacks step by step.",
+        function="studies.measured_drives.stop_study:stop_study",
+        options=(
+            define_argument("campaign", str, "Campaign folder with brake and engine torque."),
+            define_option(
+                "study",
+                str,
+                "Stop study: YAML file, or the name of one in studies/measured_drives.",
+                "bmw-m8",
+            ),
+            CAMPAIGN_VEHICLE,
+            OUT,
+        ),
+        brief=shorten_stop_study,
+    ),
+    Command(
+        name="bump-study",
+        group=MEASURED,
+        is_flow=False,
+        sentence="Find the road features in a recording's pitch rate, and fit the car that drove over them.",
+        function="studies.measured_drives.bump_study:bump_study",
+        options=(
+            define_argument("campaign", str, "Campaign folder with pitch rate and speed."),
+            define_option(
+                "study",
+                str,
+                "Bump study: YAML file, or the name of one in studies/measured_drives.",
+                "comma2k19",
+            ),
+            CAMPAIGN_VEHICLE,
+            OUT,
+        ),
+        brief=shorten_bump_study,
+    ),
+    Command(
+        name="synthetic-drives",
+        group=MEASURED,
+        is_flow=False,
+        sentence="Write drives as a car's bus logs them, with known truth, to try the brake protocol on.",
+        function="studies.measured_drives.synthetic_drives:synthetic_drives",
+        options=(
+            define_option("out", str, "Folder for one bus log of each drive."),
+            define_option("drives", int, "Number of drives.", 3),
+            define_option("events", int, "Number of brake applications in each drive.", 46),
+            define_option("seed", int, "Seed of the random numbers.", 2020),
+        ),
+    ),
+)
