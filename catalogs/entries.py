@@ -44,7 +44,6 @@ KINDS = {
     "calibration procedure": Kind("calibration", "calibration:ProcedureEntry"),
     "camera": Kind("cameras", "cameras:CameraEntry"),
     "channel map": Kind("channel_maps", "channel_maps:build_channel_map"),
-    "closing study": Kind("studies/closing.yaml", "studies.closing:ClosingStudy"),
     "cut of the low-speed rule": Kind("studies/no_low_speed_rule.yaml", "low_speed:LowSpeedCutEntry"),
     "foreign gate file": Kind("foreign_gates.yaml", "gates:ForeignGateEntry"),
     "gate file": Kind("gates.yaml", "gates:GateEntry"),

@@ -1,8 +1,16 @@
 """Commands of the laboratory, which ``python -m studies`` runs as ``musync`` runs its own."""
 
-from flows.commands.command import CAMPAIGN_VEHICLE, OUT, Command, Result, define_argument, define_option
+from flows.commands.command import (
+    CAMPAIGN_VEHICLE,
+    OUT,
+    Command,
+    Result,
+    define_argument,
+    define_option,
+    select_keys,
+)
 
-MEASURED = "Drives of real cars"
+MEASURED, KNOWN = "Drives of real cars", "Known truths"
 WIDE_COLUMNS = {
     "criterion",
     "fails_only_here",
@@ -113,5 +121,34 @@ COMMANDS = (
             define_option("events", int, "Number of brake applications in each drive.", 46),
             define_option("seed", int, "Seed of the random numbers.", 2020),
         ),
+    ),
+    Command(
+        name="closing-benchmark",
+        group=KNOWN,
+        is_flow=False,
+        sentence="Count how often close-loop is right on campaigns whose truth is known.",
+        function="studies.closing_benchmark.benchmark:close_loop_benchmark",
+        options=(
+            define_option(
+                "out",
+                str,
+                "Folder for closing-benchmark.json and campaigns.jsonl; a later call continues there.",
+            ),
+            define_option("seeds", int, "Number of campaigns for each known truth.", 10, minimum=0),
+            define_option("first_seed", int, "Of each truth; rules rest on some of 0 to 4.", 0, minimum=0),
+            define_option("nulls", int, "Number of campaigns without any effect.", 100, minimum=0),
+            define_option(
+                "harder",
+                int,
+                "Number of campaigns for each pair of effects, and for each truth driven with few kinds of manoeuvre.",
+                1,
+                minimum=0,
+            ),
+            define_option(
+                "minutes", float, "Begin no campaign after this time [min].", 1e9, shown_default="no limit"
+            ),
+        ),
+        brief=select_keys("false_discoveries", "summary", "power", "cpu_s"),
+        one_thread=True,
     ),
 )

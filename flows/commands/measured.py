@@ -101,32 +101,4 @@ COMMANDS = (
         brief=shorten_verdict,
         one_thread=True,
     ),
-    Command(
-        name="lab close-loop-benchmark",
-        group=GROUP,
-        sentence="Count how often close-loop is right on campaigns whose truth is known.",
-        function="flows.measured.closing_benchmark:close_loop_benchmark",
-        options=(
-            define_option(
-                "out",
-                str,
-                "Folder for closing-benchmark.json and campaigns.jsonl; a later call continues there.",
-            ),
-            define_option("seeds", int, "Number of campaigns for each known truth.", 10, minimum=0),
-            define_option("first_seed", int, "Of each truth; rules rest on some of 0 to 4.", 0, minimum=0),
-            define_option("nulls", int, "Number of campaigns without any effect.", 100, minimum=0),
-            define_option(
-                "harder",
-                int,
-                "Number of campaigns for each pair of effects, and for each truth driven with few kinds of manoeuvre.",
-                1,
-                minimum=0,
-            ),
-            define_option(
-                "minutes", float, "Begin no campaign after this time [min].", 1e9, shown_default="no limit"
-            ),
-        ),
-        brief=select_keys("false_discoveries", "summary", "power", "cpu_s"),
-        one_thread=True,
-    ),
 )

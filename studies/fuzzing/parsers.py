@@ -94,7 +94,6 @@ PARSERS: tuple[Parser, ...] = (
     parse_entries("stop study", f"{PLANS}/bmw-m8.yaml", partial(load_plan, "stop study"), share=2),
     parse_entries("bump study", f"{PLANS}/comma2k19.yaml", partial(load_plan, "bump study"), share=2),
     parse_entries("sensitivity study", "studies/surface-sensitivity.yaml", partial(load, "sensitivity study"), share=1),
-    parse_entries("closing study", "studies/closing.yaml", partial(load, "closing study"), share=2),
     parse_entries("street", "scenes/street.yaml", load_street_layout, share=2),
     parse_entries("effects library", "effects/library.yaml", load_effects, share=0.5),
     parse_entries("truths", "effects/truths.yaml", lambda path: (load_truths(path), load_sizes(path)), share=1),

@@ -9,12 +9,13 @@ from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from catalogs.effects.truths import Truth, load_sizes, load_truths
 from catalogs.entries import load
-from flows.measured.closing_benchmark_summary import pair_outcome, summarise_benchmark
-from flows.measured.closing_benchmark_tables import benchmark_tables
+from flows.measured.closing_error_rates import engine_hash
 from flows.store.journal import append_line, read_lines
 from flows.store.outputs import Outputs
-from manifests.canonical import sha256_of
-from manifests.provenance import code_version, source_hashes
+from manifests.provenance import code_version
+from studies.closing_benchmark.harder import load_harder
+from studies.closing_benchmark.summary import pair_outcome, summarise_benchmark
+from studies.closing_benchmark.tables import benchmark_tables
 from tasks.campaign.planned_runs import RICH, RunPlan
 from tasks.identification.benchmark import classify_outcome, make_synthetic_campaign, measure_interval_miss
 from tasks.identification.decision.answer import Verdict
@@ -28,25 +29,6 @@ FIRST_PAIR, FIRST_POOR, FIRST_POOR_NULL = 500_000, 600_000, 700_000
 pair to the next. Seeds 0 to 4 of each served to set rules; a table of error rates begins behind them."""
 SIZE_SEEDS = 5
 """Campaigns of each size of the power table."""
-JUDGES = (
-    "tasks/campaign/",
-    "tasks/conventions",
-    "tasks/identification/",
-    "tasks/vehicle/",
-    "tasks/surface/",
-    "catalogs/effects/",
-    "catalogs/decision_rules",
-    "catalogs/studies/closing.",
-    "catalogs/surfaces",
-    "catalogs/tyre_families",
-    "catalogs/tyres.",
-    "catalogs/vehicles/__init__",
-    "catalogs/vehicles/inherited",
-    "catalogs/vehicles/numbers",
-    "catalogs/vehicles/paper",
-    "catalogs/weather/",
-)
-"""Sources that a verdict depends on: campaigns judged by the same ones belong to one table."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,7 +77,7 @@ def close_loop_benchmark(
     minutes : no campaign is begun after so long
     vehicle : catalogue name or file
     """
-    results = Outputs(out, "lab close-loop-benchmark", FILE, RATES, TABLES)
+    results = Outputs(out, "closing-benchmark", FILE, RATES, TABLES)
     log, engine = results.path(FILE).with_name(LOG), engine_hash()
     rows = [row for row in read_lines(log, {"engine", "truth", "seed"}) if row["engine"] == engine]
     done = {(row["truth"], row["seed"]) for row in rows}
@@ -147,12 +129,6 @@ def close_loop_benchmark(
     return result
 
 
-def engine_hash() -> str:
-    """SHA-256 over the sources that a verdict depends on."""
-    judging = {path: digest for path, digest in source_hashes().items() if path.startswith(JUDGES)}
-    return sha256_of(f"{path} {digest}\n".encode() for path, digest in sorted(judging.items()))
-
-
 def _outcome(verdict: Verdict, truths: tuple[Truth, ...]) -> str:
     if len(truths) < 2:
         return classify_outcome(
@@ -164,7 +140,7 @@ def _outcome(verdict: Verdict, truths: tuple[Truth, ...]) -> str:
 
 def _plan(seeds: int, first_seed: int, nulls: int, harder: int) -> Iterator[Planned]:
     """Every campaign, round by round over all truths, nulls and sizes spread over them; then the harder ones."""
-    truths, sizes, study = load_truths(), load_sizes(), load("closing study")
+    truths, sizes, study = load_truths(), load_sizes(), load_harder()
     library = tuple(truth for truth in truths if truth.in_library)
     rounds = max(seeds, 1)
     for i in range(rounds):

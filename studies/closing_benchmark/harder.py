@@ -1,19 +1,16 @@
 """Harder campaigns for close-loop than one effect on a rich design: two effects at once, and too few manoeuvres."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import Field
 
-from catalogs.documents import read_json_document
+from catalogs.documents import LARGEST_YAML, read_content
 from catalogs.effects.truths import Truth
 from catalogs.names import WeatherName
-from catalogs.quantities import CatalogueEntry, Number
+from catalogs.quantities import CatalogueEntry, Number, parse_entry
 from tasks.campaign.planned_runs import TRAINING, RunPlan
 from tasks.surface.weather import DRY
-
-ERROR_RATES = Path(__file__).with_name("closing_error_rates.json")
-"""Counts of `musync lab close-loop-benchmark`, without the campaigns one by one."""
 
 Positive = Annotated[float, Field(strict=True, gt=0)]
 
@@ -56,7 +53,7 @@ class ClosingStudy(CatalogueEntry):
         return tuple((truths[min(pair)], truths[max(pair)]) for pair in chosen if len(pair) == 2)
 
 
-def load_error_rates() -> dict[str, Any]:
-    """Counts of the benchmark that ships, with the hash of the engine that was judged."""
-    rates: dict[str, Any] = read_json_document(ERROR_RATES, "table of error rates")
-    return rates
+def load_harder() -> ClosingStudy:
+    """Return the pairs and the poor design of `harder.yaml`."""
+    path = Path(__file__).with_suffix(".yaml")
+    return parse_entry(ClosingStudy, read_content(path, "closing study", LARGEST_YAML), path, "closing study")
