@@ -58,10 +58,10 @@ docs docs-serve: $(READY)
 	$(BIN)/python -m mkdocs $(if $(filter docs,$@),build --strict,serve)
 
 study: $(READY)
-	$(BIN)/musync lab sensitivity --out datasets/study
+	$(BIN)/python -m studies sensitivity --out datasets/study
 
 study-schedule: $(READY)
-	$(BIN)/python -m benchmarks.scheduled_runs
+	$(BIN)/python -m studies.scheduled_runs
 
 study-crash: $(READY)
 	$(BIN)/python -m studies.crashes
@@ -103,10 +103,10 @@ study-exports:
 		threadpoolctl tqdm cachetools parameterized
 	$(EXPORTS) pytest -rs tests/flows/exporting
 study-calibration: $(READY)
-	$(BIN)/python -m benchmarks.known_truth
+	$(BIN)/python -m studies.known_truth
 
 study-editors: $(READY)
-	$(BIN)/python -m benchmarks.editors datasets/editors
+	$(BIN)/python -m studies.editors datasets/editors
 
 # A small network learns friction from pictures (docs/tutorial/learn-friction.md): ten minutes, most of them for the dataset.
 study-learning: $(READY)
@@ -116,7 +116,7 @@ freeze: $(READY)
 	$(BIN)/musync lab freeze
 
 bench: $(READY)
-	$(BIN)/musync lab bench --out datasets/bench
+	$(BIN)/python -m studies bench --out datasets/bench
 
 clean:
 	rm -rf .venv .musync build *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache

@@ -1,16 +1,22 @@
 """Commands of the laboratory, which ``python -m studies`` runs as ``musync`` runs its own."""
 
+from collections import Counter
+
 from flows.commands.command import (
     CAMPAIGN_VEHICLE,
+    DATASET,
     OUT,
+    VEHICLE,
     Command,
     Result,
     define_argument,
     define_option,
+    require_key,
     select_keys,
 )
+from flows.commands.measured import MODE
 
-MEASURED, KNOWN = "Drives of real cars", "Known truths"
+MEASURED, KNOWN, PAPER, SPEED = "Drives of real cars", "Known truths and faults", "The paper", "Speed"
 WIDE_COLUMNS = {
     "criterion",
     "fails_only_here",
@@ -48,6 +54,18 @@ def shorten_bump_study(result: Result) -> Result:
         for car in ("uncalibrated", "calibrated")
     ]
     return result | {"windows": rows}
+
+
+def shorten_controls(result: Result) -> Result:
+    """Return of each negative control which metrics see it, and by how many methods; or why it was not tried."""
+    controls = []
+    for row in result["controls"]:
+        methods = Counter(reading.split(" by ")[0] for reading in row["seen_by"])
+        seen = ", ".join(f"{metric} ({count})" for metric, count in methods.items())
+        controls.append(
+            {"control": row["control"], "seen by metric (methods)": seen or row["reason"] or "none"}
+        )
+    return {key: result[key] for key in ("all_detected", "undetected")} | {"controls": controls}
 
 
 COMMANDS = (
@@ -150,5 +168,52 @@ COMMANDS = (
         ),
         brief=select_keys("false_discoveries", "summary", "power", "cpu_s"),
         one_thread=True,
+    ),
+    Command(
+        name="controls",
+        group=KNOWN,
+        is_flow=False,
+        sentence="Falsify a dataset's claims and motions in fourteen ways, and say which metric detects which fault.",
+        function="studies.negative_controls.study:run_controls",
+        options=(DATASET, OUT),
+        brief=shorten_controls,
+        passed=require_key("all_detected"),
+    ),
+    Command(
+        name="sensitivity",
+        group=PAPER,
+        is_flow=False,
+        sentence="Reproduce the paper's bounded surface-parameter study (Appendix E) beside its printed figures.",
+        function="studies.paper.sensitivity:run_sensitivity",
+        options=(OUT,),
+        brief=select_keys("solver_cases", "cpu_s", "beside_print"),
+        passed=lambda result: all(row["agrees"] for row in result["beside_print"]),
+    ),
+    Command(
+        name="ablation",
+        group=PAPER,
+        is_flow=False,
+        sentence="Cut one coupling at a time (the paper's Section 4.4): stops over the weather, pitch at a hump.",
+        function="studies.paper.ablation:run_ablation",
+        options=(
+            define_option("out", str, "Folder for ablation.json, .parquet, .svg and .html."),
+            define_option("vehicle", str, VEHICLE.help, "paper-reference", known=VEHICLE.known),
+            MODE,
+            define_option(
+                "traces",
+                str | None,
+                "Folder of reference traces, whose pitch is drawn beside the model's.",
+                None,
+            ),
+        ),
+        brief=select_keys("pitch", "reference"),
+    ),
+    Command(
+        name="bench",
+        group=SPEED,
+        is_flow=False,
+        sentence="Measure speed and memory, beside another implementation in the same run.",
+        function="benchmarks.run:run_benchmarks",
+        options=(define_argument("name", str | None, "Benchmark to run; by default all.", None), OUT),
     ),
 )

@@ -1,6 +1,5 @@
 """Commands that judge pixels."""
 
-from collections import Counter
 from typing import Any
 
 from flows.commands.command import CAMERA, DATASET, OUT, Command, define_argument, define_option, require_key
@@ -18,18 +17,6 @@ def shorten_evaluation(result: dict[str, Any]) -> dict[str, Any]:
     ]
     lacking = {row["metric"]: row["note"] for row in rows if row["condition"] == "-" and row["value"] is None}
     return result | {"rows": told, "lacking": [f"{metric} ({note})" for metric, note in lacking.items()]}
-
-
-def shorten_controls(result: dict[str, Any]) -> dict[str, Any]:
-    """Return of each negative control which metrics see it, and by how many methods; or why it was not tried."""
-    controls = []
-    for row in result["controls"]:
-        methods = Counter(reading.split(" by ")[0] for reading in row["seen_by"])
-        seen = ", ".join(f"{metric} ({count})" for metric, count in methods.items())
-        controls.append(
-            {"control": row["control"], "seen by metric (methods)": seen or row["reason"] or "none"}
-        )
-    return {key: result[key] for key in ("all_detected", "undetected")} | {"controls": controls}
 
 
 def show_table(result: dict[str, Any]) -> dict[str, Any]:
@@ -98,15 +85,6 @@ COMMANDS = (
             ),
         ),
         brief=shorten_evaluation,
-    ),
-    Command(
-        name="lab controls",
-        group=GROUP,
-        sentence="Falsify a dataset's claims and motions in fourteen ways, and say which metric detects which fault.",
-        function="flows.judging.controls:run_controls",
-        options=(DATASET, OUT),
-        brief=shorten_controls,
-        passed=require_key("all_detected"),
     ),
     Command(
         name="lab judge",

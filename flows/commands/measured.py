@@ -16,9 +16,15 @@ from flows.commands.measured_results import (
     shorten_import,
     shorten_verdict,
 )
-from flows.commands.studies import MODE
 
 GROUP = "Measured data"
+MODE = define_option(
+    "mode",
+    str | None,
+    "Vehicle model: paper or coupled; by default the one that a frozen vehicle was fitted in, else paper.",
+    None,
+    known=("paper", "coupled"),
+)
 
 COMMANDS = (
     Command(
@@ -55,7 +61,7 @@ COMMANDS = (
         name="vehicle agreement",
         group=GROUP,
         sentence="Compare the vehicle model with reference traces, as the paper's Appendix A.2 does.",
-        function="flows.studies.vehicle_model:measure_agreement",
+        function="flows.measured.agreement:measure_agreement",
         options=(TRACES, VEHICLE, MODE, OUT),
         brief=shorten_agreement,
     ),

@@ -8,9 +8,9 @@ import pyarrow.parquet as pq
 import pytest
 import yaml
 
-from benchmarks.editors import add_noise, warp_road, write_video
 from benchmarks.synthetic_street import camera_matrix, hump_drive, render_clip
 from flows.judging.video_sets.judge_set import judge_video_set
+from studies.editors import add_noise, warp_road, write_video
 from tests.flows.judging.test_judge_set import PROTOCOL, STOPS, cell, rms
 
 BRIEF = PROTOCOL | {

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.known_truth.coverage import ScalarOutcome, format_coverage
-from benchmarks.known_truth.traces import add_errors, draw_truth, list_development_cases, make_known_cases
 from catalogs.entries import load
+from studies.known_truth.coverage import ScalarOutcome, format_coverage
+from studies.known_truth.traces import add_errors, draw_truth, list_development_cases, make_known_cases
 from tasks.identification.calibration.identifiability import DETERMINED, compute_identifiability
 from tasks.identification.calibration.scalars import list_calibration_scalars, read_scalar, set_scalars
 from tasks.identification.calibration.staged import calibrate_vehicle

@@ -10,7 +10,7 @@ import pytest
 from catalogs.scenario import Scenario
 from catalogs.studies.ablation import cut_coupling
 from catalogs.variants import COUPLINGS
-from flows.studies.ablation import run_ablation
+from studies.paper.ablation import run_ablation
 from tasks.errors import InputError
 
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from benchmarks.physics_judge.clips import StudyClip, make_clip
 from flows.making.clip import collect_motion_figures
+from studies.physics_judge.clips import StudyClip, make_clip
 from tasks.render.camera import body_poses
 
 Tables = tuple[dict[str, NDArray[Any]], dict[str, NDArray[Any]]]

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from tasks.eval.body_agreement import rms
-from tasks.eval.negative_controls import (
+from studies.negative_controls.claims import (
     Claim,
     claims_differ,
     compute_separation,
@@ -12,6 +11,7 @@ from tasks.eval.negative_controls import (
     scale_claimed_pitch,
     score_claim,
 )
+from tasks.eval.body_agreement import rms
 from tasks.eval.poses.motion import RecoveredMotion
 
 TIMES = np.arange(81) * 0.1

@@ -80,7 +80,7 @@ def _measure_clips(scene: str, seed: int) -> tuple[dict[str, float], dict[str, d
 
 def run_benchmark() -> None:
     """Rank the levels of the scenes that the command line names, and print each row as it comes."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.severity")
+    parser = argparse.ArgumentParser(prog="python -m studies.severity")
     parser.add_argument("scene", nargs="*", default=["street"], help="scene folder, or street")
     for row in measure_rows(tuple(parser.parse_args().scene)):
         levels = " ".join(f"{value:.4f}" for value in row["values"])

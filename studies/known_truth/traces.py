@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from catalogs.entries import load
 from catalogs.references import ReferenceCase, Traces
 from flows.making.driving import weather_of
+from flows.measured.agreement import agreement_of
 from flows.measured.calibration import calibration_case
-from flows.studies.vehicle_model import agreement_of
 from tasks.identification.calibration.procedure import Procedure
 from tasks.identification.calibration.residual import WHEELS, CalibrationCase
 from tasks.identification.calibration.scalars import list_calibration_scalars, read_scalar, set_scalars

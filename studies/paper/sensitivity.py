@@ -1,13 +1,46 @@
-"""The paper's figure of the surface parameters' bands: friction above, stopping distance below."""
+"""The paper's surface-parameter sensitivity (Appendix E): bands of friction and stops, beside the printed figures."""
 
+import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from catalogs.entries import load
 from flows.pages.figures import Figure, Line, Panel, Style
+from flows.pages.static import as_svg
+from flows.pages.writer import Section, Table, write_page
+from flows.store.outputs import Outputs
+from tasks.studies.sensitivity import beside_print, sensitivity_study
 
 STYLES = {"rain": Style("a"), "snow": Style("d")}
 RATE = {"rain": "rain [mm/h]", "snow": "snow, water equivalent [mm/h]"}
 QUANTITIES = {"mu": "surface friction", "stop_m": "stopping distance [m]"}
+
+
+def run_sensitivity(*, out: str | None = None) -> dict[str, Any]:
+    """The paper's Appendix E: envelopes and rank correlations, beside the printed figures."""
+    results = Outputs(out, "sensitivity", "sensitivity.json", "sensitivity.svg", "sensitivity.html")
+    protocol, printed = load("sensitivity study")
+    vehicle, surface = load("vehicle", "paper-reference"), load("surface", "dense-asphalt")
+    started = time.process_time()
+    result = sensitivity_study(vehicle, surface, protocol)
+    result |= {"cpu_s": time.process_time() - started, "beside_print": beside_print(result, printed)}
+    results.write_json("sensitivity.json", result)
+    figure = draw_sensitivity(result["curves"], result["beside_print"])
+    results.write("sensitivity.svg", as_svg(figure))
+    page = write_page(
+        "muSync: sensitivity",
+        "Sensitivity to the surface parameters",
+        [
+            Section(title="Bands", parts=[figure]),
+            Section(title="Beside the printed figures", parts=[Table(rows=result["beside_print"])]),
+        ],
+        lead=[
+            "The paper's Appendix E: the numbers of the surface mapping are drawn within their bounds, and every draw"
+            " is driven to the stop. Printed figures agree if they are met to their last digit."
+        ],
+    )
+    results.write("sensitivity.html", page)
+    return result
 
 
 def draw_sensitivity(

@@ -10,7 +10,6 @@ from catalogs.entries import load
 from catalogs.grids.form import TICK_RATE_HZ
 from catalogs.studies.ablation import cut_coupling
 from catalogs.variants import VARIANTS, Variant
-from flows.judging.controls_figure import draw_roc
 from flows.judging.evaluation_rows import find_control
 from flows.judging.judged_clip import METHODS, JudgedClip, View, judge_clip
 from flows.judging.physics import clip_facts
@@ -24,11 +23,7 @@ from flows.running.orchestration import run_as_stage
 from flows.store.address import open_for_reading
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest, refuse_changed_content, require_frames
-from tasks.errors import InputError
-from tasks.eval.body_agreement import BodyClaim
-from tasks.eval.false_rigs import FALSE_RIGS
-from tasks.eval.motion_agreement import PoseThresholds
-from tasks.eval.negative_controls import (
+from studies.negative_controls.claims import (
     Claim,
     claims_differ,
     compute_separation,
@@ -37,6 +32,11 @@ from tasks.eval.negative_controls import (
     score_claim,
     shows_another_rig,
 )
+from studies.negative_controls.false_rigs import FALSE_RIGS
+from studies.negative_controls.figure import draw_roc
+from tasks.errors import InputError
+from tasks.eval.body_agreement import BodyClaim
+from tasks.eval.motion_agreement import PoseThresholds
 from tasks.eval.video_motion import path_error, weather_error
 
 CUTS: tuple[Variant, ...] = ("appearance-only", "vertical-only", "fixed-mu")
@@ -83,10 +83,10 @@ def run_controls(dataset: str, *, out: str | None = None) -> dict[str, Any]:
         If the folder is no finished dataset with frames, or holds fewer than two clips, or these or the scene are not
         as recorded.
     """
-    results = Outputs(out, "lab controls", "controls.json", "controls.svg")
+    results = Outputs(out, "controls", "controls.json", "controls.svg")
     layout = open_for_reading(dataset)
     root, manifest = layout.root, read_manifest(layout)
-    refuse_traced(read_plan(root).inputs, dataset, "lab controls")
+    refuse_traced(read_plan(root).inputs, dataset, "controls")
     require_frames(manifest, dataset)
     refuse_changed_content(layout, manifest, manifest["clips"])
     refuse_changed_scene(manifest["scene"])

@@ -1,4 +1,4 @@
-"""``python -m benchmarks.known_truth``: does ``calibrate --procedure paper-staged`` know what it knows?
+"""``python -m studies.known_truth``: does ``calibrate --procedure paper-staged`` know what it knows?
 
 The 19 development conditions with drawn scalars: whole fits without and with errors of the traces, and many draws of
 errors refitted by the derivatives at the truth.
@@ -8,9 +8,9 @@ import argparse
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 
-from benchmarks.known_truth.coverage import FitOutcome, fit_known_truth, format_coverage, refit_linearly
-from benchmarks.known_truth.traces import list_development_cases
 from catalogs.entries import load
+from studies.known_truth.coverage import FitOutcome, fit_known_truth, format_coverage, refit_linearly
+from studies.known_truth.traces import list_development_cases
 
 
 def print_fits(title: str, fits: list[FitOutcome]) -> None:
@@ -28,7 +28,7 @@ def print_fits(title: str, fits: list[FitOutcome]) -> None:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.known_truth", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m studies.known_truth", description=__doc__)
     parser.add_argument("--draws", type=int, default=200, help="draws of errors that are refitted linearly")
     parser.add_argument("--truths", type=int, default=4, help="vehicles that these draws are spread over")
     parser.add_argument("--fits", type=int, default=14, help="whole fits of traces with errors")

@@ -1,6 +1,6 @@
 """The paper's ablation (Section 4.4): stopping distance over the weather and pitch at a hump, coupling by coupling."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from catalogs.entries import load
 from catalogs.references import Traces, read_reference
-from catalogs.studies import Condition
-from catalogs.studies.ablation import Ablation, cut_coupling, load_ablation
+from catalogs.scenario import Scenario
+from catalogs.studies import Condition, load_conditions
+from catalogs.studies.ablation import AblationEntry, cut_coupling
 from catalogs.variants import COUPLINGS, Variant
 from catalogs.vehicles import open_vehicle
 from flows.making.driving import simulate_drive
@@ -20,9 +21,10 @@ from flows.pages.writer import Section, Table, write_page
 from flows.store.missing import null_missing
 from flows.store.outputs import Outputs
 from flows.store.telemetry import write_parquet
-from flows.studies.ablation_figure import draw_ablation
+from studies.paper.ablation_figure import draw_ablation
 from tasks.errors import InputError
 from tasks.surface.state import SurfaceParameters
+from tasks.surface.weather import find_weather
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Mode, Rollout
 
@@ -30,6 +32,44 @@ STOP_S, PITCH_S = 15.0, 10.0
 """Length of a drive to the stop on the slipperiest road, and of one whose pitch is compared [s]."""
 
 Rows = list[dict[str, Any]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ablation:
+    """Where the variants are compared.
+
+    Parameters
+    ----------
+    stops : the braking condition at every rate, dry first, by kind of weather
+    pitch : the condition whose pitch is compared
+    reference_pitch_rmse_deg : printed distance of the full model from its reference [deg]
+    """
+
+    stops: dict[str, tuple[Scenario, ...]]
+    pitch: Condition
+    reference_pitch_rmse_deg: float
+
+
+def load_ablation() -> Ablation:
+    """The study of the paper's Section 4.4."""
+    entry: AblationEntry = load("ablation")
+    protocol = load("sensitivity study")[0]
+    conditions = {condition.name: condition for condition in load_conditions()}
+    dry = conditions[entry.stop_condition].scenario
+    stops: dict[str, tuple[Scenario, ...]] = {}
+    for study in protocol.weathers.values():
+        hours = protocol.snow_accumulation_h if find_weather(study.kind).accumulates else 0.0
+        rates = np.linspace(0.0, study.highest_rate, study.nominal_rates)[1:]
+        stops[study.kind] = (
+            dry,
+            *(replace(dry, weather=study.kind, precipitation_mm_h=float(rate), snow_accumulation_h=hours)
+              for rate in rates),
+        )  # fmt: skip
+    return Ablation(
+        stops=stops,
+        pitch=conditions[entry.pitch_condition],
+        reference_pitch_rmse_deg=entry.reference_pitch_rmse.value,
+    )
 
 
 def run_ablation(
@@ -54,9 +94,7 @@ def run_ablation(
     InputError
         If the traces do not hold the condition that is compared.
     """
-    results = Outputs(
-        out, "lab ablation", "ablation.json", "ablation.parquet", "ablation.svg", "ablation.html"
-    )
+    results = Outputs(out, "ablation", "ablation.json", "ablation.parquet", "ablation.svg", "ablation.html")
     file = open_vehicle(vehicle)
     study, car, surface = load_ablation(), file.build(), load("surface", "dense-asphalt")
     provenance = file.provenance

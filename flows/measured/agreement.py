@@ -1,9 +1,7 @@
-"""Studies of the vehicle model: the surface-parameter sensitivity, agreement with reference traces, speed."""
+"""Agreement of the vehicle model with reference traces, as the paper's Appendix A.2 measures it."""
 
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -11,57 +9,24 @@ from catalogs.entries import load
 from catalogs.references import ReferenceCase, Traces, read_reference
 from catalogs.studies.agreement import find_printed_name, put_beside_print
 from catalogs.vehicles import open_vehicle
+from flows.measured.trajectory_figure import draw_trajectories
 from flows.pages.figures import Figure
 from flows.pages.static import as_svg
 from flows.pages.writer import Section, Table, write_page
 from flows.store.outputs import Outputs
-from flows.studies.sensitivity_figure import draw_sensitivity
-from flows.studies.trajectory_figure import draw_trajectories
-from tasks.errors import InputError
 from tasks.eval.agreement_groups import summarise_by_control, summarise_groups
 from tasks.eval.state_agreement import CaseAgreement, case_agreement
 from tasks.eval.stop_agreement import stop_agreement
-from tasks.studies.sensitivity import beside_print, sensitivity_study
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Mode, Rollout, simulate_scenario
 
 PAPER = ("paper-reference", "paper")
 """The paper's vehicle and mode, drawn beside any other."""
-BENCHMARKS = (
-    "rasteriser", "vehicle", "weather", "camera", "pose_checks", "pipeline", "queries", "store", "loading", "rollouts",
-)  # fmt: skip
 
 BY = dict.fromkeys(("flat", "hump", "depression"), "road")
 """What a group's cases have in common, by its name; other names are those of what the cases vary."""
 STOP_FIGURES = ("braking_time_error_s", "slip_distance_error_m")
-
-
-def run_sensitivity(*, out: str | None = None) -> dict[str, Any]:
-    """The paper's Appendix E: envelopes and rank correlations, beside the printed figures."""
-    results = Outputs(out, "lab sensitivity", "sensitivity.json", "sensitivity.svg", "sensitivity.html")
-    protocol, printed = load("sensitivity study")
-    vehicle, surface = load("vehicle", "paper-reference"), load("surface", "dense-asphalt")
-    started = time.process_time()
-    result = sensitivity_study(vehicle, surface, protocol)
-    result |= {"cpu_s": time.process_time() - started, "beside_print": beside_print(result, printed)}
-    results.write_json("sensitivity.json", result)
-    figure = draw_sensitivity(result["curves"], result["beside_print"])
-    results.write("sensitivity.svg", as_svg(figure))
-    page = write_page(
-        "muSync: sensitivity",
-        "Sensitivity to the surface parameters",
-        [
-            Section(title="Bands", parts=[figure]),
-            Section(title="Beside the printed figures", parts=[Table(rows=result["beside_print"])]),
-        ],
-        lead=[
-            "The paper's Appendix E: the numbers of the surface mapping are drawn within their bounds, and every draw"
-            " is driven to the stop. Printed figures agree if they are met to their last digit."
-        ],
-    )
-    results.write("sensitivity.html", page)
-    return result
 
 
 def measure_agreement(
@@ -192,26 +157,6 @@ def simulate_case(model: Vehicle, case: ReferenceCase, columns: Traces, mode: Mo
         model, SurfaceState(kind=case.weather, friction=case.surface_coefficient), case.controls(), case.hazard(),
         mode=mode, duration_s=case.duration_s(columns),
     )  # fmt: skip
-
-
-def run_benchmarks(name: str | None = None, *, out: str | None = None) -> dict[str, Any]:
-    """Run one benchmark, or all of them.
-
-    Raises
-    ------
-    InputError
-        For an unknown name.
-    """
-    if name is not None and name not in BENCHMARKS:
-        raise InputError(f"bench {name}: no such benchmark; there are: {', '.join(BENCHMARKS)}")
-    results = Outputs(out, "lab bench", "bench.json")
-    rows = [
-        row
-        for chosen in ([name] if name else BENCHMARKS)
-        for row in import_module(f"benchmarks.{chosen}").measure_rows()
-    ]
-    results.write_json("bench.json", {"rows": rows})
-    return {"rows": rows}
 
 
 def _stand_as_group(row: dict[str, Any], printed: str) -> dict[str, Any]:

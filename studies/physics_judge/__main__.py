@@ -1,6 +1,6 @@
 """Study of the physics judge: false alarms on random clips, injected errors found, processor time a clip.
 
-``python -m benchmarks.physics_judge [SEED] [CLIPS]``: without a seed a fresh one is drawn and printed.
+``python -m studies.physics_judge [SEED] [CLIPS]``: without a seed a fresh one is drawn and printed.
 """
 
 import json
@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.physics_judge.clips import StudyClip, draw_clip, draw_vehicle, make_clip
-from benchmarks.physics_judge.errors import ERRORS, state_outcome
 from catalogs.scenario import Scenario
+from studies.physics_judge.clips import StudyClip, draw_clip, draw_vehicle, make_clip
+from studies.physics_judge.errors import ERRORS, state_outcome
 from tasks.errors import InputError
 from tasks.eval.physics.audit import evaluate_laws
 from tasks.eval.physics.laws import Law

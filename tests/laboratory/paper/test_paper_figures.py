@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from catalogs.entries import load
-from flows.studies.sensitivity_figure import draw_sensitivity
-from flows.studies.trajectory_figure import draw_trajectories
+from flows.measured.trajectory_figure import draw_trajectories
 from studies.measured_drives.dive_figure import draw_dives
+from studies.paper.sensitivity import draw_sensitivity
 from tasks.surface.road_profile import FLAT_ROAD
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.brake import BrakeCommand

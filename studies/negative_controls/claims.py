@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from studies.negative_controls.false_rigs import show_rig
 from tasks.errors import InputError
 from tasks.eval.body_agreement import BodyClaim, compare_body, rms
-from tasks.eval.false_rigs import show_rig
 from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.poses.rigid import Floats, invert_pose
 from tasks.eval.video_motion import geometry_error, reference_progress

@@ -1,7 +1,7 @@
 """A schedule served for real: a Prefect server on loopback from a clean home, cron fires twice, everything stops.
 
 It is stopped while the third run is going. Takes about four minutes, because cron counts in minutes: ``python -m
-benchmarks.scheduled_runs``.
+studies.scheduled_runs``.
 """
 
 import base64

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.known_truth.traces import add_errors, draw_truth, make_known_cases
 from catalogs.references import ReferenceCase
+from studies.known_truth.traces import add_errors, draw_truth, make_known_cases
 from tasks.identification.calibration.identifiability import (
     DETERMINED,
     compute_identifiability,

@@ -6,12 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.vehicle_modes import HEADER, compute_differences, format_table
 from catalogs.entries import load
-from tasks.studies.mode_comparison import mode_difference
+from studies.paper.vehicle_modes import HEADER, compute_differences, format_table, mode_difference
 from tests.vehicle.conftest import command
 
-DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "explanation" / "vehicle-modes.md"
+DOCUMENT = Path(__file__).resolve().parents[3] / "docs" / "explanation" / "vehicle-modes.md"
 
 
 @pytest.fixture(scope="module")

@@ -9,9 +9,20 @@ import pytest
 from typer.testing import CliRunner
 
 from flows.cli import app
-from flows.commands.evaluation import shorten_controls
-from flows.judging import controls as judging_controls
-from flows.judging.controls import (
+from flows.judging.evaluation import evaluate_dataset
+from flows.judging.judged_clip import METHODS, JudgedClip
+from flows.judging.physics import clip_columns, clip_facts
+from flows.making.catalogue import catalogue_of
+from flows.making.generate import generate_dataset
+from flows.making.plan import read_plan
+from flows.pages.static import as_svg
+from flows.reading.previews import make_films
+from flows.reading.sheets import draw_sheets
+from studies.commands import shorten_controls
+from studies.negative_controls import study as judging_controls
+from studies.negative_controls.claims import Claim
+from studies.negative_controls.figure import draw_roc
+from studies.negative_controls.study import (
     BLIND_BY_DESIGN,
     CONTROLS,
     UNREAD,
@@ -22,18 +33,7 @@ from flows.judging.controls import (
     score_controls,
     summarise_controls,
 )
-from flows.judging.controls_figure import draw_roc
-from flows.judging.evaluation import evaluate_dataset
-from flows.judging.judged_clip import METHODS, JudgedClip
-from flows.judging.physics import clip_columns, clip_facts
-from flows.making.catalogue import catalogue_of
-from flows.making.generate import generate_dataset
-from flows.making.plan import read_plan
-from flows.pages.static import as_svg
-from flows.reading.previews import make_films
-from flows.reading.sheets import draw_sheets
 from tasks.errors import InputError
-from tasks.eval.negative_controls import Claim
 from tasks.eval.poses.motion import RecoveredMotion
 from tests.toy_street import write_toy_grid
 
