@@ -106,7 +106,7 @@ study-calibration: $(READY)
 	$(BIN)/python -m studies.known_truth
 
 study-editors: $(READY)
-	$(BIN)/python -m studies.editors datasets/editors
+	$(BIN)/python -m studies.video_sets.editors datasets/editors
 
 # A small network learns friction from pictures (docs/tutorial/learn-friction.md): ten minutes, most of them for the dataset.
 study-learning: $(READY)

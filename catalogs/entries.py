@@ -57,7 +57,6 @@ KINDS = {
     "table of plausible figures": Kind("plausible_vehicle.yaml", "plausible_vehicle:PlausibleVehicle"),
     "tyre": Kind("tyres", "tyres:parse_tyre", (".tir",)),
     "vehicle": Kind("vehicles", "vehicles:build_vehicle"),
-    "video protocol": Kind("video_protocols", "video_protocols:VideoProtocol"),
 }
 """Every kind of entry that has a name of its own; the name stands in the sentences about its files."""
 

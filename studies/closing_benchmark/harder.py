@@ -5,10 +5,10 @@ from typing import Annotated
 
 from pydantic import Field
 
-from catalogs.documents import LARGEST_YAML, read_content
 from catalogs.effects.truths import Truth
 from catalogs.names import WeatherName
-from catalogs.quantities import CatalogueEntry, Number, parse_entry
+from catalogs.quantities import CatalogueEntry, Number
+from studies.plans import load_plan
 from tasks.campaign.planned_runs import TRAINING, RunPlan
 from tasks.surface.weather import DRY
 
@@ -55,5 +55,5 @@ class ClosingStudy(CatalogueEntry):
 
 def load_harder() -> ClosingStudy:
     """Return the pairs and the poor design of `harder.yaml`."""
-    path = Path(__file__).with_suffix(".yaml")
-    return parse_entry(ClosingStudy, read_content(path, "closing study", LARGEST_YAML), path, "closing study")
+    study: ClosingStudy = load_plan(ClosingStudy, Path(__file__).parent, "harder", "closing study")
+    return study

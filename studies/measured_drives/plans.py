@@ -5,8 +5,8 @@ from typing import Annotated, Any
 
 from pydantic import Field, field_validator, model_validator
 
-from catalogs.documents import LARGEST_YAML, read_content
-from catalogs.quantities import CatalogueEntry, Number, Scalar, Text, parse_entry, require_quantity
+from catalogs.quantities import CatalogueEntry, Number, Scalar, Text, require_quantity
+from studies import plans
 from studies.measured_drives.bus_file import BusEntry
 from studies.measured_drives.protocol_file import ProtocolEntry
 from studies.measured_drives.stop_ladder import Rung
@@ -106,19 +106,5 @@ PLANS: dict[str, type[CatalogueEntry]] = {
 
 
 def load_plan(kind: str, name_or_path: str | Path) -> Any:
-    """Return a plan by the name of a file in this folder, or by its own file.
-
-    Parameters
-    ----------
-    kind : of `PLANS`
-    name_or_path : of the file
-
-    Raises
-    ------
-    InputError
-        Listing every problem of the file.
-    """
-    path = Path(name_or_path)
-    if path.suffix != ".yaml":
-        path = FOLDER / f"{name_or_path}.yaml"
-    return parse_entry(PLANS[kind], read_content(path, kind, LARGEST_YAML), path, kind).build()
+    """Return a plan of `PLANS` by its name or its file, as `studies.plans.load_plan` does."""
+    return plans.load_plan(PLANS[kind], FOLDER, name_or_path, kind)

@@ -1,4 +1,4 @@
-"""Where editors of known behaviour land in `musync lab judge-set`, beside what the metrics' equations say.
+"""Where editors of known behaviour land in `python -m studies judge-set`, beside what the metrics' equations say.
 
 The street is ray-cast and not rendered by this project. What drives through it is the paper's vehicle; what the editors
 do is simple enough that every figure can be computed without a picture: grade colours, add noise, answer late, warp the
@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from benchmarks.synthetic_street import camera_matrix, make_mount, render_clip, rig_poses
 from catalogs.entries import load
 from catalogs.scenario import Scenario
-from flows.judging.video_sets.judge_set import format_cell, judge_video_set
 from flows.making.driving import simulate_drive
 from flows.store.layout import write_json
+from studies.video_sets.judge_set import format_cell, judge_video_set
 from tasks.eval.body_agreement import rms
 from tasks.eval.video_motion import PAPER_OPENING, geometry_error
 

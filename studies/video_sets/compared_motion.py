@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flows.judging.video_sets.files import SOURCE
-from flows.judging.video_sets.motion import JudgedSet, SetMotion, check_motion
+from studies.video_sets.files import SOURCE
+from studies.video_sets.motion import JudgedSet, SetMotion, check_motion
 from tasks.errors import InputError
 from tasks.eval.video_motion import resample_onto_grid
 

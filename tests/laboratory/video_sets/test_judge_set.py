@@ -1,4 +1,4 @@
-"""`musync lab judge-set`: editors whose motion is known must land where the protocol's equations say."""
+"""`python -m studies judge-set`: editors whose motion is known must land where the protocol's equations say."""
 
 import json
 from pathlib import Path
@@ -17,15 +17,15 @@ from benchmarks.synthetic_street import (
     make_mount,
     rig_poses,
 )
-from catalogs.entries import load
 from catalogs.learned_judges import LoadedJudge
 from flows.judging.claims import read_claim
 from flows.judging.foreign_sources import read_camera
 from flows.judging.learned_rows import score_pictures
-from flows.judging.video_sets.files import SetClip, find_set
-from flows.judging.video_sets.judge_set import format_cell, judge_video_set
-from flows.judging.video_sets.motion import JudgedSet, look_at_clip
-from flows.judging.video_sets.motion_panels import list_set_panels
+from studies.video_sets.files import SetClip, find_set
+from studies.video_sets.judge_set import format_cell, judge_video_set
+from studies.video_sets.motion import JudgedSet, look_at_clip
+from studies.video_sets.motion_panels import list_set_panels
+from studies.video_sets.protocol import load_protocol
 from tasks.errors import InputError
 from tests.flows.judging.test_foreign import encode
 from tests.flows.judging.test_trajectories import tum_lines
@@ -209,7 +209,7 @@ def test_a_short_video_and_a_missing_claim_are_said_where_they_matter(
 
 
 def test_files_of_unknown_names_are_refused_all_at_once(tmp_path: Path) -> None:
-    protocol = load("video protocol", "paper")
+    protocol = load_protocol("paper")
     for name in ("models/one/seed-1/weather/rain-7.mp4", "models/one/first/weather/rain-2.mp4", "targets/wall.mp4",
                  "claims/weather/hail.parquet"):  # fmt: skip
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
@@ -224,7 +224,7 @@ def test_files_of_unknown_names_are_refused_all_at_once(tmp_path: Path) -> None:
 
 def test_a_set_that_is_not_there_is_told_and_its_parts_are_not(tmp_path: Path) -> None:
     with pytest.raises(InputError) as caught:
-        find_set(tmp_path / "nowhere", load("video protocol", "paper"))
+        find_set(tmp_path / "nowhere", load_protocol("paper"))
     (problem,) = caught.value.problems
     assert "nowhere: no such folder" in problem
 
@@ -242,7 +242,7 @@ def test_a_window_that_no_figure_has_is_refused_before_a_clip_is_judged(tmp_path
 
 
 def test_the_papers_protocol_has_its_clips_prompts_and_printed_rows() -> None:
-    protocol = load("video protocol", "paper")
+    protocol = load_protocol("paper")
     assert len(protocol.clips) == 9 + 3 + 9 and set(protocol.prompts) < set(protocol.clips)
     assert "50 millimeters per hour" in protocol.prompts["weather/rain-50"]
     assert protocol.printed_figures["vace"]["e_weather"] == (0.0867, 0.0050)
@@ -287,7 +287,7 @@ def test_a_video_is_seen_by_the_chain_and_a_painted_road_by_the_edit_metrics(
 
 
 def test_a_panel_has_the_claim_and_a_row_a_seed_of_each_model(judged: dict[str, Any]) -> None:
-    protocol = load("video protocol", str(judged["root"] / "tiny.yaml"))
+    protocol = load_protocol(str(judged["root"] / "tiny.yaml"))
     files = find_set(judged["root"] / "set", protocol)
     lighter = protocol.weather_levels["rain-50"].model_copy(update={"precipitation_mm_h": 10})
     protocol = protocol.model_copy(

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from catalogs.sentences import cap_problems
-from catalogs.video_protocols import VideoProtocol
 from flows.judging.trajectories import SUFFIXES
+from studies.video_sets.protocol import VideoProtocol
 from tasks.errors import InputError
 
 SOURCE = "source"

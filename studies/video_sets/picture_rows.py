@@ -10,8 +10,8 @@ from flows.judging.evaluation_rows import figure_row
 from flows.judging.foreign_sources import read_video
 from flows.judging.judged_clip import Row
 from flows.judging.learned_rows import rank_weathers
-from flows.judging.video_sets.files import VIDEO_METHOD
-from flows.judging.video_sets.motion import JudgedSet
+from studies.video_sets.files import VIDEO_METHOD
+from studies.video_sets.motion import JudgedSet
 from tasks.errors import InputError
 from tasks.eval.road_edit import score_road_edit
 

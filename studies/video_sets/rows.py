@@ -8,15 +8,15 @@ from numpy.typing import NDArray
 from catalogs.entries import load
 from flows.judging.evaluation_rows import figure_row
 from flows.judging.judged_clip import Row
-from flows.judging.video_sets.compared_motion import (
+from studies.video_sets.compared_motion import (
     find_control_clip,
     pair_with_control,
     require_control_clip,
     sample_claimed_pitch,
 )
-from flows.judging.video_sets.files import SOURCE
-from flows.judging.video_sets.motion import JudgedSet, SetMotion
-from flows.judging.video_sets.picture_rows import edit_rows, learned_rows_of
+from studies.video_sets.files import SOURCE
+from studies.video_sets.motion import JudgedSet, SetMotion
+from studies.video_sets.picture_rows import edit_rows, learned_rows_of
 from tasks.errors import InputError
 from tasks.eval.foreign_video import judge_motion, sample_claim
 from tasks.eval.poses.motion import RecoveredMotion

@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catalogs.learned_judges import LoadedJudge
-from catalogs.video_protocols import VideoProtocol
 from flows.judging.foreign_sources import ForeignCamera, read_footage
 from flows.judging.learned_rows import score_pictures
-from flows.judging.video_sets.files import SetClip, VideoSet
+from studies.video_sets.files import SetClip, VideoSet
+from studies.video_sets.protocol import VideoProtocol
 from tasks.errors import InputError
 from tasks.eval.foreign_video import VideoClaim
 from tasks.eval.poses.motion import RecoveredMotion

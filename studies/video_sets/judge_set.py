@@ -6,24 +6,23 @@ from typing import Any
 
 import numpy as np
 
-from catalogs.entries import load
 from catalogs.learned_judges import load_judges
 from catalogs.sentences import cap_problems
-from catalogs.video_protocols import VideoProtocol
 from flows.judging.claims import read_claim
 from flows.judging.evaluation_means import average_within_seeds
 from flows.judging.foreign_sources import read_camera
 from flows.judging.judged_clip import Row
 from flows.judging.motion_curves import draw_motion
-from flows.judging.video_sets.files import VideoSet, find_set
-from flows.judging.video_sets.motion import JudgedSet, Key, SetMotion, look_at_clip
-from flows.judging.video_sets.motion_panels import list_set_panels
-from flows.judging.video_sets.picture_rows import PIXELS
-from flows.judging.video_sets.rows import set_rows
 from flows.pages.static import as_svg
 from flows.running.orchestration import run_as_stage
 from flows.running.progress import progress_bar
 from flows.store.outputs import Outputs
+from studies.video_sets.files import VideoSet, find_set
+from studies.video_sets.motion import JudgedSet, Key, SetMotion, look_at_clip
+from studies.video_sets.motion_panels import list_set_panels
+from studies.video_sets.picture_rows import PIXELS
+from studies.video_sets.protocol import VideoProtocol, load_protocol
+from studies.video_sets.rows import set_rows
 from tasks.errors import InputError
 from tasks.eval.foreign_video import VideoClaim
 from tasks.eval.video_motion import WINDOWS
@@ -50,7 +49,7 @@ def judge_video_set(
 
     Parameters
     ----------
-    folder : of the set, as `flows.judging.video_sets.files.find_set` reads it
+    folder : of the set, as `studies.video_sets.files.find_set` reads it
     protocol : name or file of a video protocol
     out : folder for judge-set.json, judge-set.md and motion.svg
     learned : YAML of local checkpoints of learned judges
@@ -61,8 +60,8 @@ def judge_video_set(
     InputError
         For every file that cannot be read, or that no clip of the protocol has; or for another window.
     """
-    results = Outputs(out, "lab judge-set", "judge-set.json", "judge-set.md", MOTION)
-    chosen = load("video protocol", protocol)
+    results = Outputs(out, "judge-set", "judge-set.json", "judge-set.md", MOTION)
+    chosen = load_protocol(protocol)
     smoothing = int(chosen.smoothing_window.value) if window is None else window
     known = [width or 0 for width in WINDOWS]
     if smoothing not in known:

@@ -1,4 +1,4 @@
-"""`musync lab judge-set` on videos: editors that move no car land where Appendix A.5 puts a car on a dry road."""
+"""`judge-set` on videos: editors that move no car land where Appendix A.5 puts a car on a dry road."""
 
 from typing import Any
 
@@ -9,9 +9,9 @@ import pytest
 import yaml
 
 from benchmarks.synthetic_street import camera_matrix, hump_drive, render_clip
-from flows.judging.video_sets.judge_set import judge_video_set
-from studies.editors import add_noise, warp_road, write_video
-from tests.flows.judging.test_judge_set import PROTOCOL, STOPS, cell, rms
+from studies.video_sets.editors import add_noise, warp_road, write_video
+from studies.video_sets.judge_set import judge_video_set
+from tests.laboratory.video_sets.test_judge_set import PROTOCOL, STOPS, cell, rms
 
 BRIEF = PROTOCOL | {
     "frames": {"value": 31, "unit": "1", "source": "test"},

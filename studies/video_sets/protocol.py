@@ -1,11 +1,13 @@
 """Protocols by which video editors are judged: tasks, prompts, models, and the figures printed of them."""
 
+from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field, model_validator
 
 from catalogs.names import Name, WeatherName
 from catalogs.quantities import CatalogueEntry, Number, Scalar, Table, Text, require_quantity
+from studies.plans import load_plan
 
 Count = Annotated[Scalar, require_quantity("1", minimum=1)]
 Time = Annotated[Scalar, require_quantity("s", above=0)]
@@ -93,3 +95,9 @@ class VideoProtocol(CatalogueEntry):
     def printed_figures(self) -> dict[str, dict[str, PrintedFigure]]:
         """Printed figures by model and metric, without their source."""
         return {model: figures for model, figures in self.printed.items() if not isinstance(figures, str)}
+
+
+def load_protocol(name_or_path: str | Path) -> VideoProtocol:
+    """Return a video protocol by its name in this folder or its file, as `studies.plans.load_plan` does."""
+    protocol: VideoProtocol = load_plan(VideoProtocol, Path(__file__).parent, name_or_path, "video protocol")
+    return protocol

@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 
 from flows.judging.motion_curves import PITCH, PROGRESS, Floats, MotionPanel, make_event_panel
-from flows.judging.video_sets.compared_motion import pair_with_control, sample_claimed_pitch
-from flows.judging.video_sets.motion import JudgedSet, SetMotion
+from studies.video_sets.compared_motion import pair_with_control, sample_claimed_pitch
+from studies.video_sets.motion import JudgedSet, SetMotion
 from tasks.errors import InputError
 from tasks.eval.video_motion import (
     MotionProtocol,
