@@ -16,7 +16,8 @@ from flows.commands.command import (
 )
 from flows.commands.measured import MODE
 
-MEASURED, KNOWN, PAPER, SPEED = "Drives of real cars", "Known truths and faults", "The paper", "Speed"
+MEASURED, KNOWN, PAPER = "Drives of real cars", "Known truths and faults", "The paper"
+ORIGINS, SPEED = "Where numbers come from", "Speed"
 WIDE_COLUMNS = {
     "criterion",
     "fails_only_here",
@@ -264,5 +265,19 @@ COMMANDS = (
             ),
         ),
         brief=show_table,
+    ),
+    Command(
+        name="lineage",
+        group=ORIGINS,
+        is_flow=False,
+        sentence="List the catalogue lines, works and measured runs that the numbers of a clip rest on, by column.",
+        function="studies.lineage.trace:trace_lineage",
+        options=(
+            DATASET,
+            define_argument("clip", str, "Label or id of a clip."),
+            define_option("out", str | None, "Folder for lineage.json, lineage.csv and lineage.txt.", None),
+        ),
+        passed=require_key("follows"),
+        output="sentences",
     ),
 )

@@ -13,10 +13,10 @@ from catalogs.references import ReferenceCase
 from catalogs.scenario import Scenario
 from flows.auditing.audit import audit_dataset
 from flows.auditing.explain import explain_frame
-from flows.auditing.lineage import trace_lineage
 from flows.judging.physics import audit_physics, clip_columns, clip_facts
 from flows.making.request import make_dataset
 from flows.reading.query import query_dataset
+from studies.lineage.trace import trace_lineage
 from studies.negative_controls.study import run_controls
 from tasks.errors import InputError
 from tasks.eval.state_agreement import WHEELS
@@ -93,7 +93,7 @@ def test_commands_that_drive_a_clip_again_refuse_it(traced: Path) -> None:
         "lab audit-physics": lambda: audit_physics(place),
         "controls": lambda: run_controls(place),
         "explain": lambda: explain_frame(place, "hump", 0),
-        "lab lineage": lambda: trace_lineage(place, "hump"),
+        "lineage": lambda: trace_lineage(place, "hump"),
     }.items():
         with pytest.raises(InputError, match=f"no vehicle model made; musync {name} needs"):
             run()

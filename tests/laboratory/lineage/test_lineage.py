@@ -10,9 +10,9 @@ import pytest
 import yaml
 
 from catalogs.entries import find_entry
-from flows.auditing import lineage
-from flows.auditing.lineage import format_text, trace_lineage
 from flows.store.layout import Layout
+from studies.lineage import trace as lineage
+from studies.lineage.trace import format_text, trace_lineage
 from tasks.errors import InputError
 from tests.flows.reseal import reseal
 

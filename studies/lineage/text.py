@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from catalogs.citations import HEADS
 from catalogs.sentences import shorten
+from studies.lineage.citations import HEADS
 
 MARK = "*"
 WIDEST_VALUE = 28
@@ -16,7 +16,7 @@ def format_text(result: Mapping[str, Any]) -> str:
 
     Parameters
     ----------
-    result : of `flows.auditing.lineage.trace_lineage`
+    result : of `studies.lineage.trace.trace_lineage`
     """
     return "\n".join(
         [

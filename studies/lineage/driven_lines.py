@@ -12,7 +12,6 @@ from catalogs.scenario import Scenario, find_scenario_problems
 from catalogs.studies.ablation import cut_coupling
 from catalogs.variants import Variant
 from catalogs.weather.grip import GRIP_SECTIONS
-from flows.auditing.kept_lines import Line, is_number, scale_line
 from flows.making.catalogue import Catalogue
 from flows.making.driving import (
     collect_surface_figures,
@@ -26,6 +25,7 @@ from flows.making.driving import (
 from flows.running.progress import progress_bar
 from flows.store.layout import write_atomically
 from manifests.explain import REACHES, VEHICLE, kind_of_input
+from studies.lineage.kept_lines import Line, is_number, scale_line
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.explanation import Step, force_steps, pitch_steps, surface_steps

@@ -2,7 +2,7 @@
 
 import pytest
 
-from catalogs.citations import find_works, first_clause, join_works
+from studies.lineage.citations import find_works, first_clause, join_works
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import pytest
 from catalogs.entries import find_entry, load
 from catalogs.tyres import tyre_entries
 from catalogs.vehicles import open_vehicle
-from flows.auditing.kept_lines import list_lines, scale_line
+from studies.lineage.kept_lines import list_lines, scale_line
 
 
 @pytest.mark.parametrize("name", ["paper-reference", "multibody-grown"])

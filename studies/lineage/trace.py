@@ -6,20 +6,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from catalogs.citations import HEADS, find_works, first_clause, join_works
-from flows.auditing.driven_lines import (
-    ASKED,
-    Asked,
-    Moved,
-    drive_clip,
-    is_driven,
-    list_asked,
-    list_steps,
-    move_lines,
-)
 from flows.auditing.explain import find_planned_clip, find_route
-from flows.auditing.kept_lines import Line, describe_file, list_lines
-from flows.auditing.lineage_text import format_text
 from flows.making.catalogue import Catalogue
 from flows.making.gathering import table_parts
 from flows.making.input_changes import read_kept
@@ -32,6 +19,19 @@ from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
 from flows.store.telemetry import content_hash, list_columns
 from manifests.explain import JUDGING, REACHES, RENDER, kind_of_input, parse_input
+from studies.lineage.citations import HEADS, find_works, first_clause, join_works
+from studies.lineage.driven_lines import (
+    ASKED,
+    Asked,
+    Moved,
+    drive_clip,
+    is_driven,
+    list_asked,
+    list_steps,
+    move_lines,
+)
+from studies.lineage.kept_lines import Line, describe_file, list_lines
+from studies.lineage.text import format_text
 from tasks.conventions import CHANNELS_BY_NAME
 from tasks.explanation import Step
 from tasks.surface.weather import WEATHERS
@@ -76,11 +76,11 @@ def trace_lineage(dataset: str, clip: str, *, out: str | None = None) -> dict[st
     InputError
         The folder is no sealed dataset, has no such clip, or its kept entries are not those recorded.
     """
-    results = Outputs(out, "lab lineage", "lineage.json", "lineage.csv", "lineage.txt")
+    results = Outputs(out, "lineage", "lineage.json", "lineage.csv", "lineage.txt")
     layout = open_for_reading(dataset, want_inputs)
     manifest = read_manifest(layout)
     plan = Plan.of(manifest, layout.manifest)
-    refuse_traced(plan.inputs, dataset, "lab lineage")
+    refuse_traced(plan.inputs, dataset, "lineage")
     planned = find_planned_clip(plan, clip, dataset)
     kept = read_kept(layout, manifest["inputs"])
     asked = Asked(
