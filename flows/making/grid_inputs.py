@@ -1,9 +1,14 @@
 """A grid held against its catalogue entries and its scene: what the grid alone cannot tell to be wrong."""
 
+import os
+import resource
 from collections.abc import Set
+from pathlib import Path
+
+import numpy as np
 
 from catalogs.entries import load
-from catalogs.grids import Grid
+from catalogs.grids import Grid, GridFile
 from catalogs.physical_limits import find_limit_problem
 from catalogs.road_grade import ROAD_GRADE, write_road_grade
 from catalogs.scenario import find_range_problems, find_route_problems, find_scenario_problems
@@ -13,10 +18,11 @@ from catalogs.studies.ablation import cut_coupling
 from flows.making.bends import find_bend_problems
 from flows.making.driving import hazard_of, surface_of
 from flows.making.grid_entries import GridEntries, read_entries, recorded_reference
-from flows.making.memory import find_memory_problems
 from flows.making.places import remember_place
 from flows.making.traced import read_trace_inputs
+from flows.store.arrays import DIMENSION_SIZES, arrays_of
 from tasks.errors import InputError
+from tasks.render.camera import Camera
 from tasks.render.sensor import Sensor
 from tasks.render.weather.snow.layer import HIGHEST_LUMP
 from tasks.scene.route_shape import sample_grade
@@ -24,6 +30,13 @@ from tasks.surface.road_profile import RoadGrade
 from tasks.surface.weather import WEATHERS, find_weather_problem
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.strut_travel import compute_strut_travel
+
+BASE_BYTES = 600 * 2**20
+"""Of a worker with its libraries, the built-in street and the compiled kernels [B]: measured."""
+COPIES_OF_PICTURES = 2.5
+"""Memory of a clip over the size of its frames [1]: measured between 11 and 81 frames, with and without labels."""
+BYTES_PER_TICK = 700
+"""Memory of a clip's telemetry while it is driven and written [B]: measured over 500,000 ticks."""
 
 
 def read_grid_inputs(grid: Grid, tick_rate_hz: int) -> tuple[GridEntries, dict[str, str], list[str]]:
@@ -166,3 +179,49 @@ def _find_route_problems(grid: Grid) -> list[str]:
         for problem in find_route_problems(scenario, route.length, grid.settings.scene):
             problems.setdefault(problem, f"scenario {label}: {problem}")
     return list(problems.values())
+
+
+def clip_memory(settings: GridFile, camera: Camera, ticks: int) -> int:
+    """Memory that a worker needs for one clip [B].
+
+    Parameters
+    ----------
+    settings : of the grid
+    camera : whose pictures are made
+    ticks : rows of telemetry of a clip [1]
+    """
+    numbers = sum(
+        np.dtype(array.dtype).itemsize
+        * int(np.prod([DIMENSION_SIZES[dimension] for dimension in array.dimensions]))
+        for array in arrays_of(settings.labels).values()
+    )
+    pixels = settings.frames * camera.width * camera.height if settings.pictures else 0
+    return int(BASE_BYTES + COPIES_OF_PICTURES * numbers * pixels + BYTES_PER_TICK * ticks)
+
+
+def memory_here() -> int:
+    """Memory that a process of this machine may have at most [B]."""
+    limits = [os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")]
+    soft, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if soft != resource.RLIM_INFINITY:
+        limits.append(soft)
+    container = Path("/sys/fs/cgroup/memory.max")
+    if container.is_file() and (text := container.read_text().strip()).isdigit():
+        limits.append(int(text))
+    return min(limits)
+
+
+def find_memory_problems(settings: GridFile, camera: Camera, ticks: int) -> list[str]:
+    """A sentence where one clip does not fit into this machine's memory.
+
+    Parameters
+    ----------
+    settings, camera, ticks : as of `clip_memory`
+    """
+    needed, here = clip_memory(settings, camera, ticks), memory_here()
+    if needed <= here:
+        return []
+    return [
+        f"frames: a clip must fit into memory; {settings.frames} frames need about {needed / 1e9:.1f} GB,"
+        f" and this machine has {here / 1e9:.1f} GB: take fewer frames, or a smaller camera"
+    ]

@@ -8,8 +8,8 @@ import numpy as np
 
 from catalogs.learned_judges import load_judges
 from catalogs.sentences import cap_problems
-from flows.judging.claims import read_claim
 from flows.judging.evaluation_means import average_within_seeds
+from flows.judging.foreign import read_claim
 from flows.judging.foreign_sources import read_camera
 from flows.judging.judged_clip import Row
 from flows.judging.motion_curves import draw_motion
