@@ -1,4 +1,4 @@
-"""``musync vehicle new`` and ``check``: a short file for a data sheet's numbers, and its figures beside those of cars."""
+"""``musync vehicle new`` and ``check``: a short file for a data sheet, and its figures beside those of cars that exist."""
 
 import json
 import os
