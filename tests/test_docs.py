@@ -16,7 +16,7 @@ from benchmarks.size import list_sentences, measure_documents
 from catalogs.channel_maps.conditions import Conditions
 from catalogs.entries import load
 from manifests.provenance import SOURCE_ROOT
-from reference_pages.hooks import WRITERS
+from reference_pages.pages import WRITERS
 from tasks.conventions import CHANNELS_BY_NAME
 from tests.conftest import DATA
 from tests.documents import DOCS, DOCUMENTS, list_blocks, list_command_lines, list_named_commands, parse_line

@@ -1,4 +1,4 @@
-"""``musync vehicle new`` and ``check``: a short file for a data sheet, and its figures beside those of cars that exist."""
+"""``musync vehicle new`` and ``check``: a short file for a data sheet, and its figures beside those of real cars."""
 
 import json
 import os

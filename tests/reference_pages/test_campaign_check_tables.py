@@ -5,8 +5,8 @@ import re
 import yaml
 
 from catalogs.campaign_checks import CAMPAIGN_CHECKS
-from reference_pages.hooks import insert_tables
 from reference_pages.markdown import format_cell, format_value
+from reference_pages.pages import insert_tables
 from tests.documents import DOCS
 
 PAGE = insert_tables((DOCS / "reference" / "campaign-checks.md").read_text())

@@ -6,8 +6,8 @@ import yaml
 
 from catalogs.decision_rules import DECISION_RULES
 from catalogs.effects import LIBRARY_FILE
-from reference_pages.hooks import ASKED, TABLES, insert_tables
 from reference_pages.markdown import format_cell
+from reference_pages.pages import ASKED, TABLES, insert_tables
 from reference_pages.verdict_rules import read_meanings
 from tasks.identification.rules import DecisionRules
 from tests.documents import DOCS
