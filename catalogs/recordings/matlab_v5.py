@@ -59,10 +59,10 @@ def load_v5_variables(content: bytes) -> Struct:
         If its elements break the format, or are too large when unpacked.
     """
     check_elements(content, LARGEST_FILE)
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         loaded = loadmat(io.BytesIO(content), struct_as_record=False, squeeze_me=False, chars_as_strings=True)
-    twice = [str(warning.message) for warning in told if "Duplicate variable name" in str(warning.message)]
+    twice = [str(warning.message) for warning in caught if "Duplicate variable name" in str(warning.message)]
     if twice:
         raise InputError(
             f"must have distinct variables; {shorten(twice[0].split(' in stream')[0])}: save each under its own name"

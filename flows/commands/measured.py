@@ -28,10 +28,10 @@ def shorten_import(result: dict[str, Any]) -> dict[str, Any]:
     """Return the report of an import, or a narrow table of signals for each recording."""
     if "signals" not in result:
         assumed = result["assumed_tolerances_1sigma"]
-        told = ", ".join(f"{name} {sigma:g}" for name, sigma in assumed.items())
+        listed_tolerances = ", ".join(f"{name} {sigma:g}" for name, sigma in assumed.items())
         runs = [run | {"start_s": _write_time(run["start_s"])} for run in result.get("runs", [])]
         listed = {"runs": runs} if runs else {}
-        return result | listed | {"assumed_tolerances_1sigma": told or "none"}
+        return result | listed | {"assumed_tolerances_1sigma": listed_tolerances or "none"}
     return {
         file: [_shorten_signal(row, any(row["note"] for row in rows)) for row in rows]
         for file, rows in result["signals"].items()

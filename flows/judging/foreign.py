@@ -56,8 +56,8 @@ def judge_video(
         Every file that cannot be read, in one sentence each.
     """
     results = Outputs(out, "lab judge", "judgement.json")
-    footage, told, lens = _read_all((read_footage, video), (read_claim, claim), (read_camera, camera))
-    at = sample_claim(told, footage.times)
+    footage, claimed, lens = _read_all((read_footage, video), (read_claim, claim), (read_camera, camera))
+    at = sample_claim(claimed, footage.times)
     recovered = footage.motion(lens, at.rows, metric=metric)
     verdict = judge_motion(recovered, at, load("foreign gate file"))
     times, is_video = footage.times, footage.frames is not None

@@ -154,8 +154,8 @@ def _list_judged(clips: Sequence[JudgedClip], standard: Standard) -> Iterator[Ju
             continue
         for method, motion in clip.motions.items():
             yield clip, method, motion, meant
-        if standard.suffix and (told := motion_of(clip, TELEMETRY)) is not None:
-            yield clip, TELEMETRY, told, meant
+        if standard.suffix and (own := motion_of(clip, TELEMETRY)) is not None:
+            yield clip, TELEMETRY, own, meant
 
 
 def _score_change(

@@ -207,19 +207,22 @@ def draw_trajectories(
     time = reference["time"][thin]
     truth = {name: values[thin] for name, values in _read_reference(reference).items()}
     models = {
-        told: {
+        ride_name: {
             name: np.interp(time, ride.columns["t_ns"] * 1e-9, values, right=np.nan)
             for name, values in _read_ride(ride).items()
         }
-        for told, ride in rides.items()
+        for ride_name, ride in rides.items()
     }
     above, below = [], []
     for name, label in QUANTITIES.items():
         curves = [
-            (told, model[name], style) for style, (told, model) in zip(STYLES, models.items(), strict=False)
+            (ride_name, model[name], style)
+            for style, (ride_name, model) in zip(STYLES, models.items(), strict=False)
         ]
-        shown = [Line(name=told, x=time, y=y, style=style) for told, y, style in curves]
-        left = [Line(name=told, x=time, y=y - truth[name], style=style) for told, y, style in curves]
+        shown = [Line(name=ride_name, x=time, y=y, style=style) for ride_name, y, style in curves]
+        left = [
+            Line(name=ride_name, x=time, y=y - truth[name], style=style) for ride_name, y, style in curves
+        ]
         reference_line = Line(name="reference", x=time, y=truth[name], style=Style("ink", "dashed"))
         above.append(Panel(y=label, lines=[reference_line, *shown], shaded=[window]))
         below.append(Panel(y="difference", lines=left, shaded=[window]))

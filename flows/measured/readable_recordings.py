@@ -22,7 +22,7 @@ Signals = dict[Path, dict[str, Signal]]
 MOST_FAULTY = 1 / 3
 """Share of recordings, or of runs, that may be left out for their faults; more are a fault of the map [1]."""
 SHARED = 3
-"""Places from which a fault is told once for all of them [1]."""
+"""Places from which a fault is reported once for all of them [1]."""
 NUMBER = re.compile(r"(?<![\w.^-])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?!\w)")
 """A figure of a sentence; no digit of a name (run-01, w_2) or of a unit (m/s^2)."""
 
@@ -58,11 +58,11 @@ def read_recordings(
                 PlacedProblem(name=file.name, place=file.name, sentence=problem) for problem in found
             ]
             del recordings[file]
-    told = join_shared_problems(problems, len(files), "files", exact=True)
+    joined = join_shared_problems(problems, len(files), "files", exact=True)
     lost = [file.name for file in files if file not in recordings]
     if len(lost) > MOST_FAULTY * len(files):
-        raise InputError(told)
-    return channel_map, recordings, told, lost
+        raise InputError(joined)
+    return channel_map, recordings, joined, lost
 
 
 def find_signal_problems(source: Path, channel_map: ChannelMap | None) -> list[str]:
@@ -108,13 +108,13 @@ def leave_out_faulty(
         for run, found in made
         for problem in found.problems
     ]
-    told = join_shared_problems(placed, len(made), "runs")
+    joined = join_shared_problems(placed, len(made), "runs")
     faulty = {problem.name for problem in placed}
     kept = [(run, found) for run, found in made if run.name not in faulty]
     parts = {run.part for run, _ in made} - {run.part for run, _ in kept}
     if parts or len(faulty) > MOST_FAULTY * len(made) or any(found.of_map for _, found in made):
-        raise InputError(told)
-    return kept, told
+        raise InputError(joined)
+    return kept, joined
 
 
 def _fill_units(channel_map: ChannelMap, recordings: Signals) -> ChannelMap:
@@ -142,8 +142,8 @@ def _find_recording_problems(signals: dict[str, Signal], channel_map: ChannelMap
     clock = channel_map.time
     taken = clock.unit if clock is not None and clock.unit in UNITS else "s"
     recording = Recordings(signals=[signals], rules=channel_map.rules, clock_unit=taken)
-    told = apply_checks(load_campaign_checks().recording, recording)
-    return [*find_unit_problems(channel_map.rules, signals), *(one.sentence for one in told)]
+    violations = apply_checks(load_campaign_checks().recording, recording)
+    return [*find_unit_problems(channel_map.rules, signals), *(one.sentence for one in violations)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -168,7 +168,7 @@ def place_in_file(path: Path, problem: str) -> PlacedProblem:
     Parameters
     ----------
     path : of the file
-    problem : as its reader told it
+    problem : as its reader reported it
     """
     place = next((start for start in (str(path), path.name) if problem.startswith(start)), "")
     sentence = problem[len(place) :].lstrip(": ") if place else problem
@@ -185,17 +185,17 @@ def join_shared_problems(
 
     Parameters
     ----------
-    found : in the order in which they are told
+    found : in the order in which they are reported
     total : runs or files that were looked at [1]
     kind : what they are, such as runs
-    exact : join only what is told in the same figures, as the names of signals are
+    exact : join only what is reported in the same figures, as the names of signals are
     """
     groups: dict[tuple[str, int], list[PlacedProblem]] = {}
-    told: dict[tuple[str, str], int] = {}
+    counts: dict[tuple[str, str], int] = {}
     for problem in found:
         form = problem.sentence if exact else NUMBER.sub("#", problem.sentence)
-        before = told.get((problem.place, form), 0)
-        told[problem.place, form] = before + 1
+        before = counts.get((problem.place, form), 0)
+        counts[problem.place, form] = before + 1
         groups.setdefault((form, before), []).append(problem)
     return [
         sentence

@@ -37,7 +37,7 @@ from catalogs.entries import load
 from catalogs.sentences import shorten
 from flows.running.prefect_progress import show_progress
 from flows.running.runner import RunnerName, end_with_parent
-from flows.scheduled.failure_report import is_told_of, report_failure, report_run
+from flows.scheduled.failure_report import report_failure, report_run, wants_notice
 from flows.scheduled.retention import remove_oldest
 from flows.scheduled.scheduling import recorded_run
 from flows.scheduled.serving import read_options, serve_flow
@@ -83,7 +83,7 @@ def _report_crash(flow: Any, flow_run: Any, state: Any) -> None:
     """A run whose process was killed cannot report by itself: whoever started it does."""
     options = read_options(flow_run.parameters)
     at = flow_run.expected_start_time or datetime.now(UTC)
-    notify = options["notify"] if is_told_of("failed", options["notify_on"]) else None
+    notify = options["notify"] if wants_notice("failed", options["notify_on"]) else None
     report_failure(
         options["grid"], options["root"], at, _explain_crash(flow_run.parameters, state.message), notify
     )
@@ -127,7 +127,7 @@ def _make_dataset_at(
     log = get_run_logger()
 
     def tell(event: str, facts: dict[str, str]) -> None:
-        if notify is not None and is_told_of(event, notify_on):
+        if notify is not None and wants_notice(event, notify_on):
             report_run(event, grid, root, at, facts, notify)
 
     try:
@@ -137,7 +137,7 @@ def _make_dataset_at(
         ):
             result = make_dataset(grid, root, at=at, **execution)
     except Exception as error:
-        report_failure(grid, root, at, error, notify if is_told_of("failed", notify_on) else None)
+        report_failure(grid, root, at, error, notify if wants_notice("failed", notify_on) else None)
         raise
     dataset: str = result["dataset"]
     wrong = [row["clip"] for row in result["verdicts"] if row["passed"] is False]
