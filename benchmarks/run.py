@@ -1,4 +1,4 @@
-"""Benchmarks by name, for ``python -m studies bench``."""
+"""Benchmarks by name, for ``musync lab bench``."""
 
 from importlib import import_module
 from typing import Any
