@@ -11,6 +11,7 @@ from catalogs.grids.blocks import Number as LaxNumber
 from catalogs.grids.selection import Condition
 from catalogs.names import Name
 from catalogs.physical_limits import find_limit_problem
+from catalogs.street_names import SceneName
 from catalogs.variants import Variant
 
 LIMITS = load("table of physical limits")
@@ -29,9 +30,10 @@ class GridFile(Blocks):
     """A grid as written in YAML."""
 
     name: Name = Field(description="Name of the dataset.")
-    scene: Reference = Field(
+    scene: SceneName = Field(
         default="street",
-        description="Built-in street (hill climbs by 8 % from station 40 m on), or folder of a scene of your own.",
+        description="Built-in street (hill climbs by 8 % from station 40 m on), {street: {kind: town, seed: 7}}, or"
+        " folder of a scene of your own. A level may name another: the clips of a grid drive in many scenes.",
     )
     vehicle: Reference = Field(default="paper-reference", description="Vehicle: name, or file of your own.")
     surface: Reference = Field(default="dense-asphalt", description="Pavement: name, or file of your own.")
