@@ -1,0 +1,1 @@
+"""Rigid bodies of road users as Gaussians: cars, vans, trucks, pedestrians, bicycles."""
