@@ -102,7 +102,9 @@ class Blocks(Strict):
     @property
     def has_features(self) -> bool:
         """Whether a scenario may have a hump or a depression."""
-        levels = [level for axes in (self.axes, self.zip) for rows in axes.values() for level in rows.values()]
+        levels = [
+            level for axes in (self.axes, self.zip) for rows in axes.values() for level in rows.values()
+        ]
         drawn = {} if self.latin_hypercube is None else self.latin_hypercube.ranges
         return "hazard_height_m" in drawn or any(
             level.hazard_height_m for level in (*levels, *self.scenarios.values())
