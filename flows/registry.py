@@ -4,7 +4,7 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
-from flows.commands import audits, datasets, evaluation, measured, scenes, studies, vehicles
+from flows.commands import audits, datasets, evaluation, measured, scenes, vehicles
 from flows.commands.command import Command
 
 COMMANDS: tuple[Command, ...] = (
@@ -14,7 +14,6 @@ COMMANDS: tuple[Command, ...] = (
     *vehicles.COMMANDS,
     *measured.COMMANDS,
     *scenes.COMMANDS,
-    *studies.COMMANDS,
 )
 
 

@@ -1,0 +1,1 @@
+"""Studies of the paper: ``python -m studies sensitivity`` and ``ablation``."""

@@ -1,0 +1,1 @@
+"""Edited videos of many models judged by one protocol: ``python -m studies judge-set``."""
