@@ -1,4 +1,4 @@
-"""Commands of the laboratory, which ``python -m studies`` runs as ``musync`` runs its own."""
+"""Commands of the laboratory, which ``musync lab`` runs beside those of the house."""
 
 from collections import Counter
 
@@ -86,7 +86,7 @@ def show_table(result: Result) -> Result:
 
 COMMANDS = (
     Command(
-        name="brake-protocol",
+        name="lab brake-protocol",
         group=MEASURED,
         is_flow=False,
         sentence="Select braking events by the paper's rules and predict each drive from the others (Appendix C.5).",
@@ -106,7 +106,7 @@ COMMANDS = (
         brief=shorten_brake_protocol,
     ),
     Command(
-        name="stop-study",
+        name="lab stop-study",
         group=MEASURED,
         is_flow=False,
         sentence="Calibrate on one stop of a car, predict another, and add what the model lacks step by step.",
@@ -125,7 +125,7 @@ COMMANDS = (
         brief=shorten_stop_study,
     ),
     Command(
-        name="bump-study",
+        name="lab bump-study",
         group=MEASURED,
         is_flow=False,
         sentence="Find the road features in a recording's pitch rate, and fit the car that drove over them.",
@@ -144,7 +144,7 @@ COMMANDS = (
         brief=shorten_bump_study,
     ),
     Command(
-        name="synthetic-drives",
+        name="lab synthetic-drives",
         group=MEASURED,
         is_flow=False,
         sentence="Write drives as a car's bus logs them, with known truth, to try the brake protocol on.",
@@ -157,7 +157,7 @@ COMMANDS = (
         ),
     ),
     Command(
-        name="closing-benchmark",
+        name="lab close-loop-benchmark",
         group=KNOWN,
         is_flow=False,
         sentence="Count how often close-loop is right on campaigns whose truth is known.",
@@ -186,7 +186,7 @@ COMMANDS = (
         one_thread=True,
     ),
     Command(
-        name="controls",
+        name="lab controls",
         group=KNOWN,
         is_flow=False,
         sentence="Falsify a dataset's claims and motions in fourteen ways, and say which metric detects which fault.",
@@ -196,7 +196,7 @@ COMMANDS = (
         passed=require_key("all_detected"),
     ),
     Command(
-        name="sensitivity",
+        name="lab sensitivity",
         group=PAPER,
         is_flow=False,
         sentence="Reproduce the paper's bounded surface-parameter study (Appendix E) beside its printed figures.",
@@ -206,7 +206,7 @@ COMMANDS = (
         passed=lambda result: all(row["agrees"] for row in result["beside_print"]),
     ),
     Command(
-        name="ablation",
+        name="lab ablation",
         group=PAPER,
         is_flow=False,
         sentence="Cut one coupling at a time (the paper's Section 4.4): stops over the weather, pitch at a hump.",
@@ -225,7 +225,7 @@ COMMANDS = (
         brief=select_keys("pitch", "reference"),
     ),
     Command(
-        name="bench",
+        name="lab bench",
         group=SPEED,
         is_flow=False,
         sentence="Measure speed and memory, beside another implementation in the same run.",
@@ -233,7 +233,7 @@ COMMANDS = (
         options=(define_argument("name", str | None, "Benchmark to run; by default all.", None), OUT),
     ),
     Command(
-        name="judge-set",
+        name="lab judge-set",
         group=PAPER,
         is_flow=False,
         sentence="Judge the clips of video editors by a protocol: a table of models, the paper's figures beside them.",
@@ -267,7 +267,7 @@ COMMANDS = (
         brief=show_table,
     ),
     Command(
-        name="lineage",
+        name="lab lineage",
         group=ORIGINS,
         is_flow=False,
         sentence="List the catalogue lines, works and measured runs that the numbers of a clip rest on, by column.",

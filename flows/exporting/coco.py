@@ -4,37 +4,34 @@ A mask is an uncompressed run-length code, column by column, as COCO counts it. 
 because trainers take 0 for "nothing". A class is no set of objects: where it appears in several places it is still one
 mask (``iscrowd`` 1). Boxes are x, y, width, height in pixels, from the picture's upper left corner.
 
-Parked cars, lamps, signs, bollards, bins and the letter box of the built-in street are objects. Each has a mask and a
-box of its own (``iscrowd`` 0, categories from 101 on), ``instance_id``, ``visibility``, ``truncation`` (null where too
-little of it is seen). ``objects`` has their 3D boxes in the world, each image its ``T_world_camera``, and ``camera`` is
-that of all images, with its lens and shutter.
+Parked cars, lamps, signs, bollards, bins and the letter box of a street that muSync makes are objects. Each has a mask
+and a box of its own (``iscrowd`` 0, categories from 101 on), ``instance_id``, ``visibility``, ``truncation`` (null
+where too little of it is seen). ``objects`` has their 3D boxes in the world, each image its ``T_world_camera``, and
+``camera`` is that of all images, with its lens and shutter. Images and objects name the scene where there are several.
 
 Format: https://cocodataset.org/#format-data
 """
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
-from math import isnan
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from catalogs.scenes import load_scene, scene_identity
-from catalogs.scenes.street import load_street_layout
 from flows.exporting.camera import describe_camera
 from flows.exporting.dataset import ExportedDataset
+from flows.exporting.instances import describe_object, find_scene_objects, to_share
 from flows.exporting.json_array import open_array
 from tasks.conventions import SemanticClass
 from tasks.render.contact_sheet import encode_png
-from tasks.render.instances import InstanceFinder, Instances
-from tasks.scene.street.objects import KINDS, StreetObject, list_objects, own_gaussians
+from tasks.render.instances import Instances
+from tasks.scene.street.objects import KINDS, StreetObject
 
 FIRST_KIND = 100
 """Category ids of objects begin after it [1]; those of classes lie below."""
-STREET = "street"
 
 
 def write_coco(dataset: ExportedDataset, folder: Path) -> None:
@@ -48,12 +45,17 @@ def write_coco(dataset: ExportedDataset, folder: Path) -> None:
     (folder / "images").mkdir()
     images: list[dict[str, Any]] = []
     count = 0
-    scene = find_scene_objects(dataset)
+    objects: dict[str | None, tuple[StreetObject, ...]] = {}
+    find_scene = lru_cache(maxsize=1)(
+        lambda name: find_scene_objects(dataset.plan.record_of(name), dataset.camera)
+    )
     with (folder / "annotations.json").open("w") as stream:
         stream.write('{"annotations": ')
         with open_array(stream) as annotations:
             for clip in dataset:
-                classes, poses = clip.read_array("class"), clip.T_world_camera
+                classes, poses, named = clip.read_array("class"), clip.T_world_camera, clip.scenario.scene
+                if (scene := find_scene(named)) is not None:
+                    objects[named] = scene.objects
                 depth = clip.read_array("depth") if scene else None
                 for frame, picture in enumerate(clip.read_array("rgb")):
                     name = f"{clip.name}_{frame:06d}.png"
@@ -61,6 +63,7 @@ def write_coco(dataset: ExportedDataset, folder: Path) -> None:
                     images.append(
                         _describe_image(len(images) + 1, name, clip.label, frame, picture)
                         | {"T_world_camera": poses[frame].tolist()}
+                        | ({} if named is None else {"scene": named})
                     )
                     masks = [
                         describe_mask(classes[frame] == kind, kind)
@@ -73,18 +76,24 @@ def write_coco(dataset: ExportedDataset, folder: Path) -> None:
                         count += 1
                         annotations.append({"id": count, "image_id": len(images)} | mask)
         categories = [{"id": kind + 1, "name": kind.name.lower()} for kind in SemanticClass]
-        if scene is not None:
+        if objects:
             categories += [
                 {"id": FIRST_KIND + 1 + place, "name": kind, "supercategory": "object"}
                 for place, kind in enumerate(KINDS)
             ]
-        rest = {
+        rest: dict[str, Any] = {
             "camera": describe_camera(dataset.camera),
             "images": images,
             "categories": categories,
             "info": {"description": f"muSync {dataset.name}", "version": dataset.manifest["run_id"]},
             "licenses": [],
-        } | ({} if scene is None else {"objects": [describe_object(thing) for thing in scene.objects]})
+        }
+        if objects:
+            rest["objects"] = [
+                describe_object(thing) | ({} if named is None else {"scene": named})
+                for named, things in objects.items()
+                for thing in things
+            ]
         stream.write(f", {json.dumps(rest, allow_nan=False)[1:]}")
 
 
@@ -138,58 +147,3 @@ def _describe_image(
     return {
         "id": number, "file_name": f"images/{name}", "height": height, "width": width, "clip": label, "frame": frame
     }  # fmt: skip
-
-
-@dataclass(frozen=True, kw_only=True)
-class SceneObjects:
-    """Objects of a scene, and what finds them in a frame.
-
-    Parameters
-    ----------
-    objects : in the order of their numbers
-    finder : of their pixels
-    """
-
-    objects: tuple[StreetObject, ...]
-    finder: InstanceFinder
-
-
-def find_scene_objects(dataset: ExportedDataset) -> SceneObjects | None:
-    """Return the objects of the dataset's scene.
-
-    None where they are not known, or not to be found in its pictures: of every scene but the built-in street of this
-    version, with a lens that distorts, and with a shutter that takes the rows one after the other.
-
-    Parameters
-    ----------
-    dataset : with frames
-    """
-    scene, camera = dataset.plan.scene, dataset.camera
-    if scene["name"] != STREET or camera.distortion is not None or camera.line_delay_s or camera.motion_blur:
-        return None
-    if scene["sha256"] != scene_identity(STREET):
-        return None
-    objects, owners, classes = list_objects(load_street_layout())
-    cloud = load_scene(STREET).gaussians
-    return SceneObjects(objects=objects, finder=InstanceFinder(cloud, own_gaussians(cloud, owners, classes)))
-
-
-def describe_object(thing: StreetObject) -> dict[str, Any]:
-    """Return the box of an object in the world as JSON has it: metres, and radians from the world's x.
-
-    Parameters
-    ----------
-    thing : the object
-    """
-    return {
-        "id": thing.number,
-        "kind": thing.kind,
-        "centre": thing.centre.tolist(),
-        "size": thing.size.tolist(),
-        "heading": thing.heading,
-    }
-
-
-def to_share(value: float) -> float | None:
-    """Return a share with three decimals; None where it is not represented."""
-    return None if isnan(value) else round(value, 3)

@@ -8,7 +8,7 @@ from manifests.canonical import sha256_of
 from manifests.provenance import source_hashes
 
 ERROR_RATES = CATALOGUE / "studies" / "closing_error_rates.json"
-"""Counts of `python -m studies closing-benchmark`, without the campaigns one by one."""
+"""Counts of `musync lab close-loop-benchmark`, without the campaigns one by one."""
 JUDGES = (
     "tasks/campaign/",
     "tasks/conventions",

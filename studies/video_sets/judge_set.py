@@ -60,7 +60,7 @@ def judge_video_set(
     InputError
         For every file that cannot be read, or that no clip of the protocol has; or for another window.
     """
-    results = Outputs(out, "judge-set", "judge-set.json", "judge-set.md", MOTION)
+    results = Outputs(out, "lab judge-set", "judge-set.json", "judge-set.md", MOTION)
     chosen = load_protocol(protocol)
     smoothing = int(chosen.smoothing_window.value) if window is None else window
     known = [width or 0 for width in WINDOWS]

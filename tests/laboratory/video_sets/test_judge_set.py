@@ -1,4 +1,4 @@
-"""`python -m studies judge-set`: editors whose motion is known must land where the protocol's equations say."""
+"""`musync lab judge-set`: editors whose motion is known must land where the protocol's equations say."""
 
 import json
 from pathlib import Path
