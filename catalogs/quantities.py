@@ -119,14 +119,14 @@ def read_entry(model: type[Entry], path: Path, kind: str) -> Entry:
 
 
 @lru_cache(maxsize=64)
-def parse_entry(model: type[Entry], content: bytes, place: Hashable, kind: str) -> Entry:
-    """Check the content of one YAML file; the same content of the same place is checked once.
+def parse_entry(model: type[Entry], content: bytes, origin: Hashable, kind: str) -> Entry:
+    """Check the content of one YAML file; the same content of the same origin is checked once.
 
     Parameters
     ----------
     model : what it must hold
     content : of the file
-    place, kind : where it comes from and what it is called in the sentences
+    origin, kind : where it comes from and what it is called in the sentences
 
     Raises
     ------
@@ -135,6 +135,6 @@ def parse_entry(model: type[Entry], content: bytes, place: Hashable, kind: str) 
     """
     parse = parse_yaml_value if issubclass(model, RootModel) else parse_yaml
     try:
-        return model.model_validate(parse(content, place, kind, finite=False))
+        return model.model_validate(parse(content, origin, kind, finite=False))
     except ValidationError as error:
-        raise InputError(cap_problems(describe_rules(error, place))) from None
+        raise InputError(cap_problems(describe_rules(error, origin))) from None
