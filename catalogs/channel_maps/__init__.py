@@ -215,8 +215,8 @@ class ChannelMap(CatalogueEntry):
         if (common := info.data.get("conditions")) is not None:
             laid = {f"run {run.name}": _lay_over(common, run) for run in runs} or {"conditions": common}
             problems += [
-                f"{origin}: {problem}"
-                for origin, conditions in laid.items()
+                f"{key_path}: {problem}"
+                for key_path, conditions in laid.items()
                 for problem in find_condition_problems(conditions.model_dump())
             ]
         return _raise_problems(runs, problems)
