@@ -26,6 +26,10 @@ class CatalogueEntry(BaseModel):
         """Return what the entry is for those who ask for it: itself, where a kind has no other value."""
         return self
 
+    def values(self) -> dict[str, Any]:
+        """Return the numbers of its quantities, by their names [their own units]."""
+        return {name: one.value for name, one in self if isinstance(one, Scalar | Table)}
+
 
 class CatalogueList(RootModel[Content]):
     """Base of a file that is a list of entries, or a table of names that it chooses itself."""
