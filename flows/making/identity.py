@@ -23,6 +23,8 @@ def list_deciding(
     later = {name: getattr(settings, name) for name in BEFORE}
     if not settings.keeps_stops_steady:
         later["low_speed"] = BEFORE["low_speed"]
+    if not settings.grips_by_speed:
+        later["wet_friction"] = BEFORE["wet_friction"]
     return {
         "scene": dict(scene),
         "inputs": dict(inputs),
