@@ -52,7 +52,7 @@ def write_fmu(
     ----------
     vehicle : catalogue name or file
     out : the file, NAME.fmu
-    surface : the pavement whose dry friction is the friction at the start
+    surface : the pavement whose dry friction is the friction at the start, and whose texture holds water
     platforms : where it will run; None takes this one
 
     Returns
@@ -106,11 +106,12 @@ def pack_fmu(car: Vehicle, content: bytes, surface: str, platforms: Sequence[str
     ----------
     car : the vehicle
     content : its file with everything that it inherits
-    surface : the pavement whose dry friction is the friction at the start
+    surface : the pavement, as of `write_fmu`
     platforms : where it will run, of `PLATFORMS`
     """
     weathers = car.find_weathers()
-    first = surface_state(Weather(kind=weathers[0]), load("surface", surface))
+    pavement = load("wet friction").apply(load("surface", surface))
+    first = surface_state(Weather(kind=weathers[0]), pavement)
     starts = {row.name: row.start for row in INPUTS} | {
         "weather": float(find_weather(weathers[0]).code),
         "road_friction": first.friction,
@@ -128,7 +129,7 @@ def pack_fmu(car: Vehicle, content: bytes, surface: str, platforms: Sequence[str
         ),
         "resources/vehicle.yaml": content,
     }
-    compiled, header = compile_advance(car), format_header(car, starts.values(), guid)
+    compiled, header = compile_advance(car, pavement), format_header(car, starts.values(), guid)
     for target in (PLATFORMS[name] for name in platforms):
         with TemporaryDirectory() as folder:
             place = f"binaries/{target.name}/{identifier}{target.suffix}"
