@@ -27,7 +27,7 @@ from tasks.vehicle.tyres.contract import compute_braking_slip, compute_tyre_fric
 TOLERANCE = 1e-9
 """Largest difference from the stored number, relative to it, that rounding explains [1]."""
 ROAD_POINT_M = 10.0
-"""The road point whose shift is told lies this far ahead of the front axle [m]."""
+"""The road point whose shift is given lies this far ahead of the front axle [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -163,7 +163,7 @@ def pitch_steps(
     ----------
     vehicle, response, hazard : as above
     row : the stored frame
-    ride : the clip driven again from its scenario; the moment is told in paper mode only
+    ride : the clip driven again from its scenario; the moment is given in paper mode only
     steady : how the end of its stop is kept steady; None takes the published rule literally
     """
     tick = int(row["tick"])
@@ -173,7 +173,7 @@ def pitch_steps(
         climb = vehicle.gravity * grade if np.isfinite(grade := float(row["road_grade"])) else 0.0
         d = max(-float(row["longitudinal_acceleration"]) - climb, min(-climb, 0.0))
         steps.append(Step(
-            quantity=f"brake-pitch moment{_tell_rule(response, ride, steady, tick)}",
+            quantity=f"brake-pitch moment{_describe_rule(response, ride, steady, tick)}",
             symbol="M_b", equation="S16", unit="N m",
             formula=f"{scale:.5g} * {vehicle.sprung_mass:g} * {vehicle.cg_height:g} * {d:.5g}",
             recomputed=scale * vehicle.sprung_mass * vehicle.cg_height * d,
@@ -187,7 +187,7 @@ def pitch_steps(
     ]  # fmt: skip
 
 
-def _tell_rule(response: SurfaceResponse, ride: Rollout, steady: SteadyStop | None, tick: int) -> str:
+def _describe_rule(response: SurfaceResponse, ride: Rollout, steady: SteadyStop | None, tick: int) -> str:
     """Say when the low-speed rule acts, at a tick at which it may put another moment in the place of Eq. S16's."""
     if steady is not None and not steady.pitch_rule:
         return ""
