@@ -138,8 +138,10 @@ def expand_grid(settings: GridFile, place: str) -> Grid:
         idle=tuple(sorted(idle)),
     )
     if problems:
-        told = [f"{shorten(place)}: scenario {name_some(named)}: {rule}" for rule, named in problems.items()]
-        raise FaultyGrid(cap_problems(told), grid)
+        sentences = [
+            f"{shorten(place)}: scenario {name_some(named)}: {rule}" for rule, named in problems.items()
+        ]
+        raise FaultyGrid(cap_problems(sentences), grid)
     return grid
 
 

@@ -101,6 +101,17 @@ class Blocks(Strict):
         ),
     ] = None
 
+    @property
+    def has_features(self) -> bool:
+        """Whether a scenario may have a hump or a depression."""
+        levels = [
+            level for axes in (self.axes, self.zip) for rows in axes.values() for level in rows.values()
+        ]
+        drawn = {} if self.latin_hypercube is None else self.latin_hypercube.ranges
+        return "hazard_height_m" in drawn or any(
+            level.hazard_height_m for level in (*levels, *self.scenarios.values())
+        )
+
     @model_validator(mode="after")
     def _something_to_make(self) -> "Blocks":
         if not (self.axes or self.zip or self.scenarios or self.latin_hypercube):

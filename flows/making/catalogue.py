@@ -14,6 +14,7 @@ from catalogs.studies.ablation import ABLATION, FamilyWeather, find_families
 from catalogs.vehicles import VehicleFile, open_vehicle
 from catalogs.weather.grip import WeatherFolder
 from catalogs.weather.look import load_weather
+from catalogs.wet_friction import WET_FRICTION
 from flows.making.places import find_scene
 from flows.making.plan import read_plan
 from flows.making.traced import Reference
@@ -69,7 +70,9 @@ class Catalogue:
     @cached_property
     def surface(self) -> SurfaceParameters:
         """The pavement."""
-        return load("surface", self._inputs / "surface.yaml", self.weather)
+        pavement: SurfaceParameters = load("surface", self._inputs / "surface.yaml", self.weather)
+        wet = self._load_kept("wet friction", WET_FRICTION)
+        return pavement if wet is None else wet.apply(pavement)
 
     @cached_property
     def camera(self) -> Camera:

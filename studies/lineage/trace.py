@@ -77,11 +77,11 @@ def trace_lineage(dataset: str, clip: str, *, out: str | None = None) -> dict[st
     InputError
         The folder is no sealed dataset, has no such clip, or its kept entries are not those recorded.
     """
-    results = Outputs(out, "lineage", "lineage.json", "lineage.csv", "lineage.txt")
+    results = Outputs(out, "lab lineage", "lineage.json", "lineage.csv", "lineage.txt")
     layout = open_for_reading(dataset, want_inputs)
     manifest = read_manifest(layout)
     plan = Plan.of(manifest, layout.manifest)
-    refuse_traced(plan.inputs, dataset, "lineage")
+    refuse_traced(plan.inputs, dataset, "lab lineage")
     planned = find_planned_clip(plan, clip, dataset)
     kept = {
         name: content

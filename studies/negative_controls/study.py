@@ -84,10 +84,10 @@ def run_controls(dataset: str, *, out: str | None = None) -> dict[str, Any]:
         If the folder is no finished dataset with frames, or holds fewer than two clips, or these or the scene are not
         as recorded.
     """
-    results = Outputs(out, "controls", "controls.json", "controls.svg")
+    results = Outputs(out, "lab controls", "controls.json", "controls.svg")
     layout = open_for_reading(dataset)
     root, manifest = layout.root, read_manifest(layout)
-    refuse_traced(read_plan(root).inputs, dataset, "controls")
+    refuse_traced(read_plan(root).inputs, dataset, "lab controls")
     require_frames(manifest, dataset)
     refuse_changed_content(layout, manifest, manifest["clips"])
     for scene in list_scenes(manifest):
