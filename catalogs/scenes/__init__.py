@@ -5,11 +5,12 @@ from functools import lru_cache
 from pathlib import Path
 
 from catalogs.scenes.folder import read_scene, scene_hash, write_scene
-from catalogs.scenes.street import CHANGES
-from catalogs.scenes.street_cache import cached_street
+from catalogs.scenes.street import CHANGES, STREET_FILE, load_street_layout
+from catalogs.scenes.street_cache import BUILT_IN_SEED, cached_street
 from catalogs.sentences import shorten
 from tasks.errors import InputError
 from tasks.scene.scene import Scene
+from tasks.scene.street.layout import StreetLayout
 
 BUILT_IN = tuple(CHANGES)
 
@@ -31,6 +32,18 @@ def scene_folder(name_or_folder: str | Path) -> Path:
             f"scene {shorten(name_or_folder)}: no such scene; give a scene folder or one of: {', '.join(BUILT_IN)}"
         )
     return folder
+
+
+def load_recipe(name_or_folder: str) -> tuple[StreetLayout, int] | None:
+    """Return the layout and the seed that a built-in street is made of; None of any other scene.
+
+    Parameters
+    ----------
+    name_or_folder : of the scene
+    """
+    if name_or_folder not in BUILT_IN:
+        return None
+    return load_street_layout(STREET_FILE, *CHANGES[name_or_folder]), BUILT_IN_SEED
 
 
 @lru_cache(maxsize=2)

@@ -26,7 +26,11 @@ WRITTEN = ("scene.json", *ARRAY_FILES, *OPTIONAL_FILES, MARKER)
 """Files of a cached street; nothing else is ever deleted."""
 
 
-def cached_street(*changes: Path, seed: int = 2025) -> Path:
+BUILT_IN_SEED = 2025
+"""Of the streets that have a name of their own."""
+
+
+def cached_street(*changes: Path, seed: int = BUILT_IN_SEED) -> Path:
     """The folder of a street with this seed; made on first use, when its code changes, and when it is damaged.
 
     Parameters

@@ -111,7 +111,7 @@ class Plan:
 
 CROWN_BALLS = 26
 """Balls of leaves of a crown."""
-MODELS = ("hatchback", "saloon", "estate", "van")
+MODELS = ("hatchback", "saloon", "estate", "suv", "van")
 """Shapes of car."""
 
 
@@ -226,7 +226,7 @@ def _park_cars(layout: StreetLayout, seed: int, side: int) -> list[Car]:
             station=float(station),
             lateral=float(lateral + rng.uniform(-0.08, 0.08)),
             facing=-side,
-            model=str(rng.choice(MODELS, p=[0.4, 0.25, 0.22, 0.13])),
+            model=str(rng.choice(MODELS, p=[0.33, 0.2, 0.17, 0.18, 0.12])),
         )
         crossing = -8.5 < station - layout.crossing_station < layout.crossing_length + 5.5
         if not crossing:
