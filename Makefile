@@ -58,7 +58,7 @@ docs docs-serve: $(READY)
 	$(BIN)/python -m mkdocs $(if $(filter docs,$@),build --strict,serve)
 
 study: $(READY)
-	$(BIN)/python -m studies sensitivity --out datasets/study
+	$(BIN)/musync lab sensitivity --out datasets/study
 
 study-schedule: $(READY)
 	$(BIN)/python -m studies.scheduled_runs
@@ -78,9 +78,9 @@ study-double-track: $(READY)
 
 # The paper's brake-dive protocol (Appendix C.5) on made-up drives.
 study-drives: $(READY)
-	$(BIN)/python -m studies synthetic-drives --out datasets/drives
+	$(BIN)/musync lab synthetic-drives --out datasets/drives
 	$(BIN)/musync import-measurements datasets/drives --map a2d2 --out datasets/a2d2
-	$(BIN)/python -m studies brake-protocol datasets/a2d2 --out datasets/brake-protocol
+	$(BIN)/musync lab brake-protocol datasets/a2d2 --out datasets/brake-protocol
 
 # How memory and time grow with the clips; SCALE="100000 --folder /dev/shm" takes some 4 CPU-minutes.
 study-scale: $(READY)
@@ -116,7 +116,7 @@ freeze: $(READY)
 	$(BIN)/musync lab freeze
 
 bench: $(READY)
-	$(BIN)/python -m studies bench --out datasets/bench
+	$(BIN)/musync lab bench --out datasets/bench
 
 clean:
 	rm -rf .venv .musync build *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache

@@ -1,4 +1,4 @@
-"""Benchmarks by name, for ``python -m studies bench``."""
+"""Benchmarks by name, for ``musync lab bench``."""
 
 from importlib import import_module
 from typing import Any
@@ -21,7 +21,7 @@ def run_benchmarks(name: str | None = None, *, out: str | None = None) -> dict[s
     """
     if name is not None and name not in BENCHMARKS:
         raise InputError(f"bench {name}: no such benchmark; there are: {', '.join(BENCHMARKS)}")
-    results = Outputs(out, "bench", "bench.json")
+    results = Outputs(out, "lab bench", "bench.json")
     rows = [
         row
         for chosen in ([name] if name else BENCHMARKS)

@@ -57,6 +57,7 @@ KINDS = {
     "table of plausible figures": Kind("plausible_vehicle.yaml", "plausible_vehicle:PlausibleVehicle"),
     "tyre": Kind("tyres", "tyres:parse_tyre", (".tir",)),
     "vehicle": Kind("vehicles", "vehicles:build_vehicle"),
+    "wet friction": Kind("wet_friction.yaml", "wet_friction:WetFrictionEntry"),
 }
 """Every kind of entry that has a name of its own; the name stands in the sentences about its files."""
 

@@ -1,4 +1,4 @@
-"""Commands of the laboratory, which ``python -m studies`` runs as ``musync`` runs its own."""
+"""Commands of the laboratory, which ``musync lab`` runs beside those of the house."""
 
 from collections import Counter
 
@@ -86,9 +86,8 @@ def show_table(result: Result) -> Result:
 
 COMMANDS = (
     Command(
-        name="brake-protocol",
+        name="lab brake-protocol",
         group=MEASURED,
-        is_flow=False,
         sentence="Select braking events by the paper's rules and predict each drive from the others (Appendix C.5).",
         function="studies.measured_drives.brake_protocol:brake_protocol",
         options=(
@@ -106,9 +105,8 @@ COMMANDS = (
         brief=shorten_brake_protocol,
     ),
     Command(
-        name="stop-study",
+        name="lab stop-study",
         group=MEASURED,
-        is_flow=False,
         sentence="Calibrate on one stop of a car, predict another, and add what the model lacks step by step.",
         function="studies.measured_drives.stop_study:stop_study",
         options=(
@@ -125,9 +123,8 @@ COMMANDS = (
         brief=shorten_stop_study,
     ),
     Command(
-        name="bump-study",
+        name="lab bump-study",
         group=MEASURED,
-        is_flow=False,
         sentence="Find the road features in a recording's pitch rate, and fit the car that drove over them.",
         function="studies.measured_drives.bump_study:bump_study",
         options=(
@@ -144,9 +141,8 @@ COMMANDS = (
         brief=shorten_bump_study,
     ),
     Command(
-        name="synthetic-drives",
+        name="lab synthetic-drives",
         group=MEASURED,
-        is_flow=False,
         sentence="Write drives as a car's bus logs them, with known truth, to try the brake protocol on.",
         function="studies.measured_drives.synthetic_drives:synthetic_drives",
         options=(
@@ -157,9 +153,8 @@ COMMANDS = (
         ),
     ),
     Command(
-        name="closing-benchmark",
+        name="lab close-loop-benchmark",
         group=KNOWN,
-        is_flow=False,
         sentence="Count how often close-loop is right on campaigns whose truth is known.",
         function="studies.closing_benchmark.benchmark:close_loop_benchmark",
         options=(
@@ -186,9 +181,8 @@ COMMANDS = (
         one_thread=True,
     ),
     Command(
-        name="controls",
+        name="lab controls",
         group=KNOWN,
-        is_flow=False,
         sentence="Falsify a dataset's claims and motions in fourteen ways, and say which metric detects which fault.",
         function="studies.negative_controls.study:run_controls",
         options=(DATASET, OUT),
@@ -196,9 +190,8 @@ COMMANDS = (
         passed=require_key("all_detected"),
     ),
     Command(
-        name="sensitivity",
+        name="lab sensitivity",
         group=PAPER,
-        is_flow=False,
         sentence="Reproduce the paper's bounded surface-parameter study (Appendix E) beside its printed figures.",
         function="studies.paper.sensitivity:run_sensitivity",
         options=(OUT,),
@@ -206,9 +199,8 @@ COMMANDS = (
         passed=lambda result: all(row["agrees"] for row in result["beside_print"]),
     ),
     Command(
-        name="ablation",
+        name="lab ablation",
         group=PAPER,
-        is_flow=False,
         sentence="Cut one coupling at a time (the paper's Section 4.4): stops over the weather, pitch at a hump.",
         function="studies.paper.ablation:run_ablation",
         options=(
@@ -225,7 +217,7 @@ COMMANDS = (
         brief=select_keys("pitch", "reference"),
     ),
     Command(
-        name="bench",
+        name="lab bench",
         group=SPEED,
         is_flow=False,
         sentence="Measure speed and memory, beside another implementation in the same run.",
@@ -233,9 +225,8 @@ COMMANDS = (
         options=(define_argument("name", str | None, "Benchmark to run; by default all.", None), OUT),
     ),
     Command(
-        name="judge-set",
+        name="lab judge-set",
         group=PAPER,
-        is_flow=False,
         sentence="Judge the clips of video editors by a protocol: a table of models, the paper's figures beside them.",
         function="studies.video_sets.judge_set:judge_video_set",
         options=(
@@ -267,9 +258,8 @@ COMMANDS = (
         brief=show_table,
     ),
     Command(
-        name="lineage",
+        name="lab lineage",
         group=ORIGINS,
-        is_flow=False,
         sentence="List the catalogue lines, works and measured runs that the numbers of a clip rest on, by column.",
         function="studies.lineage.trace:trace_lineage",
         options=(

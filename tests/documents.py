@@ -1,19 +1,13 @@
 """The pages of the documentation, and what stands in their blocks of code."""
 
 import re
-import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
-import typer
-
-from flows.cli import app
 from manifests.provenance import SOURCE_ROOT
-from studies.__main__ import app as laboratory
 
 DOCS = SOURCE_ROOT / "docs"
 DOCUMENTS = sorted([*SOURCE_ROOT.glob("*.md"), *DOCS.rglob("*.md")])
-PROGRAMS = "(?:musync|python -m studies) "
 BLOCK = re.compile(r"^( *)```(\w*)\n(.*?)^\1```$", flags=re.M | re.S)
 
 
@@ -24,19 +18,13 @@ def list_blocks(document: Path, *languages: str) -> list[str]:
 
 
 def list_command_lines(document: Path) -> Iterator[str]:
-    """Yield the lines of a page that call a program of the project: of blocks for a terminal, and indented ones."""
+    """Yield the lines of a page that call musync: of blocks for a terminal, and indented ones."""
     for block in list_blocks(document, "", "sh", "bash", "console"):
         for line in block.replace("\\\n", " ").splitlines():
-            if re.match(PROGRAMS, line.lstrip("$ ")):
+            if line.lstrip("$ ").startswith("musync "):
                 yield line.lstrip("$ ")
     text = BLOCK.sub("", document.read_text())
-    yield from (line.strip() for line in re.findall(rf"^ {{4}}({PROGRAMS}.*)$", text, flags=re.M))
-
-
-def parse_line(line: str) -> tuple[typer.Typer, list[str]]:
-    """Return the program that a line of a document names, and the words after its name."""
-    words = shlex.split(line, comments=True)
-    return (laboratory, words[3:]) if words[0] == "python" else (app, words[1:])
+    yield from (line.strip() for line in re.findall(r"^ {4}(musync .*)$", text, flags=re.M))
 
 
 def list_named_commands(document: Path) -> Iterator[str]:

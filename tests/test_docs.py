@@ -3,6 +3,7 @@
 import ast
 import importlib
 import re
+import shlex
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -15,11 +16,12 @@ from typer.exceptions import TyperException
 from benchmarks.size import list_sentences, measure_documents
 from catalogs.channel_maps.conditions import Conditions
 from catalogs.entries import load
+from flows.cli import app
 from manifests.provenance import SOURCE_ROOT
 from reference_pages.pages import WRITERS
 from tasks.conventions import CHANNELS_BY_NAME
 from tests.conftest import DATA
-from tests.documents import DOCS, DOCUMENTS, list_blocks, list_command_lines, list_named_commands, parse_line
+from tests.documents import DOCS, DOCUMENTS, list_blocks, list_command_lines, list_named_commands
 
 OURS = {"musync", "flows", "manifests", "catalogs", "tasks"}
 NOT_OURS = {"clip", "dask_jobqueue", "dask_kubernetes"}
@@ -31,8 +33,8 @@ PARTS = ["tutorial", "how-to", "reference", "explanation", "evidence"]
 
 def find_command(line: str) -> tuple[Any, list[str]]:
     """Return the command that a line begins with, and the words after its name."""
-    program, words = parse_line(line)
-    command: Any = typer.main.get_command(program)
+    words = shlex.split(line, comments=True)[1:]
+    command: Any = typer.main.get_command(app)
     while words and words[0] in getattr(command, "commands", {}):
         command, words = command.commands[words[0]], words[1:]
     return command, words

@@ -69,7 +69,10 @@ def render_frames(
         scene = replace(
             scene,
             gaussians=detail_cars(
-                scene.gaussians, *street, T_world_rig @ catalogue.camera.T_rig_camera, float(catalogue.camera.K[0, 0])
+                scene.gaussians,
+                *street,
+                T_world_rig @ catalogue.camera.T_rig_camera,
+                float(catalogue.camera.K[0, 0]),
             ),
         )
     gaussians, relief = edit_scene(
@@ -132,6 +135,6 @@ def edit_scene(
 def _anchors_of(scenario: Scenario, plan: Plan, catalogue: Catalogue) -> tuple[SurfaceState, ...]:
     """Return the anchors about the clip's rate that the paper's composition blends."""
     look = catalogue.weather_parameters.find_look(scenario.weather)
-    if plan.settings.composition != "paper" or look is None or look.anchors_mm_h is None:
+    if plan.settings.composition != "paper" or look.anchors_mm_h is None:
         return ()
     return adjacent_anchors(weather_of(scenario), look.anchors_mm_h, catalogue.surface)

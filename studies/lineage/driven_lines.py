@@ -153,7 +153,7 @@ def list_steps(asked: Asked, entries: Catalogue, drive: Drive) -> list[Step]:
     response = compute_surface_response(vehicle, drive.state.kind, drive.state.friction)
     return [
         *surface_steps(weather_of(drive.scenario), entries.surface, vehicle, row),
-        *force_steps(vehicle, response, hazard, asked.mode, row),
+        *force_steps(vehicle, response, hazard, asked.mode, row, drive.state.grip),
         *pitch_steps(vehicle, response, hazard, row, drive.ride, entries.steady),
     ]
 
@@ -217,11 +217,11 @@ def _change_line(
 ) -> tuple[Asked, Catalogue]:
     if line.file != ASKED:
         (inputs / line.file).write_bytes(scale_line(line.file, kept[line.file], line.place, factor))
-        return asked, Catalogue(inputs)
+        return asked, Catalogue(inputs, named=asked.scenario.scene)
     scenario = replace(asked.scenario, **{line.key: line.value * factor})
     if problems := find_scenario_problems(scenario):
         raise InputError(problems)
-    return replace(asked, scenario=scenario), Catalogue(inputs)
+    return replace(asked, scenario=scenario), Catalogue(inputs, named=asked.scenario.scene)
 
 
 def _find_moved(before: Mapping[str, Any], after: Mapping[str, Any]) -> set[str]:

@@ -6,6 +6,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from catalogs.road_grade import SCENE_GRADES, name_grade_file
 from flows.auditing.explain import find_planned_clip, find_route
 from flows.making.catalogue import Catalogue
 from flows.making.gathering import table_parts
@@ -76,18 +77,22 @@ def trace_lineage(dataset: str, clip: str, *, out: str | None = None) -> dict[st
     InputError
         The folder is no sealed dataset, has no such clip, or its kept entries are not those recorded.
     """
-    results = Outputs(out, "lineage", "lineage.json", "lineage.csv", "lineage.txt")
+    results = Outputs(out, "lab lineage", "lineage.json", "lineage.csv", "lineage.txt")
     layout = open_for_reading(dataset, want_inputs)
     manifest = read_manifest(layout)
     plan = Plan.of(manifest, layout.manifest)
-    refuse_traced(plan.inputs, dataset, "lineage")
+    refuse_traced(plan.inputs, dataset, "lab lineage")
     planned = find_planned_clip(plan, clip, dataset)
-    kept = read_kept(layout, manifest["inputs"])
+    kept = {
+        name: content
+        for name, content in read_kept(layout, manifest["inputs"]).items()
+        if not name.startswith(SCENE_GRADES) or name == name_grade_file(planned.scenario.scene)
+    }
     asked = Asked(
         scenario=planned.scenario, mode=plan.settings.vehicle_mode, variant=plan.settings.variant,
-        duration_s=plan.duration_s, route=find_route(plan.scene),
+        duration_s=plan.duration_s, route=find_route(plan.record_of(planned.scenario.scene)),
     )  # fmt: skip
-    entries = Catalogue(layout.inputs)
+    entries = Catalogue(layout.inputs, named=planned.scenario.scene)
     drive = drive_clip(asked, entries)
     units = {name: channel.unit for name, channel in CHANNELS_BY_NAME.items()}
     lines = list_asked(planned.scenario, units, manifest["grid"]["name"])
@@ -118,7 +123,7 @@ def trace_lineage(dataset: str, clip: str, *, out: str | None = None) -> dict[st
             {"file": name, "sha256": manifest["inputs"][name], "title": describe_file(kept[name])}
             for name in kept
         ],
-        "scene": {**manifest["scene"], "at_hand": asked.route is not None},
+        "scene": {**plan.record_of(planned.scenario.scene), "at_hand": asked.route is not None},
         "measured": _find_provenance(kept),
     }
     results.write_json("lineage.json", result)

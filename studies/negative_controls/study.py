@@ -23,6 +23,7 @@ from flows.running.orchestration import run_as_stage
 from flows.store.address import open_for_reading
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest, refuse_changed_content, require_frames
+from manifests.manifest import list_scenes
 from studies.negative_controls.claims import (
     Claim,
     claims_differ,
@@ -83,13 +84,14 @@ def run_controls(dataset: str, *, out: str | None = None) -> dict[str, Any]:
         If the folder is no finished dataset with frames, or holds fewer than two clips, or these or the scene are not
         as recorded.
     """
-    results = Outputs(out, "controls", "controls.json", "controls.svg")
+    results = Outputs(out, "lab controls", "controls.json", "controls.svg")
     layout = open_for_reading(dataset)
     root, manifest = layout.root, read_manifest(layout)
-    refuse_traced(read_plan(root).inputs, dataset, "controls")
+    refuse_traced(read_plan(root).inputs, dataset, "lab controls")
     require_frames(manifest, dataset)
     refuse_changed_content(layout, manifest, manifest["clips"])
-    refuse_changed_scene(manifest["scene"])
+    for scene in list_scenes(manifest):
+        refuse_changed_scene(scene)
     facts = clip_facts(root)
     if len(facts) < 2:
         raise InputError(f"{root}: negative controls need at least two clips; there are {len(facts)}.")
@@ -281,7 +283,7 @@ def _make_faulty_claims(
             plan.settings.vehicle_mode,
             plan.duration_s,
             catalogue.steady,
-            catalogue.grade,
+            catalogue.grade_of(scenario.scene),
         )
         made[variant] = Claim(pitch=ride.columns["pitch"][ticks], station=ride.columns["station"][ticks])
     for name, move in FALSE_RIGS.items():

@@ -1,1 +1,1 @@
-"""Studies of the paper: ``python -m studies sensitivity`` and ``ablation``."""
+"""Studies of the paper: ``musync lab sensitivity`` and ``ablation``."""

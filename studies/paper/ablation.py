@@ -94,7 +94,9 @@ def run_ablation(
     InputError
         If the traces do not hold the condition that is compared.
     """
-    results = Outputs(out, "ablation", "ablation.json", "ablation.parquet", "ablation.svg", "ablation.html")
+    results = Outputs(
+        out, "lab ablation", "ablation.json", "ablation.parquet", "ablation.svg", "ablation.html"
+    )
     file = open_vehicle(vehicle)
     study, car, surface = load_ablation(), file.build(), load("surface", "dense-asphalt")
     provenance = file.provenance

@@ -1,4 +1,4 @@
-"""Where editors of known behaviour land in `python -m studies judge-set`, beside what the metrics' equations say.
+"""Where editors of known behaviour land in `musync lab judge-set`, beside what the metrics' equations say.
 
 The street is ray-cast and not rendered by this project. What drives through it is the paper's vehicle; what the editors
 do is simple enough that every figure can be computed without a picture: grade colours, add noise, answer late, warp the

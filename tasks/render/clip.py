@@ -80,6 +80,7 @@ def render_clip(
         route=scene.route,
         relief=relief,
         to_sun=scene.to_sun,
+        daylight=scene.daylight,
     )
     weathered, weather = weather_scene(clear_scene, conditions, float(camera.K[0, 0]))
     prepared = backend.prepare_gaussians(weathered)

@@ -1,4 +1,4 @@
-"""`python -m studies judge-set`: editors whose motion is known must land where the protocol's equations say."""
+"""`musync lab judge-set`: editors whose motion is known must land where the protocol's equations say."""
 
 import json
 from pathlib import Path
@@ -18,7 +18,7 @@ from benchmarks.synthetic_street import (
     rig_poses,
 )
 from catalogs.learned_judges import LoadedJudge
-from flows.judging.claims import read_claim
+from flows.judging.foreign import read_claim
 from flows.judging.foreign_sources import read_camera
 from flows.judging.learned_rows import score_pictures
 from studies.video_sets.files import SetClip, find_set

@@ -105,6 +105,7 @@ def _make_fine(
     weight = 1 / (away + 0.02) ** 2
     weight /= weight.sum(axis=1, keepdims=True)
     lit = np.einsum("nk,nkc->nc", weight, light[nearest])
+    colour = new.albedo * lit + new.glow
     station = new.centre[:, 0]
     body = build_parked(car, seed, cell)
     out: dict[str, NDArray[Any]] = {
@@ -112,12 +113,16 @@ def _make_fine(
         "quats_wxyz": line.to_world_quaternions(station, new.axes).astype(np.float32),
         "scales": body.gaussians.scales,
         "opacities": body.gaussians.opacities,
-        "sh": ((new.albedo * lit + new.glow - 0.5) / C0).astype(np.float32)[:, None],
+        "sh": ((colour - 0.5) / C0).astype(np.float32)[:, None],
         "normals": line.to_world_directions(station, new.axes[:, 2]).astype(np.float32),
         "class_id": body.gaussians.class_id,
     }
     if coarse.surroundings is not None:
         out["surroundings"] = _surroundings_of(car.model, cell, body)
+    if coarse.light is not None:
+        shares = np.einsum("nk,nkc->nc", weight, coarse.light[nearest].astype(np.float64))
+        shares[:, 3] = new.glow.sum(axis=1) / np.maximum(colour.sum(axis=1), 1e-9)
+        out["light"] = np.clip(shares, 0, 1).astype(np.float32)
     return out
 
 
