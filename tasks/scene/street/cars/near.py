@@ -1,4 +1,4 @@
-"""Parked cars that a clip comes near: drawn with as many discs as its camera resolves, in the light of the coarse ones."""
+"""Parked cars that a clip comes near: as fine as its camera resolves, in the light of the coarse ones."""
 
 from dataclasses import fields, replace
 from functools import lru_cache
@@ -93,9 +93,7 @@ def measure_approach(point: Floats, T_world_camera: Floats) -> float:
     return float(distance[seen].min()) if seen.any() else float("inf")
 
 
-def _make_fine(
-    car: Car, seed: int, cell: float, coarse: Gaussians, layout: StreetLayout
-) -> dict[str, NDArray[Any]]:
+def _make_fine(car: Car, seed: int, cell: float, coarse: Gaussians, layout: StreetLayout) -> dict[str, Any]:
     line = integrate_course(layout)
     old, new = (place_body(build_parked(car, seed, spacing), car) for spacing in (COARSE, cell))
     radiance = np.maximum(coarse.sh[:, 0].astype(np.float64) * C0 + 0.5, 0)
@@ -108,7 +106,7 @@ def _make_fine(
     colour = new.albedo * lit + new.glow
     station = new.centre[:, 0]
     body = build_parked(car, seed, cell)
-    out: dict[str, NDArray[Any]] = {
+    out: dict[str, Any] = {
         "means": line.to_world(new.centre).astype(np.float32),
         "quats_wxyz": line.to_world_quaternions(station, new.axes).astype(np.float32),
         "scales": body.gaussians.scales,
@@ -118,7 +116,7 @@ def _make_fine(
         "class_id": body.gaussians.class_id,
     }
     if coarse.surroundings is not None:
-        out["surroundings"] = _surroundings_of(car.model, cell, body)
+        out["surroundings"] = _count_surroundings(car, seed, cell)
     if coarse.light is not None:
         shares = np.einsum("nk,nkc->nc", weight, coarse.light[nearest].astype(np.float64))
         shares[:, 3] = new.glow.sum(axis=1) / np.maximum(colour.sum(axis=1), 1e-9)
@@ -126,21 +124,13 @@ def _make_fine(
     return out
 
 
-_SURROUNDINGS: dict[tuple[str, float, int], NDArray[np.float32]] = {}
-
-
-def _surroundings_of(model: str, cell: float, body: Body) -> NDArray[np.float32]:
-    """Return the surroundings of a body's discs, which are those of every body of its shape and plates."""
-    key = model, cell, len(body.gaussians)
-    if key not in _SURROUNDINGS:
-        counted = add_surroundings(body.gaussians).surroundings
-        assert counted is not None
-        _SURROUNDINGS[key] = counted
-    return _SURROUNDINGS[key]
-
-
 @lru_cache(maxsize=4)
 def _list_owners(layout: StreetLayout, seed: int) -> tuple[tuple[Car, ...], NDArray[np.int32]]:
     """Return the cars of a street, and which of its last Gaussians belong to which, by their number."""
     _, owners, _ = list_objects(layout, seed)
     return plan_street(layout, seed).cars, owners
+
+
+@lru_cache(maxsize=128)
+def _count_surroundings(car: Car, seed: int, cell: float) -> NDArray[np.float32] | None:
+    return add_surroundings(build_parked(car, seed, cell).gaussians).surroundings
