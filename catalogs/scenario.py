@@ -35,6 +35,7 @@ class Scenario:
     hold_speed : the speed is held until the brake onset, without one throughout; else the car coasts
     hazard_center_m, hazard_length_m : where on the route the road feature lies and how long it is [m]
     hazard_height_m : positive a hump, negative a depression, 0 a flat road [m]
+    scene : that it drives in; None is the one scene of its grid, and stands in no row
     """
 
     weather: WeatherName = DRY
@@ -51,13 +52,16 @@ class Scenario:
     hazard_center_m: float = 0.0
     hazard_length_m: float = 0.0
     hazard_height_m: float = 0.0
+    scene: str | None = None
 
     def as_row(self) -> dict[str, Any]:
         """The fields in order, for a manifest, a table row or a content id."""
-        return dict(zip(SCENARIO_FIELDS, _read_fields(self), strict=True))
+        row = dict(zip(SCENARIO_FIELDS, _read_fields(self), strict=True))
+        return row if self.scene is None else row | {"scene": self.scene}
 
 
-SCENARIO_FIELDS = tuple(field.name for field in fields(Scenario))
+SCENARIO_FIELDS = tuple(field.name for field in fields(Scenario) if field.name != "scene")
+"""Fields of every scenario; the scene is one of those alone whose grid has several."""
 _read_fields = attrgetter(*SCENARIO_FIELDS)
 NUMBERS = tuple(name for name in SCENARIO_FIELDS if name not in {"weather", "hold_speed"})
 NOT_NEGATIVE = (

@@ -82,6 +82,8 @@ def find_input_differences(
                 else _list_rows(name, key, a["inputs"].get(name, ABSENT), b["inputs"].get(name, ABSENT))
             )
     rows += _list_rows("scene", "scene", a["scene"].get("sha256"), b["scene"].get("sha256"))
+    several = [{scene["name"]: scene["sha256"] for scene in one.get("scenes", ())} for one in (a, b)]
+    rows += _list_rows("scenes", "scene", *several)
     rows += _list_rows("backend", "backend", a["backend"], b["backend"])
     for name in (
         "vehicle_mode", "low_speed", "wet_friction", "variant", "composition", "labels", "pictures", "frames",
@@ -192,6 +194,8 @@ def kind_of_input(name: str) -> str:
     path = PurePosixPath(name)
     if path.suffix in KINDS["tyre"].suffixes:
         return "tyre"
+    if path.parts[0] == "road_grade":
+        return "road_grade.yaml"
     return path.parts[0] if path.parts[0] in ("weather", "traces") else name
 
 

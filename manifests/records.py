@@ -71,7 +71,10 @@ if TYPE_CHECKING:  # their keys follow from what they record
     VerdictRecord = dict[str, Any]
 else:
     ScenarioRecord = with_config(STRICT)(
-        TypedDict("ScenarioRecord", get_type_hints(Scenario, include_extras=True))
+        TypedDict(
+            "ScenarioRecord",
+            get_type_hints(Scenario, include_extras=True) | {"scene": NotRequired[LocalName]},
+        )
     )
     # a dataset decides what it has: a figure that came later is not represented
     _figures = {c.name: NotRequired[float | None] for c in CLIP_CHANNELS if c.name not in SCENARIO_FIELDS}
@@ -86,10 +89,12 @@ else:
 
 @with_config(STRICT)
 class SceneRecord(TypedDict):
-    """Which scene: its name, and the SHA-256 of its content."""
+    """Which scene: its name, and the SHA-256 of its content; of a street that is drawn, kind and seed."""
 
     name: LocalName
     sha256: Sha256
+    kind: NotRequired[Text]
+    seed: NotRequired[Index]
 
 
 @with_config(STRICT)
@@ -139,6 +144,7 @@ class PlanRecord(TypedDict):
     run_id: Id
     grid: dict[str, Any]
     scene: SceneRecord
+    scenes: NotRequired[list[SceneRecord]]
     backend: Text
     inputs: Inputs
     made_with: MadeWith
@@ -157,6 +163,7 @@ class ManifestHead(TypedDict):
     run_id: Id
     grid: dict[str, Any]
     scene: SceneRecord
+    scenes: NotRequired[list[SceneRecord]]
     backend: Text
     inputs: Inputs
     made_with: MadeWith
@@ -196,6 +203,7 @@ class FrozenRun(TypedDict):
     parameters: dict[InputName, Any]
     clips: Annotated[list[FrozenClip], Field(min_length=1)]
     scene: SceneRecord
+    scenes: NotRequired[list[SceneRecord]]
     made_with: MadeWith
     processor: dict[Text, Text]
     seal: Sha256

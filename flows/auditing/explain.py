@@ -83,7 +83,7 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
             f"{folder}: every tick must have every number; frame {frame} or 0 of clip {planned.label} has none in"
             f" {', '.join(dict.fromkeys(empty))}: musync lab repair makes the table again"
         )
-    catalogue = Catalogue(layout.inputs)
+    catalogue = Catalogue(layout.inputs, named=scenario.scene)
     vehicle, surface, steady = catalogue.vehicle, catalogue.surface, catalogue.steady
     mode = plan.settings.vehicle_mode
     driven = cut_coupling(scenario, variant, catalogue.families)
@@ -105,7 +105,7 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
         *surface_steps(weather_of(driven), surface, vehicle, row),
         *force_steps(vehicle, response, hazard, mode, row, state.grip),
         *pitch_steps(vehicle, response, hazard, row, ride, steady),
-        *picture_steps(vehicle, catalogue.camera, row, first, find_route(plan.scene)),
+        *picture_steps(vehicle, catalogue.camera, row, first, find_route(plan.record_of(scenario.scene))),
     ]  # fmt: skip
     result = {
         "dataset": str(layout.root),

@@ -13,15 +13,18 @@ from flows.commands.command import (
 )
 from flows.commands.measured_results import (
     shorten_agreement,
-    shorten_brake_protocol,
-    shorten_bump_study,
     shorten_import,
-    shorten_stop_study,
     shorten_verdict,
 )
-from flows.commands.studies import MODE
 
 GROUP = "Measured data"
+MODE = define_option(
+    "mode",
+    str | None,
+    "Vehicle model: paper or coupled; by default the one that a frozen vehicle was fitted in, else paper.",
+    None,
+    known=("paper", "coupled"),
+)
 
 COMMANDS = (
     Command(
@@ -55,80 +58,10 @@ COMMANDS = (
         passed=lambda result: not result.get("faulty"),
     ),
     Command(
-        name="lab brake-protocol",
-        group=GROUP,
-        sentence="Select braking events by the paper's rules and predict each drive from the others (Appendix C.5).",
-        function="flows.measured.protocol:brake_protocol",
-        options=(
-            define_argument("campaign", str, "Campaign folder with brake pressure and pitch."),
-            define_option(
-                "protocol",
-                str,
-                "Protocol: YAML file, or the name of one in catalogs/protocols.",
-                "brake-dive",
-                known="catalogs/protocols/*.yaml",
-            ),
-            CAMPAIGN_VEHICLE,
-            define_option("all_events", bool, "Use every candidate event, whatever rules it breaks.", False),
-            OUT,
-        ),
-        brief=shorten_brake_protocol,
-    ),
-    Command(
-        name="lab stop-study",
-        group=GROUP,
-        sentence="Calibrate on one stop of a car, predict another, and add what the model lacks step by step.",
-        function="flows.measured.stop_study:stop_study",
-        options=(
-            define_argument("campaign", str, "Campaign folder with brake and engine torque."),
-            define_option(
-                "study",
-                str,
-                "Stop study: YAML file, or the name of one in catalogs/stop_studies.",
-                "bmw-m8",
-                known="catalogs/stop_studies/*.yaml",
-            ),
-            CAMPAIGN_VEHICLE,
-            OUT,
-        ),
-        brief=shorten_stop_study,
-    ),
-    Command(
-        name="lab bump-study",
-        group=GROUP,
-        sentence="Find the road features in a recording's pitch rate, and fit the car that drove over them.",
-        function="flows.measured.bump_study:bump_study",
-        options=(
-            define_argument("campaign", str, "Campaign folder with pitch rate and speed."),
-            define_option(
-                "study",
-                str,
-                "Bump study: YAML file, or the name of one in catalogs/bump_studies.",
-                "comma2k19",
-                known="catalogs/bump_studies/*.yaml",
-            ),
-            CAMPAIGN_VEHICLE,
-            OUT,
-        ),
-        brief=shorten_bump_study,
-    ),
-    Command(
-        name="lab synthetic-drives",
-        group=GROUP,
-        sentence="Write drives as a car's bus logs them, with known truth, to try the brake protocol on.",
-        function="flows.measured.bus_drives:synthetic_drives",
-        options=(
-            define_option("out", str, "Folder for one bus log of each drive."),
-            define_option("drives", int, "Number of drives.", 3),
-            define_option("events", int, "Number of brake applications in each drive.", 46),
-            define_option("seed", int, "Seed of the random numbers.", 2020),
-        ),
-    ),
-    Command(
         name="vehicle agreement",
         group=GROUP,
         sentence="Compare the vehicle model with reference traces, as the paper's Appendix A.2 does.",
-        function="flows.studies.vehicle_model:measure_agreement",
+        function="flows.measured.agreement:measure_agreement",
         options=(TRACES, VEHICLE, MODE, OUT),
         brief=shorten_agreement,
     ),
@@ -172,34 +105,6 @@ COMMANDS = (
             CAMPAIGN_VEHICLE,
         ),
         brief=shorten_verdict,
-        one_thread=True,
-    ),
-    Command(
-        name="lab close-loop-benchmark",
-        group=GROUP,
-        sentence="Count how often close-loop is right on campaigns whose truth is known.",
-        function="flows.measured.closing_benchmark:close_loop_benchmark",
-        options=(
-            define_option(
-                "out",
-                str,
-                "Folder for closing-benchmark.json and campaigns.jsonl; a later call continues there.",
-            ),
-            define_option("seeds", int, "Number of campaigns for each known truth.", 10, minimum=0),
-            define_option("first_seed", int, "Of each truth; rules rest on some of 0 to 4.", 0, minimum=0),
-            define_option("nulls", int, "Number of campaigns without any effect.", 100, minimum=0),
-            define_option(
-                "harder",
-                int,
-                "Number of campaigns for each pair of effects, and for each truth driven with few kinds of manoeuvre.",
-                1,
-                minimum=0,
-            ),
-            define_option(
-                "minutes", float, "Begin no campaign after this time [min].", 1e9, shown_default="no limit"
-            ),
-        ),
-        brief=select_keys("false_discoveries", "summary", "power", "cpu_s"),
         one_thread=True,
     ),
 )

@@ -2,16 +2,6 @@
 
 from typing import Any
 
-WIDE_COLUMNS = {
-    "criterion",
-    "fails_only_here",
-    "mean_trajectory",
-    "trained_on",
-    "rate_correlation",
-    "no_dive_rmse",
-}
-BUMP_FIGURES = ("rate_rmse", "rate_rms", "rate_correlation", "vertical_correlation", "peak_pitch")
-
 
 def shorten_import(result: dict[str, Any]) -> dict[str, Any]:
     """Return the report of an import, or a narrow table of signals for each recording."""
@@ -40,34 +30,6 @@ def _shorten_signal(row: dict[str, Any], noted: bool) -> dict[str, Any]:
 def _write_time(seconds: float) -> str:
     """Return a logger's time to the millisecond [s]; one that counts from 1970 has ten digits before the point."""
     return f"{round(seconds, 3) + 0.0:.3f}".rstrip("0").rstrip(".")  # -0.0004 is 0, and not -0
-
-
-def shorten_brake_protocol(result: dict[str, Any]) -> dict[str, Any]:
-    """Return a brake protocol without its events and the widest columns of its tables."""
-    brief = {key: value for key, value in result.items() if key != "events"}
-    for table in ("attrition", "folds"):
-        brief[table] = [{k: v for k, v in row.items() if k not in WIDE_COLUMNS} for row in result[table]]
-    return brief
-
-
-def shorten_stop_study(result: dict[str, Any]) -> dict[str, Any]:
-    """Return a stop study with the held-out figures of each step."""
-    return result | {"rungs": [{"rung": row["rung"], **row["held_out"]} for row in result["rungs"]]}
-
-
-def shorten_bump_study(result: dict[str, Any]) -> dict[str, Any]:
-    """Return a bump study with a row for each window and car."""
-    rows = [
-        {
-            "window": row["window"],
-            "car": car,
-            **row[car]["feature"],
-            **{name: row[car][name] for name in BUMP_FIGURES},
-        }
-        for row in result["windows"]
-        for car in ("uncalibrated", "calibrated")
-    ]
-    return result | {"windows": rows}
 
 
 def shorten_agreement(result: dict[str, Any]) -> dict[str, Any]:

@@ -87,7 +87,7 @@ def find_control(clip: JudgedClip, clips: list[JudgedClip], *, weather: bool) ->
     free = {"weather", "precipitation_mm_h", "snow_accumulation_h"} if weather else {
         "hazard_center_m", "hazard_length_m", "hazard_height_m"
     }  # fmt: skip
-    held = set(SCENARIO_FIELDS) - free
+    held = {*SCENARIO_FIELDS, "scene"} - free
     seed = read_visual_seed(clip.facts["label"])
     for other in (c for c in clips if read_visual_seed(c.facts["label"]) == seed):
         plain = other.facts["weather"] == DRY if weather else other.facts["hazard_height_m"] == 0

@@ -47,7 +47,7 @@ INPUTS = (
     Input(name="study.yaml", kind="sensitivity study"),
     Input(
         name="hazard_marking.yaml", kind="hazard marking", setting="hazard_marking",
-        needed=lambda settings: settings.hazard_marking is not None,
+        needed=lambda settings: settings.marked_features,
     ),
     Input(name=LOW_SPEED, kind="low-speed rule", needed=lambda settings: settings.keeps_stops_steady),
     Input(name=WET_FRICTION, kind="wet friction", needed=lambda settings: settings.grips_by_speed),

@@ -114,7 +114,7 @@ def edit_scene(
     )
     carriageway = scene.carriageway_left, scene.carriageway_right
     gaussians = refine_road(scene.gaussians, relief)
-    if marking is not None and hazard.height_m > 0:
+    if marking is not None:
         gaussians = paint_feature(gaussians, relief, marking, *carriageway, asphalt_albedo)
     return extend_kerbs(apply_road_profile(gaussians, relief, *carriageway)[0], relief), relief
 

@@ -2,11 +2,46 @@
 
 from typing import Any
 
-from catalogs.studies.closing import load_error_rates
-from flows.measured.closing_benchmark import engine_hash
+from catalogs.documents import read_json_document
+from catalogs.entries import CATALOGUE
+from manifests.canonical import sha256_of
+from manifests.provenance import source_hashes
+
+ERROR_RATES = CATALOGUE / "studies" / "closing_error_rates.json"
+"""Counts of `musync lab close-loop-benchmark`, without the campaigns one by one."""
+JUDGES = (
+    "tasks/campaign/",
+    "tasks/conventions",
+    "tasks/identification/",
+    "tasks/vehicle/",
+    "tasks/surface/",
+    "catalogs/effects/",
+    "catalogs/decision_rules",
+    "catalogs/surfaces",
+    "catalogs/tyre_families",
+    "catalogs/tyres.",
+    "catalogs/vehicles/__init__",
+    "catalogs/vehicles/inherited",
+    "catalogs/vehicles/numbers",
+    "catalogs/vehicles/paper",
+    "catalogs/weather/",
+)
+"""Sources that a verdict depends on: campaigns judged by the same ones belong to one table."""
 
 
-def tell_error_rates(named: list[str]) -> list[str]:
+def engine_hash() -> str:
+    """SHA-256 over the sources that a verdict depends on."""
+    judging = {path: digest for path, digest in source_hashes().items() if path.startswith(JUDGES)}
+    return sha256_of(f"{path} {digest}\n".encode() for path, digest in sorted(judging.items()))
+
+
+def load_error_rates() -> dict[str, Any]:
+    """Counts of the benchmark that ships, with the hash of the engine that was judged."""
+    rates: dict[str, Any] = read_json_document(ERROR_RATES, "table of error rates")
+    return rates
+
+
+def describe_error_rates(named: list[str]) -> list[str]:
     """Return the benchmark's error rates in sentences: for nulls, library effects, and what this verdict names.
 
     Parameters
@@ -30,10 +65,10 @@ def tell_error_rates(named: list[str]) -> list[str]:
         }
         wrong = ", ".join(f"{truth} ({count})" for truth, count in others.items()) or "none"
         lines.append(f"{name} in the data: {told}; named where the data held something else: {wrong}")
-    return lines + _tell_engine(rates, engine_hash())
+    return lines + _describe_engine(rates, engine_hash())
 
 
-def _tell_engine(rates: dict[str, Any], engine: str) -> list[str]:
+def _describe_engine(rates: dict[str, Any], engine: str) -> list[str]:
     """Return a sentence where the counts are not of the engine of this verdict."""
     if rates["engine_sha256"] == engine:
         return []

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from flows.measured.closing_error_rates import tell_error_rates
+from flows.measured.closing_error_rates import describe_error_rates
 from flows.measured.friction_pulls import find_pulled_runs
 from flows.measured.residuals import predict_runs
 from flows.measured.verdict_figures import (
@@ -49,7 +49,7 @@ def write_verdict_page(outcome: Outcome, result: Mapping[str, Any], campaign: Ca
     train, held_out = predict_runs(outcome)
     gains, spline = draw_splines(outcome)
     correlation = result["residual_input_correlation"]
-    rates = tell_error_rates([effect["name"] for effect in result["effects"]])
+    rates = describe_error_rates([effect["name"] for effect in result["effects"]])
     return write_page(
         f"{campaign.name}: close-loop",
         heading,

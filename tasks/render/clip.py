@@ -11,6 +11,7 @@ from tasks.render.camera import Camera, RigAt, world_to_camera
 from tasks.render.composition import compose_over_sky, round_depth
 from tasks.render.display_bytes import encode_picture
 from tasks.render.environment import environment_view
+from tasks.render.grain import add_grain
 from tasks.render.labels import compute_clip_flow, compute_flow, compute_row_flow, label_frame
 from tasks.render.rasterise.backend import Backend
 from tasks.render.readout import Field, sensor_field
@@ -92,6 +93,8 @@ def render_clip(
         gbuffer = backend.rasterise_view(
             prepared, view, field.K, field.width, field.height, normals=labels or weather.reads_normals
         )
+        if scene.gaussians.surroundings is not None:
+            gbuffer = add_grain(gbuffer, pose, field.K)
         sky = environment_view(scene.environment, view, field.K, field.width, field.height)
         shutter = Shutter(
             T_world_camera=pose,

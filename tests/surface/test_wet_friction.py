@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.physics_judge.__main__ import judge
-from benchmarks.physics_judge.clips import make_clip
 from catalogs.entries import load
 from catalogs.scenario import Scenario
+from studies.physics_judge.__main__ import judge
+from studies.physics_judge.clips import make_clip
 from tasks.eval.physics.constants import compute_wet_friction, derive_surface
 from tasks.studies.label_ranges import sampled_friction
 from tasks.surface.weather import Weather, find_wet_grip, surface_state

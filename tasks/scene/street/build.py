@@ -7,6 +7,7 @@ from tasks.scene.scene import Scene
 from tasks.scene.street.bend import integrate_course, lay_route
 from tasks.scene.street.cars.parked import build_cars, car_boxes, car_footprints
 from tasks.scene.street.furniture import build_furniture, post_boxes
+from tasks.scene.street.ground import build_ground
 from tasks.scene.street.houses.adornments import awning_boxes, build_adornments
 from tasks.scene.street.houses.facades import build_facades
 from tasks.scene.street.houses.roofs import build_roofs, house_boxes
@@ -24,7 +25,7 @@ _SH_BAND_0 = 0.28209479177387814
 
 
 def build_street(layout: StreetLayout, seed: int) -> Scene:
-    """A two-lane city street on a summer morning, with houses, trees and parked cars.
+    """A two-lane road with what the layout puts beside it: houses, trees, parked cars, gardens, fields.
 
     The same seed and layout give the same bytes.
 
@@ -44,6 +45,7 @@ def build_street(layout: StreetLayout, seed: int) -> Scene:
     surfels = join_surfels(
         [
             build_road(layout, seed),
+            build_ground(layout, seed),
             build_pavement(layout, plan.trees, seed),
             build_facades(layout, plan.buildings, seed),
             build_roofs(layout, plan.buildings, seed),

@@ -17,8 +17,6 @@ Floats = NDArray[np.float64]
 
 _LIFT = 0.03
 """Start of a shadow ray above its surface [m]."""
-_CANYON_HEIGHT = 12.0
-"""Mean height of the houses, which hide the low sky [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,7 +103,7 @@ def sky_share(point: Floats, normal: Floats, layout: StreetLayout) -> Floats:
     -------
     float64 [N] in 0..1 [1]
     """
-    height = np.maximum(_CANYON_HEIGHT - point[:, 2], 0.0)
+    height = np.maximum(layout.canyon_height - point[:, 2], 0.0)
     right = np.arctan2(height, np.maximum(point[:, 1] - layout.front_position(-1), 0.05))
     left = np.pi - np.arctan2(height, np.maximum(layout.front_position(1) - point[:, 1], 0.05))
     tilt = np.arctan2(normal[:, 2], normal[:, 1])

@@ -13,11 +13,11 @@ from catalogs.references import ReferenceCase
 from catalogs.scenario import Scenario
 from flows.auditing.audit import audit_dataset
 from flows.auditing.explain import explain_frame
-from flows.auditing.lineage import trace_lineage
-from flows.judging.controls import run_controls
 from flows.judging.physics import audit_physics, clip_columns, clip_facts
 from flows.making.request import make_dataset
 from flows.reading.query import query_dataset
+from studies.lineage.trace import trace_lineage
+from studies.negative_controls.study import run_controls
 from tasks.errors import InputError
 from tasks.eval.state_agreement import WHEELS
 from tasks.vehicle.replayed_trace import replay_trace
@@ -91,9 +91,9 @@ def test_commands_that_drive_a_clip_again_refuse_it(traced: Path) -> None:
     place = str(traced)
     for name, run in {
         "lab audit-physics": lambda: audit_physics(place),
-        "lab controls": lambda: run_controls(place),
+        "controls": lambda: run_controls(place),
         "explain": lambda: explain_frame(place, "hump", 0),
-        "lab lineage": lambda: trace_lineage(place, "hump"),
+        "lineage": lambda: trace_lineage(place, "hump"),
     }.items():
         with pytest.raises(InputError, match=f"no vehicle model made; musync {name} needs"):
             run()

@@ -4,11 +4,11 @@ import pytest
 
 from catalogs.entries import load
 from flows.auditing.explain import explain_frame
-from flows.auditing.lineage import trace_lineage
 from flows.judging.physics import audit_physics
 from flows.making.generate import generate_dataset
 from flows.making.plan import make_plan
 from flows.store.sealed import read_manifest, recorded_grid
+from studies.lineage.trace import trace_lineage
 from tests.toy_street import write_toy_grid
 
 GRID = """
