@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from tasks.scene.bodies.body import Body
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.spherical_harmonics import C0
 from tasks.scene.street.bend import integrate_course
