@@ -63,6 +63,7 @@ KINDS = {
     "table of printed figures": Kind("paper_metrics.yaml", "paper_metrics:MetricFile"),
     "tyre": Kind("tyres", "tyres:parse_tyre", (".tir",)),
     "vehicle": Kind("vehicles", "vehicles:build_vehicle"),
+    "wet friction": Kind("wet_friction.yaml", "wet_friction:WetFrictionEntry"),
 }
 """Every kind of entry that has a name of its own; the name stands in the sentences about its files."""
 

@@ -19,6 +19,7 @@ REACHES = {
     "camera.yaml": (RENDER,),
     "hazard_marking.yaml": (RENDER,),
     "low_speed.yaml": (VEHICLE, RENDER),
+    "wet_friction.yaml": (VEHICLE, RENDER),
     "road_grade.yaml": (VEHICLE, RENDER),
     "ablation.yaml": (VEHICLE, RENDER),
     "no_low_speed_rule.yaml": (VEHICLE, RENDER),
@@ -34,6 +35,7 @@ REACHES = {
     "frames": (VEHICLE, RENDER),
     "duration_s": (VEHICLE,),
     "low_speed": (VEHICLE, RENDER),
+    "wet_friction": (VEHICLE, RENDER),
     "variant": (VEHICLE, RENDER),
     "frame_rate_hz": (VEHICLE, RENDER),
     "labels": (RENDER,),
@@ -84,8 +86,8 @@ def find_input_differences(
     rows += _list_rows("scenes", "scene", *several)
     rows += _list_rows("backend", "backend", a["backend"], b["backend"])
     for name in (
-        "vehicle_mode", "low_speed", "variant", "composition", "labels", "pictures", "frames", "frame_rate_hz",
-        "duration_s", "seed",
+        "vehicle_mode", "low_speed", "wet_friction", "variant", "composition", "labels", "pictures", "frames",
+        "frame_rate_hz", "duration_s", "seed",
     ):  # fmt: skip
         before = BEFORE.get(name)
         rows += _list_rows(name, name, a["grid"].get(name, before), b["grid"].get(name, before))

@@ -17,6 +17,7 @@ from tasks.scene.route import Route
 from tasks.surface.road_profile import RoadHazard, road_slope
 from tasks.surface.state import SurfaceParameters
 from tasks.surface.weather import Weather, find_weather, surface_state
+from tasks.surface.wet_friction import ANY_SPEED, WetGrip, compute_wet_share
 from tasks.vehicle.model.axle_ports import compute_signed_slip
 from tasks.vehicle.paper.low_speed import SteadyStop, find_rule_span
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle, compute_surface_response
@@ -93,8 +94,9 @@ def surface_steps(
 
 
 def force_steps(
-    vehicle: Vehicle, response: SurfaceResponse, hazard: RoadHazard, mode: str, row: Mapping[str, Any]
-) -> list[Step]:
+    vehicle: Vehicle, response: SurfaceResponse, hazard: RoadHazard, mode: str, row: Mapping[str, Any],
+    grip: WetGrip = ANY_SPEED,
+) -> list[Step]:  # fmt: skip
     """Slip, tyre forces, road force and dv/dt at the stored tick (paper, Eqs. 8, 9, S7 and S11).
 
     Parameters
@@ -103,16 +105,20 @@ def force_steps(
     hazard : road feature
     mode : paper or coupled, which lets a wheel slip the other way too
     row : the stored frame
+    grip : how friction depends on speed
     """
     slip_of, lowest = (compute_signed_slip, -1) if mode == "coupled" else (compute_braking_slip, 0)
     steps, forces = [], []
     speed, radius = float(row["speed"]), vehicle.wheel_radius
     standing = speed <= 0
     formula = find_law(type(response.tyre)).formula
+    by_speed = 1.0 if grip == ANY_SPEED else compute_wet_share(speed, grip) / grip.reference
+    if by_speed != 1.0:
+        formula += f" * {by_speed:.4g}"
     for axle, name in (("f", "front"), ("r", "rear")):
         omega, load = float(row[f"wheel_speed_{axle}"]), float(row[f"tyre_load_{axle}"])
         kappa = slip_of(speed, radius * omega, vehicle.slip_speed_floor)
-        mu = copysign(compute_tyre_friction(abs(kappa), load, response.tyre), kappa)
+        mu = copysign(compute_tyre_friction(abs(kappa), load, response.tyre) * by_speed, kappa)
         law = formula.format(kappa=kappa, load=load, stiffness=response.slip_stiffness)
         forces.append(mu * load)
         steps += [

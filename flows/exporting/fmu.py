@@ -68,7 +68,7 @@ def write_fmu(
     ----------
     vehicle : catalogue name or file
     out : the file, NAME.fmu
-    surface : the pavement whose dry friction is the friction at the start
+    surface : the pavement whose dry friction is the friction at the start, and whose texture holds water
     platforms : where it will run; None takes this one
 
     Returns
@@ -122,11 +122,12 @@ def pack_fmu(car: Vehicle, content: bytes, surface: str, platforms: Sequence[str
     ----------
     car : the vehicle
     content : its file with everything that it inherits
-    surface : the pavement whose dry friction is the friction at the start
+    surface : the pavement, as of `write_fmu`
     platforms : where it will run, of `PLATFORMS`
     """
     weathers = car.find_weathers()
-    first = surface_state(Weather(kind=weathers[0]), load("surface", surface))
+    pavement = load("wet friction").apply(load("surface", surface))
+    first = surface_state(Weather(kind=weathers[0]), pavement)
     starts = {row.name: row.start for row in INPUTS} | {
         "weather": float(find_weather(weathers[0]).code),
         "road_friction": first.friction,
@@ -144,7 +145,7 @@ def pack_fmu(car: Vehicle, content: bytes, surface: str, platforms: Sequence[str
         ),
         "resources/vehicle.yaml": content,
     }
-    compiled, header = compile_advance(car), format_header(car, starts.values(), guid)
+    compiled, header = compile_advance(car, pavement), format_header(car, starts.values(), guid)
     for target in (PLATFORMS[name] for name in platforms):
         with TemporaryDirectory() as folder:
             place = f"binaries/{target.name}/{identifier}{target.suffix}"
@@ -244,7 +245,7 @@ def _add_variable(
 ) -> None:
     fixed = {"parameter": {"causality": "parameter", "variability": "fixed"}, "input": {"causality": "input"}}
     roles = fixed.get(row.role, {"causality": "output", "initial": "calculated"})
-    if row.kind != "real":
+    if row.kind != "real" and row.role != "parameter":
         roles |= {"variability": "discrete"}
     said = {"name": row.name, "valueReference": str(place), "description": description}
     variable = ElementTree.SubElement(parent, "ScalarVariable", said | roles)

@@ -9,11 +9,12 @@ from catalogs.entries import load
 from catalogs.low_speed import LOW_SPEED, LOW_SPEED_CUT
 from catalogs.references import read_reference
 from catalogs.road_grade import name_grade_file
-from catalogs.scenes import load_scene
+from catalogs.scenes import load_recipe, load_scene
 from catalogs.studies.ablation import ABLATION, FamilyWeather, find_families
 from catalogs.vehicles import VehicleFile, open_vehicle
 from catalogs.weather.grip import WeatherFolder
 from catalogs.weather.look import load_weather
+from catalogs.wet_friction import WET_FRICTION
 from flows.making.places import find_scene
 from flows.making.plan import read_plan
 from flows.making.traced import Reference
@@ -24,6 +25,7 @@ from tasks.render.camera import Camera
 from tasks.render.road_paint import HazardMarking
 from tasks.render.weather.parameters import WeatherParameters
 from tasks.scene.scene import Scene
+from tasks.scene.street.layout import StreetLayout
 from tasks.studies.sensitivity import StudyProtocol
 from tasks.surface.road_profile import LEVEL_ROAD, RoadGrade
 from tasks.surface.state import SurfaceParameters
@@ -69,7 +71,9 @@ class Catalogue:
     @cached_property
     def surface(self) -> SurfaceParameters:
         """The pavement."""
-        return load("surface", self._inputs / "surface.yaml", self.weather)
+        pavement: SurfaceParameters = load("surface", self._inputs / "surface.yaml", self.weather)
+        wet = self._load_kept("wet friction", WET_FRICTION)
+        return pavement if wet is None else wet.apply(pavement)
 
     @cached_property
     def camera(self) -> Camera:
@@ -122,6 +126,11 @@ class Catalogue:
     def scene(self) -> Scene:
         """The scene."""
         return load_scene(self._scene)
+
+    @cached_property
+    def street(self) -> tuple[StreetLayout, int] | None:
+        """Layout and seed of a built-in street, whose objects can be drawn finer; None of another scene."""
+        return load_recipe(self._scene)
 
     @cached_property
     def traces(self) -> Reference | None:

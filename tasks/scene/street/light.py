@@ -1,4 +1,4 @@
-"""Sun, shade and skylight on the street, which are baked into the colours.
+"""Sun, shade and skylight on the street: how much of each reaches every surfel.
 
 Shadows are cast by simple proxies, boxes and balls of leaves, along the sun's direction in route
 coordinates; over the length of a shadow the road is nearly straight.
@@ -46,8 +46,8 @@ def sun_direction(layout: StreetLayout) -> Floats:
     )
 
 
-def lit_radiance(surfels: Surfels, layout: StreetLayout, line: Course, casters: Casters) -> Floats:
-    """Return the outgoing radiance of every surfel: Lambert's law for sun, sky and surroundings, plus its own glow.
+def share_light(surfels: Surfels, layout: StreetLayout, line: Course, casters: Casters) -> Floats:
+    """Return the shares of sun, sky and sunlit surroundings that reach every surfel, as `Gaussians.light` has them.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def lit_radiance(surfels: Surfels, layout: StreetLayout, line: Course, casters: 
 
     Returns
     -------
-    float64 [N, 3] linear light [1]
+    float64 [N, 3] in 0..1 [1]
     """
     order = np.argsort(surfels.centre[:, 0], kind="stable")
     normal = surfels.axes[order, 2]
@@ -80,14 +80,9 @@ def lit_radiance(surfels: Surfels, layout: StreetLayout, line: Course, casters: 
     openness = surfels.openness[order] * _ambient_share(point, casters.footprints)
     sky = sky_share(point, normal, layout) * openness
     around = (1 - sky) * (0.25 + 0.75 * openness)
-    light = (
-        direct[:, None] * np.array(layout.sun_rgb)
-        + sky[:, None] * np.array(layout.sky_rgb)
-        + around[:, None] * np.array(layout.bounce_rgb)
-    )
-    radiance = np.empty_like(light)
-    radiance[order] = surfels.albedo[order] * light + surfels.glow[order]
-    return radiance
+    light = np.empty((len(point), 3))
+    light[order] = np.clip(np.stack([direct, sky, around], axis=1), 0.0, 1.0)
+    return light
 
 
 def sky_share(point: Floats, normal: Floats, layout: StreetLayout) -> Floats:
