@@ -37,7 +37,7 @@ def find_recipe(name: str) -> tuple[tuple[Path, ...], int] | None:
     if name in BUILT_IN:
         return CHANGES[name], BUILT_IN_SEED
     street = parse_street_name(name)
-    return None if street is None else ((KIND_FILES[street.kind],), street.seed)
+    return None if street is None else ((KIND_FILES[street.kind],), street.random_seed)
 
 
 def scene_folder(name_or_folder: str | Path) -> Path:

@@ -16,11 +16,21 @@ from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tasks.scene.gaussians import check_gaussians
 from tasks.scene.scene import Scene
 from tasks.scene.street.build import build_street
+from tasks.scene.street.course import Stretches
 
 WIDTH, HEIGHT = 480, 320
 K = np.array([[400.0, 0, WIDTH / 2], [0, 400.0, HEIGHT / 2], [0, 0, 1]])
 STATIONS = (0.0, 20.0, 60.0, 120.0, 180.0)
-SHORT = replace(load_street_layout(), route_length=12.0, behind=5.0, beyond=20.0, crossing_station=4.0)
+COURSE = Stretches(
+    length=(12.0, 28.0, 60.0),
+    curvature=(0.0, 1 / 110 - 1 / 450, 1 / 110),
+    grade=(0.0, 0.0, 0.0),
+    transition=(0.0, 60.0, 60.0),
+    bloss_share=1.0,
+)
+SHORT = replace(
+    load_street_layout(), route_length=12.0, behind=5.0, beyond=20.0, crossing_station=4.0, course=COURSE
+)
 
 LOOKED_AT = {
     "ROAD": (18123, 7.5016008, 0.18857596, 0.94390475, 1.2369209),
