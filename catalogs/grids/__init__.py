@@ -1,7 +1,7 @@
 """Scenario grids: a YAML file of blocks whose product is a list of scenarios."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,7 @@ class Grid:
     left_out : combinations that ``exclude`` took out [1]
     idle : places of the conditions of ``exclude`` that took out none
     poses : folder of reference traces whose motion the clips show in place of the vehicle's; None for the vehicle
+    driven : files of a policy's drive by their name under ``inputs/``; none where the scenarios brake
     """
 
     settings: GridFile
@@ -41,6 +42,7 @@ class Grid:
     left_out: int = 0
     idle: tuple[int, ...] = ()
     poses: Path | None = None
+    driven: Mapping[str, bytes] = field(default_factory=dict)
 
 
 class FaultyGrid(InputError):

@@ -92,7 +92,7 @@ def _lay_cells(
         layout, start if start >= 0 else min(stop, 0.0) - 1e-9, (breaks[1:] + breaks[:-1]) / 2
     )
     columns = []
-    for j, (d, width, k) in enumerate(zip(*graded_cells(breaks, CELL * PIXEL * nearest, 0.4), strict=True)):
+    for j, (d, width, k) in enumerate(zip(*graded_cells(breaks, CELL * PIXEL * nearest, 0.55), strict=True)):
         cell = CELL * PIXEL * nearest[k]
         length = cell * np.clip(nearest[k] / EYE_HEIGHT, *_SLENDER) * min(cell / width, 1.8)
         if kind[k] != "asphalt":

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from tasks.scene.bodies.vehicles import build_vehicle
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.spherical_harmonics import C0
 from tasks.scene.street.bend import integrate_course
-from tasks.scene.street.cars.parked import COARSE, build_parked, place_body
+from tasks.scene.street.cars.parked import COARSE, build_parked, draw_look, place_body
 from tasks.scene.street.layout import StreetLayout
 from tasks.scene.street.objects import list_objects, own_gaussians
 from tasks.scene.street.plan import Car, plan_street
@@ -48,9 +49,9 @@ def detail_cars(
     Gaussians
         The same for the same arguments; the other Gaussians are bitwise unchanged and in their order.
     """
-    cars, owners = _list_owners(layout, seed)
+    cars, owners, classes = _list_owners(layout, seed)
     first = len(gaussians) - len(owners)
-    own_gaussians(gaussians, owners, gaussians.class_id[first:])
+    own_gaussians(gaussians, owners, classes)
     line = integrate_course(layout)
     gone, parts = [], []
     for number, car in enumerate(cars, start=1):
@@ -115,7 +116,7 @@ def _make_fine(car: Car, seed: int, cell: float, coarse: Gaussians, layout: Stre
         "class_id": body.gaussians.class_id,
     }
     if coarse.surroundings is not None:
-        out["surroundings"] = _count_surroundings(car, seed, cell)
+        out["surroundings"] = _count_surroundings(car.model, draw_look(car, seed)[1], cell)
     if coarse.light is not None:
         shares = np.einsum("nk,nkc->nc", weight, coarse.light[nearest].astype(np.float64))
         shares[:, 3] = new.glow.sum(axis=1) / np.maximum(colour.sum(axis=1), 1e-9)
@@ -124,12 +125,14 @@ def _make_fine(car: Car, seed: int, cell: float, coarse: Gaussians, layout: Stre
 
 
 @lru_cache(maxsize=4)
-def _list_owners(layout: StreetLayout, seed: int) -> tuple[tuple[Car, ...], NDArray[np.int32]]:
-    """Return the cars of a street, and which of its last Gaussians belong to which, by their number."""
-    _, owners, _ = list_objects(layout, seed)
-    return plan_street(layout, seed).cars, owners
+def _list_owners(
+    layout: StreetLayout, seed: int
+) -> tuple[tuple[Car, ...], NDArray[np.int32], NDArray[np.uint8]]:
+    """Return the cars of a street, and the owner and the class of each of its last Gaussians."""
+    _, owners, classes = list_objects(layout, seed)
+    return plan_street(layout, seed).cars, owners, classes
 
 
 @lru_cache(maxsize=128)
-def _count_surroundings(car: Car, seed: int, cell: float) -> NDArray[np.float32] | None:
-    return add_surroundings(build_parked(car, seed, cell).gaussians).surroundings
+def _count_surroundings(model: str, plate: int, cell: float) -> NDArray[np.float32] | None:
+    return add_surroundings(build_vehicle(model, cell=cell, seed=plate).gaussians).surroundings

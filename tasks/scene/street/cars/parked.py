@@ -61,9 +61,20 @@ def build_parked(car: Car, seed: int, cell: float) -> Body:
     seed : the street's seed, which draws its colour [1]
     cell : spacing of its discs [m]
     """
+    paint, plate = draw_look(car, seed)
+    return build_vehicle(car.model, colour=paint, cell=cell, seed=plate)
+
+
+def draw_look(car: Car, seed: int) -> tuple[Floats, int]:
+    """Draw the reflectance of a car's paint, float64 [3] [1], and the seed of its plates.
+
+    Parameters
+    ----------
+    car : its number
+    seed : the street's seed [1]
+    """
     rng = named_generator(seed, f"car {car.number}")
-    paint = palette.CAR_PAINT[rng.integers(len(palette.CAR_PAINT))]
-    return build_vehicle(car.model, colour=paint, cell=cell, seed=int(rng.integers(4)))
+    return palette.CAR_PAINT[rng.integers(len(palette.CAR_PAINT))], int(rng.integers(4))
 
 
 def place_body(body: Body, car: Car) -> Surfels:
