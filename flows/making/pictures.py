@@ -22,6 +22,7 @@ from tasks.render.road_refinement import refine_road
 from tasks.render.weather.layers import ClipConditions
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.scene import Scene
+from tasks.scene.street.cars.near import detail_cars
 from tasks.surface.anchors import adjacent_anchors
 from tasks.surface.road_profile import RoadHazard, road_elevation, road_slope
 from tasks.surface.state import SurfaceState
@@ -62,17 +63,29 @@ def render_frames(
     rig_at: RigAt,
 ) -> dict[str, NDArray[Any]]:
     """Render the clip's finished frames, depth and class."""
+    T_world_rig = frames["T_world_rig"].reshape(-1, 4, 4)
+    scene = catalogue.scene
+    if (street := catalogue.street) is not None:
+        scene = replace(
+            scene,
+            gaussians=detail_cars(
+                scene.gaussians,
+                *street,
+                T_world_rig @ catalogue.camera.T_rig_camera,
+                float(catalogue.camera.K[0, 0]),
+            ),
+        )
     gaussians, relief = edit_scene(
-        catalogue.scene,
+        scene,
         hazard_of(scenario),
         catalogue.marking,
         catalogue.weather_parameters.sky.asphalt_albedo,
     )
     return render_clip(
-        replace(catalogue.scene, gaussians=gaussians),
+        replace(scene, gaussians=gaussians),
         catalogue.camera,
         RigMotion(
-            T_world_rig=frames["T_world_rig"].reshape(-1, 4, 4),
+            T_world_rig=T_world_rig,
             frame_rate_hz=plan.settings.frame_rate_hz,
             rig_at=rig_at,
         ),

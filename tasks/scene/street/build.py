@@ -39,7 +39,7 @@ def build_street(layout: StreetLayout, seed: int) -> Scene:
     Returns
     -------
     Scene
-        200k to 500k Gaussians with true classes and normals, colours in linear light with the sun and
+        200k to 600k Gaussians with true classes and normals, colours in linear light with the sun and
         its shadows baked in, the route in the right lane and a panorama of the sky.
     """
     line = integrate_course(layout)

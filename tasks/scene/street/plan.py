@@ -113,7 +113,7 @@ class Plan:
 
 CROWN_BALLS = 26
 """Balls of leaves of a crown."""
-MODELS = ("hatchback", "saloon", "estate", "van")
+MODELS = ("hatchback", "saloon", "estate", "suv", "van")
 """Shapes of car."""
 
 
@@ -279,7 +279,7 @@ def _park_cars(layout: StreetLayout, seed: int, side: int) -> list[Car]:
             station=float(station),
             lateral=float(lateral + rng.uniform(-0.08, 0.08)),
             facing=-side,
-            model=str(rng.choice(MODELS, p=[0.4, 0.25, 0.22, 0.13])),
+            model=str(rng.choice(MODELS, p=[0.33, 0.2, 0.17, 0.18, 0.12])),
         )
         beyond = station - layout.crossing_station
         crossing = layout.has_crossing and -8.5 < beyond < layout.crossing_length + 5.5
