@@ -5,6 +5,7 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
+from catalogs.driven import DrivenClips, read_driven
 from catalogs.entries import load
 from catalogs.low_speed import LOW_SPEED, LOW_SPEED_CUT
 from catalogs.references import read_reference
@@ -137,6 +138,11 @@ class Catalogue:
         """Reference traces whose motion the clips show; None where the vehicle drives."""
         folder = self._inputs / TRACES
         return read_reference(folder) if folder.is_dir() else None
+
+    @cached_property
+    def driven(self) -> DrivenClips | None:
+        """Pressures of a policy's drive; None where the scenarios brake."""
+        return read_driven(self._inputs)
 
     def _load_kept(self, kind: str, name: str) -> Any:
         """Load an entry that not every dataset keeps; None where this one does not."""
