@@ -55,6 +55,7 @@ KINDS = {
     "hazard marking": Kind("hazard_markings", "hazard_markings:MarkingEntry"),
     "low-speed rule": Kind("low_speed.yaml", "low_speed:LowSpeedEntry"),
     "protocol": Kind("protocols", "protocols:ProtocolEntry"),
+    "road user sizes": Kind("road_users.yaml", "road_users:RoadUserSizes"),
     "sensitivity study": Kind("studies/surface-sensitivity.yaml", "studies:SensitivityEntry"),
     "stop study": Kind("stop_studies", "stop_studies:StopStudy"),
     "surface": Kind("surfaces", "surfaces:SurfaceEntry"),

@@ -170,7 +170,7 @@ PAIR_CHANNELS: tuple[Channel, ...] = (
     Channel(name="clip_id_b", unit="", symbol="", description="the other sibling"),
     Channel(name="label_a", unit="", symbol="", description="label of the first"),
     Channel(name="label_b", unit="", symbol="", description="label of the other"),
-    Channel(name="control", unit="", symbol="", description="the one control in which they differ: weather, speed, braking or road"),
+    Channel(name="control", unit="", symbol="", description="the one control in which they differ: weather, speed, braking, road or road users"),
     Channel(name="differs", unit="", symbol="", description="the scenario fields of that control whose values differ"),
     Channel(name="surface_friction_change", unit="1", symbol="Delta mu_c", description="reference surface coefficient, b minus a"),
     Channel(name="tyre_peak_change", unit="1", symbol="Delta mu_eff", description="effective peak of the tyre curve, b minus a"),

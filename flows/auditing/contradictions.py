@@ -90,7 +90,7 @@ def find_contradictions(
 
 def list_remade(plan: Plan) -> list[str]:
     """Return the paths of the files that `find_contradictions` holds against what our writer makes."""
-    names = arrays_of(plan.settings.labels) if plan.settings.pictures else {}
+    names = arrays_of(plan.settings.labels, plan.settings.has_objects) if plan.settings.pictures else {}
     return [
         "plan.json",
         GRID,
@@ -142,7 +142,7 @@ def _list_names(record: type) -> Collection[str]:
 def _compare_ids(manifest: Manifest, plan: Plan) -> Iterator[str]:
     deciding = list_deciding(plan.settings, plan.scene, plan.inputs, plan.backend)
     for clip in plan.clips:
-        if (wanted := identify_clip(deciding, clip.scenario.as_row(), clip.seed)) != clip.clip_id:
+        if (wanted := identify_clip(deciding, clip.scenario.as_record(), clip.seed)) != clip.clip_id:
             yield (
                 f"manifest.json: the id of clip {clip.label} must be {wanted}, the hash of its inputs, scenario and"
                 f" seed; it is {clip.clip_id}"
@@ -156,7 +156,7 @@ def _compare_ids(manifest: Manifest, plan: Plan) -> Iterator[str]:
 
 def _compare_files(layout: Layout, manifest: Manifest, plan: Plan) -> Iterator[str]:
     """Yield the files that are recorded and not planned, or planned and not recorded, or recorded of another clip."""
-    arrays = arrays_of(plan.settings.labels) if plan.settings.pictures else {}
+    arrays = arrays_of(plan.settings.labels, plan.settings.has_objects) if plan.settings.pictures else {}
     planned: dict[str, str | None] = dict.fromkeys(
         [*list_remade(plan), *(f"inputs/{name}" for name in plan.inputs)]
     )

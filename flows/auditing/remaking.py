@@ -89,7 +89,9 @@ def _compare_clip(
     clip_id, index = clip["clip_id"], clip["index"]
     again = read_receipt(remade, clip_id)
     changed: dict[str, dict[str, Any]] = {}
-    for name in (*STAGED_TABLES, *(arrays_of(plan.settings.labels) if plan.settings.pictures else ())):
+    settings = plan.settings
+    arrays = arrays_of(settings.labels, settings.has_objects) if settings.pictures else ()
+    for name in (*STAGED_TABLES, *arrays):
         digest = again["content"][name]
         try:
             if name in STAGED_TABLES:

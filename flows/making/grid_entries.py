@@ -8,6 +8,7 @@ from typing import Any
 from catalogs.entries import open_entry
 from catalogs.grids import GridFile
 from catalogs.low_speed import LOW_SPEED, LOW_SPEED_CUT
+from catalogs.road_users import ROAD_USERS
 from catalogs.studies.ablation import ABLATION
 from catalogs.vehicles import open_vehicle
 from catalogs.weather.grip import WEATHER
@@ -47,6 +48,7 @@ INPUTS = (
         name="hazard_marking.yaml", kind="hazard marking", setting="hazard_marking",
         needed=lambda settings: settings.hazard_marking is not None,
     ),
+    Input(name=ROAD_USERS, kind="road user sizes", needed=lambda settings: settings.has_objects),
     Input(name=LOW_SPEED, kind="low-speed rule", needed=lambda settings: settings.keeps_stops_steady),
     Input(name=ABLATION, kind="ablation", needed=lambda settings: settings.variant == "fixed-mu"),
     Input(

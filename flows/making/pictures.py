@@ -12,6 +12,7 @@ from catalogs.scenario import Scenario
 from flows.making.catalogue import Catalogue
 from flows.making.driving import hazard_of, weather_of
 from flows.making.plan import Plan, frame_ticks
+from flows.making.road_users import build_moving_bodies, move_road_users
 from tasks.render.camera import RigAt, body_poses, continuous_rig
 from tasks.render.clip import RigMotion, render_clip
 from tasks.render.kerb_face import extend_kerbs
@@ -68,13 +69,16 @@ def render_frames(
         catalogue.marking,
         catalogue.weather_parameters.sky.asphalt_albedo,
     )
-    return render_clip(
+    sizes, time = catalogue.road_user_sizes, frames["tick"] / TICK_RATE_HZ
+    motions = move_road_users(scenario, sizes, catalogue.scene, state.friction, time)
+    buffers = render_clip(
         replace(catalogue.scene, gaussians=gaussians),
         catalogue.camera,
         RigMotion(
             T_world_rig=frames["T_world_rig"].reshape(-1, 4, 4),
             frame_rate_hz=plan.settings.frame_rate_hz,
             rig_at=rig_at,
+            bodies=build_moving_bodies(scenario, sizes, motions),
         ),
         ClipConditions(
             state=state,
@@ -89,6 +93,9 @@ def render_frames(
         labels=plan.settings.labels,
         composition=plan.settings.composition,
     )
+    if plan.settings.has_objects and not scenario.objects:
+        buffers["instance"] = np.zeros(buffers["class"].shape, np.uint16)
+    return buffers
 
 
 def edit_scene(

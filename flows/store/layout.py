@@ -12,7 +12,7 @@ from threading import get_native_id
 from typing import Any
 
 from catalogs.documents import read_json_document
-from flows.store.arrays import arrays_of
+from flows.store.arrays import EVERY_ARRAY
 
 STAGED_TABLES = ("ticks", "frames")
 STAGING = ".staging"
@@ -78,7 +78,7 @@ class Layout:
 
     def frame_shard(self, array: str, index: int) -> Path:
         """The one file that holds a clip's frames of one array (Zarr v3 default chunk keys)."""
-        further = arrays_of(labels=True)[array].dimensions
+        further = EVERY_ARRAY[array].dimensions
         return self.frames.joinpath(array, "c", str(index), "0", "0", "0", *("0" for _ in further))
 
     def relative(self, path: Path) -> str:

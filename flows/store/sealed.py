@@ -10,7 +10,7 @@ from catalogs.documents import LARGEST_JSON, parse_json, read_content
 from catalogs.grids import GridFile
 from catalogs.grids.form import BEFORE
 from catalogs.sentences import cap_problems, describe_rules, shorten_value
-from flows.store.arrays import arrays_of
+from flows.store.arrays import EVERY_ARRAY
 from flows.store.layout import RECORD, STAGED_TABLES, Layout, read_json
 from flows.store.telemetry import content_hash, labelled_field, read_table, table_columns
 from manifests.canonical import sha256_of_file
@@ -216,7 +216,7 @@ def read_receipt(layout: Layout, clip_id: str) -> Receipt:
     """
     place = layout.receipt(clip_id)
     receipt = check_record(Receipt, read_json(place), place)
-    arrays = arrays_of(labels=True).keys() & receipt["content"].keys()
+    arrays = EVERY_ARRAY.keys() & receipt["content"].keys()
     shards = {layout.relative(layout.frame_shard(name, receipt["index"])) for name in arrays}
     if receipt["clip_id"] != clip_id or receipt["artifacts"].keys() != shards:
         raise InputError(

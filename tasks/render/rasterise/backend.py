@@ -1,5 +1,6 @@
 """Choice of the rasteriser: this project's on the CPU, or gsplat where its picture on a GPU agrees with the CPU's."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, Protocol, get_args
@@ -11,6 +12,7 @@ from tasks.conventions import SemanticClass
 from tasks.errors import InputError
 from tasks.render.rasterise import rasteriser
 from tasks.render.rasterise.gbuffer import GBuffer
+from tasks.render.rasterise.placed_body import PlacedBody, Shade
 from tasks.scene.gaussians import Gaussians
 
 BackendName = Literal["auto", "cpu", "gsplat"]
@@ -41,6 +43,8 @@ class Backend(Protocol):
         width: int,
         height: int,
         normals: bool = True,
+        bodies: Sequence[PlacedBody] = (),
+        shade: Shade | None = None,
     ) -> GBuffer:
         """Draw one view; see `tasks.render.rasterise.rasteriser.rasterise_view`; normals may be there unasked."""
 

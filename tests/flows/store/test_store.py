@@ -6,7 +6,7 @@ import pyarrow.parquet as pq
 import pytest
 import zarr
 
-from flows.store.arrays import ARRAYS, arrays_of
+from flows.store.arrays import ARRAYS, EVERY_ARRAY
 from flows.store.frames import buffer_hash, create_arrays, read_clip, write_clip
 from flows.store.layout import PARTIAL, Layout, write_atomically, write_json
 from flows.store.staging import partial_files
@@ -78,7 +78,7 @@ def test_arrays_carry_unit_and_meaning_and_the_names_of_their_codes(tmp_path):
     assert {name: array.attrs["units"] for name, array in group.arrays()} == {
         "rgb": "1", "depth": "m", "class": "1", "normal": "1", "road": "m", "flow": "px", "marks": "1",
     }  # fmt: skip
-    for name, array in arrays_of(labels=True).items():
+    for name, array in EVERY_ARRAY.items():
         assert group[name].attrs["long_name"] == group[name].attrs["description"] == array.channel.description
     codes = dict(
         zip(group["class"].attrs["flag_meanings"].split(), group["class"].attrs["flag_values"], strict=True)
