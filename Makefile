@@ -6,7 +6,7 @@ READY := .venv/.ready
 DEMO ?= datasets/demo
 WORKERS ?= 2
 
-.PHONY: demo test test-minutes check docs docs-serve study study-schedule study-crash study-fuzz study-faults study-double-track study-scale study-production study-mutants study-exports study-calibration study-editors study-learning freeze bench lock size clean
+.PHONY: demo test test-minutes check docs docs-serve study study-schedule study-crash study-fuzz study-faults study-double-track study-drives study-scale study-production study-mutants study-exports study-calibration study-editors study-learning freeze bench lock size clean
 
 # Whatever comes from the network is held against a hash of constraints.txt, but for torch: one version of it has builds
 # with and without CUDA, one an index, and which of them is at hand differs; what a CUDA build needs beyond is not in the
@@ -61,7 +61,7 @@ study: $(READY)
 	$(BIN)/musync lab sensitivity --out datasets/study
 
 study-schedule: $(READY)
-	$(BIN)/python -m benchmarks.scheduled_runs
+	$(BIN)/python -m studies.scheduled_runs
 
 study-crash: $(READY)
 	$(BIN)/python -m studies.crashes
@@ -75,6 +75,12 @@ study-faults: $(READY)
 study-double-track: $(READY)
 	$(BIN)/python -m studies.double_track --make datasets/double-track
 	$(BIN)/python -m studies.double_track --judge datasets/double-track
+
+# The paper's brake-dive protocol (Appendix C.5) on made-up drives.
+study-drives: $(READY)
+	$(BIN)/musync lab synthetic-drives --out datasets/drives
+	$(BIN)/musync import-measurements datasets/drives --map a2d2 --out datasets/a2d2
+	$(BIN)/musync lab brake-protocol datasets/a2d2 --out datasets/brake-protocol
 
 # How memory and time grow with the clips; SCALE="100000 --folder /dev/shm" takes some 4 CPU-minutes.
 study-scale: $(READY)
@@ -97,10 +103,10 @@ study-exports:
 		threadpoolctl tqdm cachetools parameterized
 	$(EXPORTS) pytest -rs tests/flows/exporting
 study-calibration: $(READY)
-	$(BIN)/python -m benchmarks.known_truth
+	$(BIN)/python -m studies.known_truth
 
 study-editors: $(READY)
-	$(BIN)/python -m benchmarks.editors datasets/editors
+	$(BIN)/python -m studies.video_sets.editors datasets/editors
 
 # A small network learns friction from pictures (docs/tutorial/learn-friction.md): ten minutes, most of them for the dataset.
 study-learning: $(READY)

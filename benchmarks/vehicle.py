@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from benchmarks.side_by_side import make_row, print_rows
-from benchmarks.vehicle_modes import simulate_condition
 from catalogs.entries import load
 from catalogs.studies import Condition, load_conditions
+from studies.paper.vehicle_modes import simulate_condition
 from tasks.campaign.campaign import CHANNELS, Run
 from tasks.identification.inference.forward import prepare_run, simulate_run
 from tasks.studies.sensitivity import sensitivity_study

@@ -74,7 +74,13 @@ def measure_rows(scene_name: str = "street", camera_name: str = "dashcam-480x320
     for name, state in STATES.items():
         started = time.process_time()
         gaussians, weather = weather_scene(
-            ClearScene(gaussians=scene.gaussians, environment=scene.environment, route=scene.route),
+            ClearScene(
+                gaussians=scene.gaussians,
+                environment=scene.environment,
+                route=scene.route,
+                to_sun=scene.to_sun,
+                daylight=scene.daylight,
+            ),
             ClipConditions(state=state, pavement=pavement, parameters=parameters, seed=1),
             float(K[0, 0]),
         )
@@ -103,14 +109,14 @@ def _list_stages(
     weather: ClipWeather, picture: np.ndarray, clear_sky: np.ndarray, gbuffer: GBuffer, shutter: Shutter
 ) -> dict[str, Callable[[], object]]:
     """The layers of one frame, each to be called alone."""
-    overcast = weather.overcast
-    assert overcast is not None and overcast.population is not None
-    film, falling = overcast.look.film, overcast.population
+    outside = weather.outside
+    assert outside is not None and outside.population is not None
+    film, falling = outside.look.film, outside.population
     rays = pixel_rays(shutter)
-    sky, air, view = overcast.sky, overcast.air, world_to_camera(shutter.T_world_camera)
+    sky, air, view = outside.sky, outside.air, world_to_camera(shutter.T_world_camera)
 
     def see_clouds() -> np.ndarray:
-        return environment_view(overcast.environment, view, shutter.K, shutter.width, shutter.height)
+        return environment_view(outside.environment, view, shutter.K, shutter.width, shutter.height)
 
     cloudy = see_clouds()
     lit = recompose_layers(picture, [light_layer(picture, gbuffer, clear_sky, cloudy, sky)])
@@ -127,7 +133,7 @@ def _list_stages(
             parameters=film,
             seed=weather.seed,
         )
-        light = LightOnRoad(environment=overcast.environment, sky=sky, extinction=air.extinction)
+        light = LightOnRoad(environment=outside.environment, sky=sky, extinction=air.extinction)
         stages["wet road with reflection"] = lambda: wet_layer(lit, gbuffer, shutter, rays, on_road, light)
     return stages
 

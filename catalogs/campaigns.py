@@ -153,8 +153,8 @@ def read_campaign(folder: str | Path) -> Campaign:
             )
             first, _ = find_motion(run.speed)
             runs.append(run.begin_at(first) if first else run)
-    told = apply_checks(table.session, Session(runs=readable))
-    problems += [one.sentence for one in told if one.check.fault != "warning"]
+    violations = apply_checks(table.session, Session(runs=readable))
+    problems += [one.sentence for one in violations if one.check.fault != "warning"]
     if problems:
         raise InputError(cap_problems([f"{shorten(folder.name)}: {problem}" for problem in problems]))
     zero = 0.0

@@ -40,13 +40,10 @@ class Kind:
 
 KINDS = {
     "ablation": Kind("studies/ablation.yaml", "studies.ablation:AblationEntry"),
-    "bump study": Kind("bump_studies", "bump_studies:BumpStudy"),
-    "bus": Kind("buses", "buses:BusEntry"),
     "calibrated range": Kind("calibrated_range.yaml", "calibrated_range:CalibratedRange"),
     "calibration procedure": Kind("calibration", "calibration:ProcedureEntry"),
     "camera": Kind("cameras", "cameras:CameraEntry"),
     "channel map": Kind("channel_maps", "channel_maps:build_channel_map"),
-    "closing study": Kind("studies/closing.yaml", "studies.closing:ClosingStudy"),
     "cut of the low-speed rule": Kind("studies/no_low_speed_rule.yaml", "low_speed:LowSpeedCutEntry"),
     "foreign gate file": Kind("foreign_gates.yaml", "gates:ForeignGateEntry"),
     "gate file": Kind("gates.yaml", "gates:GateEntry"),
@@ -54,16 +51,14 @@ KINDS = {
     "grid": Kind("grids", "grids:build_grid"),
     "hazard marking": Kind("hazard_markings", "hazard_markings:MarkingEntry"),
     "low-speed rule": Kind("low_speed.yaml", "low_speed:LowSpeedEntry"),
-    "protocol": Kind("protocols", "protocols:ProtocolEntry"),
     "road user sizes": Kind("road_users.yaml", "road_users:RoadUserSizes"),
     "sensitivity study": Kind("studies/surface-sensitivity.yaml", "studies:SensitivityEntry"),
-    "stop study": Kind("stop_studies", "stop_studies:StopStudy"),
     "surface": Kind("surfaces", "surfaces:SurfaceEntry"),
     "table of physical limits": Kind("physical_limits.yaml", "physical_limits:PhysicalLimits"),
     "table of plausible figures": Kind("plausible_vehicle.yaml", "plausible_vehicle:PlausibleVehicle"),
     "tyre": Kind("tyres", "tyres:parse_tyre", (".tir",)),
     "vehicle": Kind("vehicles", "vehicles:build_vehicle"),
-    "video protocol": Kind("video_protocols", "video_protocols:VideoProtocol"),
+    "wet friction": Kind("wet_friction.yaml", "wet_friction:WetFrictionEntry"),
 }
 """Every kind of entry that has a name of its own; the name stands in the sentences about its files."""
 

@@ -1,4 +1,4 @@
-"""Paint on raised road features: how it is laid out, and how it reflects."""
+"""Finish of road features, paint, patch and joints: how it is laid out, and how it reflects."""
 
 from typing import Annotated
 
@@ -23,13 +23,24 @@ class MarkingEntry(CatalogueEntry):
     stripe_width: Annotated[Scalar, require_quantity("m", above=0)]
     paint: Reflectance
     gap: Reflectance
+    patch: Reflectance | None = None
+    patch_margin: Annotated[Scalar, require_quantity("m", minimum=0)] | None = None
+    joint: Reflectance | None = None
+    joint_width: Annotated[Scalar, require_quantity("m", above=0)] | None = None
 
     def build(self) -> HazardMarking:
         """The marking itself."""
-        red, green, blue = self.paint.value
-        dark_red, dark_green, dark_blue = self.gap.value
         return HazardMarking(
             stripe_width=self.stripe_width.value,
-            paint=(red, green, blue),
-            gap=(dark_red, dark_green, dark_blue),
+            paint=_as_colour(self.paint),
+            gap=_as_colour(self.gap),
+            patch=self.patch and _as_colour(self.patch),
+            patch_margin=self.patch_margin.value if self.patch_margin else 0.0,
+            joint=self.joint and _as_colour(self.joint),
+            joint_width=self.joint_width.value if self.joint_width else 0.0,
         )
+
+
+def _as_colour(table: Table) -> tuple[float, float, float]:
+    red, green, blue = table.value
+    return red, green, blue

@@ -1,5 +1,6 @@
 """The grade of a scene's road as a dataset keeps it, so that its motion follows from its inputs without the scene."""
 
+import re
 from typing import Annotated
 
 from catalogs.quantities import CatalogueEntry, Scalar, Table, require_quantity
@@ -7,6 +8,18 @@ from tasks.surface.road_profile import RoadGrade
 
 ROAD_GRADE = "road_grade.yaml"
 """Name among the kept inputs; a dataset of a level road keeps none."""
+SCENE_GRADES = "road_grade/"
+"""Folder of the grades in a dataset of several scenes: one file for each scene that is not level."""
+
+
+def name_grade_file(scene: str | None) -> str:
+    """Return the name among the kept inputs of a scene's grade.
+
+    Parameters
+    ----------
+    scene : that a clip names; None where the dataset has one
+    """
+    return ROAD_GRADE if scene is None else f"{SCENE_GRADES}{re.sub(r'[^A-Za-z0-9_.=-]', '_', scene)}.yaml"
 
 
 class RoadGradeEntry(CatalogueEntry):

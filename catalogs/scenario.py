@@ -37,6 +37,7 @@ class Scenario:
     hazard_center_m, hazard_length_m : where on the route the road feature lies and how long it is [m]
     hazard_height_m : positive a hump, negative a depression, 0 a flat road [m]
     objects : road users beside the ego vehicle; in no row of a table, which has one value a column
+    scene : that it drives in; None is the one scene of its grid, and stands in no row
     """
 
     weather: WeatherName = DRY
@@ -53,6 +54,7 @@ class Scenario:
     hazard_center_m: float = 0.0
     hazard_length_m: float = 0.0
     hazard_height_m: float = 0.0
+    scene: str | None = None
     objects: tuple[RoadUser, ...] = ()
 
     @classmethod
@@ -62,8 +64,9 @@ class Scenario:
         return cls(**{**record, "objects": users})
 
     def as_row(self) -> dict[str, Any]:
-        """The numbers in order, for a row of a table."""
-        return dict(zip(SCENARIO_FIELDS, _read_fields(self), strict=True))
+        """The fields in order, for a row of a table."""
+        row = dict(zip(SCENARIO_FIELDS, _read_fields(self), strict=True))
+        return row if self.scene is None else row | {"scene": self.scene}
 
     def as_record(self) -> dict[str, Any]:
         """The row and the road users, if any, for a manifest or a content id."""
@@ -71,7 +74,8 @@ class Scenario:
         return self.as_row() | ({"objects": users} if users else {})
 
 
-SCENARIO_FIELDS = tuple(field.name for field in fields(Scenario) if field.name != "objects")
+SCENARIO_FIELDS = tuple(field.name for field in fields(Scenario) if field.name not in {"scene", "objects"})
+"""Fields of every scenario; the scene is one of those alone whose grid has several, and road users are a list."""
 _read_fields = attrgetter(*SCENARIO_FIELDS)
 NUMBERS = tuple(name for name in SCENARIO_FIELDS if name not in {"weather", "hold_speed"})
 NOT_NEGATIVE = (

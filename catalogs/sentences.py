@@ -91,7 +91,7 @@ def describe_rules(
     ----------
     error : of the model that the document was held against
     place : the document
-    known : keys that exist in the table at a place; told where a key is unknown
+    known : keys that exist in the table at a place; listed where a key is unknown
     """
     where = shorten(place)
     return [f"{where}: {_describe_rule(problem, known)}" for problem in error.errors(include_url=False)]

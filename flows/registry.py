@@ -2,10 +2,23 @@
 
 from collections.abc import Callable
 from importlib import import_module
+from importlib.util import find_spec
 from typing import Any
 
-from flows.commands import audits, datasets, evaluation, measured, scenes, studies, vehicles
+from flows.commands import audits, datasets, evaluation, measured, scenes, vehicles
 from flows.commands.command import Command
+
+LABORATORY = "studies.commands"
+"""Where the laboratory beside the house lists its commands; it may be absent."""
+
+
+def list_laboratory() -> tuple[Command, ...]:
+    """Return the commands of the laboratory, which ``musync lab`` runs beside its own."""
+    if find_spec("studies") is None:
+        return ()
+    commands: tuple[Command, ...] = import_module(LABORATORY).COMMANDS
+    return commands
+
 
 COMMANDS: tuple[Command, ...] = (
     *datasets.COMMANDS,
@@ -14,7 +27,7 @@ COMMANDS: tuple[Command, ...] = (
     *vehicles.COMMANDS,
     *measured.COMMANDS,
     *scenes.COMMANDS,
-    *studies.COMMANDS,
+    *list_laboratory(),
 )
 
 

@@ -19,6 +19,7 @@ REACHES = {
     "camera.yaml": (RENDER,),
     "hazard_marking.yaml": (RENDER,),
     "low_speed.yaml": (VEHICLE, RENDER),
+    "wet_friction.yaml": (VEHICLE, RENDER),
     "road_grade.yaml": (VEHICLE, RENDER),
     "ablation.yaml": (VEHICLE, RENDER),
     "no_low_speed_rule.yaml": (VEHICLE, RENDER),
@@ -34,6 +35,7 @@ REACHES = {
     "frames": (VEHICLE, RENDER),
     "duration_s": (VEHICLE,),
     "low_speed": (VEHICLE, RENDER),
+    "wet_friction": (VEHICLE, RENDER),
     "variant": (VEHICLE, RENDER),
     "frame_rate_hz": (VEHICLE, RENDER),
     "labels": (RENDER,),
@@ -80,10 +82,12 @@ def find_input_differences(
                 else _list_rows(name, key, a["inputs"].get(name, ABSENT), b["inputs"].get(name, ABSENT))
             )
     rows += _list_rows("scene", "scene", a["scene"].get("sha256"), b["scene"].get("sha256"))
+    several = [{scene["name"]: scene["sha256"] for scene in one.get("scenes", ())} for one in (a, b)]
+    rows += _list_rows("scenes", "scene", *several)
     rows += _list_rows("backend", "backend", a["backend"], b["backend"])
     for name in (
-        "vehicle_mode", "low_speed", "variant", "composition", "labels", "pictures", "frames", "frame_rate_hz",
-        "duration_s", "seed",
+        "vehicle_mode", "low_speed", "wet_friction", "variant", "composition", "labels", "pictures", "frames",
+        "frame_rate_hz", "duration_s", "seed",
     ):  # fmt: skip
         before = BEFORE.get(name)
         rows += _list_rows(name, name, a["grid"].get(name, before), b["grid"].get(name, before))
@@ -190,6 +194,8 @@ def kind_of_input(name: str) -> str:
     path = PurePosixPath(name)
     if path.suffix in KINDS["tyre"].suffixes:
         return "tyre"
+    if path.parts[0] == "road_grade":
+        return "road_grade.yaml"
     return path.parts[0] if path.parts[0] in ("weather", "traces") else name
 
 

@@ -23,6 +23,27 @@ _SEAL = re.compile(rb',"seal":"([0-9a-f]{64})"\}')
 _SEAL_LENGTH = len(',"seal":"') + 64 + len('"}')
 
 
+def list_scenes(manifest: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Return name and hash of each scene that the clips of a dataset drive in.
+
+    Parameters
+    ----------
+    manifest : of the dataset, or its head
+    """
+    return manifest.get("scenes") or [manifest["scene"]]
+
+
+def describe_scenes(manifest: Mapping[str, Any]) -> str:
+    """Return the name of a dataset's scene, or how many it has.
+
+    Parameters
+    ----------
+    manifest : of the dataset, or its head
+    """
+    scenes = list_scenes(manifest)
+    return str(manifest["grid"]["scene"]) if "scenes" not in manifest else f"{len(scenes)} scenes"
+
+
 def freeze_manifest(
     plan: Mapping[str, Any],
     clips: Iterable[Mapping[str, Any]],

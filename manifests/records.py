@@ -80,7 +80,9 @@ else:
     _fields = get_type_hints(Scenario, include_extras=True)
     _users = Annotated[list[dict[str, Any]], AfterValidator(_check_road_users), Field(min_length=1)]
     ScenarioRecord = with_config(STRICT)(
-        TypedDict("ScenarioRecord", {**_fields, "objects": NotRequired[_users]})
+        TypedDict(
+            "ScenarioRecord", {**_fields, "scene": NotRequired[LocalName], "objects": NotRequired[_users]}
+        )
     )
     # a dataset decides what it has: a figure that came later is not represented
     _figures = {c.name: NotRequired[float | None] for c in CLIP_CHANNELS if c.name not in SCENARIO_FIELDS}
@@ -95,10 +97,12 @@ else:
 
 @with_config(STRICT)
 class SceneRecord(TypedDict):
-    """Which scene: its name, and the SHA-256 of its content."""
+    """Which scene: its name, and the SHA-256 of its content; of a street that is drawn, kind and seed."""
 
     name: LocalName
     sha256: Sha256
+    kind: NotRequired[Text]
+    seed: NotRequired[Index]
 
 
 @with_config(STRICT)
@@ -148,6 +152,7 @@ class PlanRecord(TypedDict):
     run_id: Id
     grid: dict[str, Any]
     scene: SceneRecord
+    scenes: NotRequired[list[SceneRecord]]
     backend: Text
     inputs: Inputs
     made_with: MadeWith
@@ -166,6 +171,7 @@ class ManifestHead(TypedDict):
     run_id: Id
     grid: dict[str, Any]
     scene: SceneRecord
+    scenes: NotRequired[list[SceneRecord]]
     backend: Text
     inputs: Inputs
     made_with: MadeWith
@@ -205,6 +211,7 @@ class FrozenRun(TypedDict):
     parameters: dict[InputName, Any]
     clips: Annotated[list[FrozenClip], Field(min_length=1)]
     scene: SceneRecord
+    scenes: NotRequired[list[SceneRecord]]
     made_with: MadeWith
     processor: dict[Text, Text]
     seal: Sha256

@@ -21,6 +21,7 @@ CONTROLS: dict[str, tuple[str, ...]] = {
         "hold_speed",
     ),
     "road": ("hazard_center_m", "hazard_length_m", "hazard_height_m"),
+    "scene": ("scene",),
     "road users": ("objects",),
 }
 """The scenario's fields by what an experimenter turns: q, u (speed and braking) and g of Eq. overall_pipeline."""

@@ -58,7 +58,7 @@ def write_span_table() -> str:
 
 
 def _list_checks() -> Iterator[tuple[str, str, CheckEntry]]:
-    """Yield group, name and row of each check, in the order in which they are told."""
+    """Yield group, name and row of each check, in the order in which they are reported."""
     for group, checks in read_entry(CheckTableEntry, CAMPAIGN_CHECKS, "table of checks").groups.items():
         yield from ((group, name, check) for name, check in checks.items())
 

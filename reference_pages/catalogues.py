@@ -19,9 +19,9 @@ RULES = (
     ("plausible_vehicle", "Plausible vehicles"),
 )
 """Files of the catalogue's own folder, with their headings."""
-TABLED = ("camera", "surface", "bus", "calibration procedure", "hazard marking", "protocol")
+TABLED = ("camera", "surface", "calibration procedure", "hazard marking")
 """Kinds of few files, whose numbers have value, unit and source."""
-LISTED = ("tyre", "channel map", "stop study", "bump study")
+LISTED = ("tyre", "channel map")
 """Kinds of which the files are named with their first comment; other pages say what they hold."""
 
 REFERENCE = "paper-reference"

@@ -170,7 +170,7 @@ PAIR_CHANNELS: tuple[Channel, ...] = (
     Channel(name="clip_id_b", unit="", symbol="", description="the other sibling"),
     Channel(name="label_a", unit="", symbol="", description="label of the first"),
     Channel(name="label_b", unit="", symbol="", description="label of the other"),
-    Channel(name="control", unit="", symbol="", description="the one control in which they differ: weather, speed, braking, road or road users"),
+    Channel(name="control", unit="", symbol="", description="the one control in which they differ: weather, speed, braking, road, scene or road users"),
     Channel(name="differs", unit="", symbol="", description="the scenario fields of that control whose values differ"),
     Channel(name="surface_friction_change", unit="1", symbol="Delta mu_c", description="reference surface coefficient, b minus a"),
     Channel(name="tyre_peak_change", unit="1", symbol="Delta mu_eff", description="effective peak of the tyre curve, b minus a"),
@@ -186,10 +186,15 @@ VARIANT_CHANNEL = Channel(
 )
 """Column of the clips table of a dataset in which a coupling is cut."""
 
+SCENE_CHANNEL = Channel(
+    name="scene", unit="", symbol="", description="scene that the clip drives in; of a dataset with several"
+)
+"""Column of the clips table of a dataset of several scenes."""
+
 CHANNELS_BY_NAME: dict[str, Channel] = {
     c.name: c
     for c in (
-        VARIANT_CHANNEL, *IDENTITY_CHANNELS, *TICK_CHANNELS, *FRAME_CHANNELS, *CLIP_CHANNELS, *CHECK_CHANNELS, *PAIR_CHANNELS
+        VARIANT_CHANNEL, SCENE_CHANNEL, *IDENTITY_CHANNELS, *TICK_CHANNELS, *FRAME_CHANNELS, *CLIP_CHANNELS, *CHECK_CHANNELS, *PAIR_CHANNELS
     )
 }  # fmt: skip
 

@@ -18,7 +18,7 @@ def list_blocks(document: Path, *languages: str) -> list[str]:
 
 
 def list_command_lines(document: Path) -> Iterator[str]:
-    """Yield the lines of a page that start with ``musync``: of blocks for a terminal, and indented ones."""
+    """Yield the lines of a page that call musync: of blocks for a terminal, and indented ones."""
     for block in list_blocks(document, "", "sh", "bash", "console"):
         for line in block.replace("\\\n", " ").splitlines():
             if line.lstrip("$ ").startswith("musync "):

@@ -31,12 +31,10 @@ MOST_WORDS, MOST_LONG = 34_000, 0.015
 PARTS = ["tutorial", "how-to", "reference", "explanation", "evidence"]
 
 
-PROGRAM = typer.main.get_command(app)
-
-
-def find_command(words: list[str]) -> tuple[Any, list[str]]:
+def find_command(line: str) -> tuple[Any, list[str]]:
     """Return the command that a line begins with, and the words after its name."""
-    command = PROGRAM
+    words = shlex.split(line, comments=True)[1:]
+    command: Any = typer.main.get_command(app)
     while words and words[0] in getattr(command, "commands", {}):
         command, words = command.commands[words[0]], words[1:]
     return command, words
@@ -46,7 +44,7 @@ def find_command(words: list[str]) -> tuple[Any, list[str]]:
 def test_every_command_line_of_a_document_is_one_that_the_program_takes(document):
     refused = {}
     for line in list_command_lines(document):
-        command, words = find_command(shlex.split(line.split(" > ")[0], comments=True)[1:])
+        command, words = find_command(line.split(" > ")[0])
         try:
             command.make_context(
                 command.name, words
@@ -60,7 +58,7 @@ def test_every_command_line_of_a_document_is_one_that_the_program_takes(document
 def test_every_command_named_in_a_document_exists_with_its_options(document):
     unknown = []
     for line in list_named_commands(document):
-        command, words = find_command(re.split(r"[\s\[\],]+", line)[1:])
+        command, words = find_command(re.sub(r"[\[\],]+", " ", line))
         known = {name for option in command.params for name in (*option.opts, *option.secondary_opts)} | {
             "--help"
         }

@@ -37,7 +37,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
         patch.chdir(folder)
         patch.delenv("PREFECT_API_URL", raising=False)
         for command in COMMANDS:
-            result = CliRunner().invoke(app, shlex.split(command)[1:])
+            words = shlex.split(command)[1:]
+            result = CliRunner().invoke(app, words)
             assert result.exit_code == 0, f"{command}: {result.exception}"
     return folder
 

@@ -6,12 +6,13 @@ from pathlib import Path
 from typing import Any
 
 from catalogs.documents import parse_yaml
-from catalogs.grids.blocks import fields_set_by, list_combinations
+from catalogs.grids.blocks import fields_set_by, list_combinations, names_scenes
 from catalogs.grids.faults import read_form
 from catalogs.grids.form import GridFile
 from catalogs.grids.selection import CALIBRATION, facts_of, split_of
 from catalogs.scenario import UNKNOWN_WEATHER, Scenario, find_range_problems, find_scenario_problems
 from catalogs.sentences import cap_problems, name_some, shorten
+from catalogs.street_names import find_default_split
 from tasks.errors import InputError
 
 __all__ = ["FaultyGrid", "Grid", "GridFile", "build_grid", "expand_grid", "warn_of_late_brakes"]
@@ -95,11 +96,14 @@ def expand_grid(settings: GridFile, place: str) -> Grid:
     scenarios, tags, left_out = [], [], 0
     labels: set[str] = set()
     idle = set(range(len(settings.exclude)))
+    several = names_scenes(settings)
     for combination in list_combinations(settings):
         label = "/".join(level for level, _ in combination)
         merged: dict[str, Any] = dict(base)
         for _, partial in combination:
             merged |= partial
+        if several:
+            merged.setdefault("scene", settings.scene)
         scenario = Scenario(**merged)
         unknown = [name for name, value in merged.items() if value != value or value == UNKNOWN_WEATHER]
         facts = facts_of(scenario)
@@ -109,6 +113,8 @@ def expand_grid(settings: GridFile, place: str) -> Grid:
             left_out += 1
             continue
         split = split_of(facts, settings.splits)
+        if not settings.splits and scenario.scene is not None:
+            split = find_default_split(scenario.scene)
         scenarios.append((label, scenario))
         tags.append((split or "", facts[CALIBRATION]))
         # of what cannot be read in full nobody knows whether it is excluded
@@ -132,8 +138,10 @@ def expand_grid(settings: GridFile, place: str) -> Grid:
         idle=tuple(sorted(idle)),
     )
     if problems:
-        told = [f"{shorten(place)}: scenario {name_some(named)}: {rule}" for rule, named in problems.items()]
-        raise FaultyGrid(cap_problems(told), grid)
+        sentences = [
+            f"{shorten(place)}: scenario {name_some(named)}: {rule}" for rule, named in problems.items()
+        ]
+        raise FaultyGrid(cap_problems(sentences), grid)
     return grid
 
 

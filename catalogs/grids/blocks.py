@@ -11,6 +11,7 @@ from catalogs.names import Label, WeatherName
 from catalogs.road_users import RoadUser
 from catalogs.scenario import NUMBERS
 from catalogs.sentences import shorten
+from catalogs.street_names import SceneName, read_scene_levels
 
 Level = tuple[str, dict[str, Any]]
 
@@ -53,9 +54,10 @@ class PartialScenario(Strict):
         exclude_if=lambda users: users is None,
         description="Road users beside the ego vehicle.",
     )
+    scene: SceneName | None = None
 
 
-Levels = Annotated[dict[Label, PartialScenario], Field(min_length=1)]
+Levels = Annotated[dict[Label, PartialScenario], Field(min_length=1), BeforeValidator(read_scene_levels)]
 
 
 def _check_lengths(axes: dict[str, Levels]) -> dict[str, Levels]:
@@ -105,6 +107,17 @@ class Blocks(Strict):
         ),
     ] = None
 
+    @property
+    def has_features(self) -> bool:
+        """Whether a scenario may have a hump or a depression."""
+        levels = [
+            level for axes in (self.axes, self.zip) for rows in axes.values() for level in rows.values()
+        ]
+        drawn = {} if self.latin_hypercube is None else self.latin_hypercube.ranges
+        return "hazard_height_m" in drawn or any(
+            level.hazard_height_m for level in (*levels, *self.scenarios.values())
+        )
+
     @model_validator(mode="after")
     def _something_to_make(self) -> "Blocks":
         if not (self.axes or self.zip or self.scenarios or self.latin_hypercube):
@@ -143,6 +156,17 @@ def list_combinations(blocks: Blocks) -> Iterator[list[Level]]:
         factors.append([[level] for level in _draw_levels(blocks.latin_hypercube)])
     for combination in product(*factors):
         yield [level for part in combination for level in part]
+
+
+def names_scenes(blocks: Blocks) -> bool:
+    """Return whether a level of the blocks names a scene, so that every clip does.
+
+    Parameters
+    ----------
+    blocks : of a grid
+    """
+    axes = [*blocks.axes.values(), *blocks.zip.values(), blocks.scenarios]
+    return any(level.scene is not None for levels in axes for level in levels.values())
 
 
 def _list_levels(axis: Mapping[str, PartialScenario]) -> list[Level]:

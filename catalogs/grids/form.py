@@ -3,7 +3,7 @@
 from math import ceil
 from typing import Annotated, Literal
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from catalogs.entries import load
 from catalogs.grids.blocks import Blocks, PartialScenario, Whole, count_combinations
@@ -11,6 +11,7 @@ from catalogs.grids.blocks import Number as LaxNumber
 from catalogs.grids.selection import Condition
 from catalogs.names import Name
 from catalogs.physical_limits import find_limit_problem
+from catalogs.street_names import SceneName
 from catalogs.variants import Variant
 
 LIMITS = load("table of physical limits")
@@ -20,24 +21,37 @@ MOST_CLIPS = 100_000
 Reference = Annotated[str, Field(min_length=1, max_length=4096)]
 """Name or file of an entry; 4096 characters are the longest path."""
 
-BEFORE = {"composition": "linear", "low_speed": "literal", "duration_s": None, "variant": "full"}
+BEFORE = {
+    "composition": "linear",
+    "low_speed": "literal",
+    "duration_s": None,
+    "variant": "full",
+    "hazard_marking": None,
+    "wet_friction": "paper",
+}
 """Value of a setting that a record lacks, and that an id leaves out, so that older clips keep theirs; for ``low_speed``
-grid files mean another default."""
+and ``wet_friction`` grid files mean another default."""
+
+
+def _read_plain(value: object) -> object:
+    return None if value == "plain" else value
 
 
 class GridFile(Blocks):
     """A grid as written in YAML."""
 
     name: Name = Field(description="Name of the dataset.")
-    scene: Reference = Field(
+    scene: SceneName = Field(
         default="street",
-        description="Built-in street (hill climbs by 8 % from station 40 m on), or folder of a scene of your own.",
+        description="Built-in street (hill climbs by 8 % from station 40 m on), {street: {kind: town, seed: 7}}, or"
+        " folder of a scene of your own. A level may name another: the clips of a grid drive in many scenes.",
     )
     vehicle: Reference = Field(default="paper-reference", description="Vehicle: name, or file of your own.")
     surface: Reference = Field(default="dense-asphalt", description="Pavement: name, or file of your own.")
     camera: Reference = Field(default="dashcam-480x320", description="Camera: name, or file of your own.")
-    hazard_marking: Reference | None = Field(
-        default=None, description="Paint on raised road features; without an entry they are left bare."
+    hazard_marking: Annotated[Reference | None, BeforeValidator(_read_plain)] = Field(
+        default="zebra-yellow-black",
+        description="Finish of road features: marking of humps, patch of depressions, joints; plain leaves them bare.",
     )
     vehicle_mode: Literal["paper", "coupled"] = Field(
         default="paper",
@@ -64,6 +78,12 @@ class GridFile(Blocks):
     low_speed: Literal["steady", "literal"] = Field(
         default="steady",
         description="End of a stop in paper mode: steady rests on no one sample; literal is Appendix B word by word.",
+    )
+    wet_friction: Literal["by-speed", "paper"] = Field(
+        default="by-speed",
+        exclude_if=lambda law: law == "paper",
+        description="Friction of wet roads in coupled mode: by-speed knows film and speed, paper the film alone"
+        " (Eq. 5). Paper mode takes the paper's.",
     )
     variant: Variant = Field(
         default="full",
@@ -153,6 +173,16 @@ class GridFile(Blocks):
     def keeps_stops_steady(self) -> bool:
         """Whether the numbers of ``catalogs/low_speed.yaml`` reach the motion; coupled mode has no such rule."""
         return self.vehicle_mode == "paper" and self.low_speed == "steady"
+
+    @property
+    def marked_features(self) -> bool:
+        """Whether clips may show a road feature with a finish."""
+        return self.hazard_marking is not None and bool(self.has_features or self.base.hazard_height_m)
+
+    @property
+    def grips_by_speed(self) -> bool:
+        """Whether the numbers of ``catalogs/wet_friction.yaml`` reach the motion; paper mode keeps the paper's law."""
+        return self.vehicle_mode == "coupled" and self.wet_friction == "by-speed"
 
     @model_validator(mode="after")
     def _clips_are_few_enough(self) -> "GridFile":

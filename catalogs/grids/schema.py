@@ -14,7 +14,7 @@ def grid_schema() -> dict[str, Any]:
     schema = GridFile.model_json_schema()
     schema |= {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "muSync grid"}
     fields, ranges = schema["$defs"]["PartialScenario"]["properties"], list_ranges()
-    for name in SCENARIO_FIELDS:
+    for name in (*SCENARIO_FIELDS, "scene"):
         channel = CHANNELS_BY_NAME[name]
         unit = f" [{channel.unit}]" if channel.unit else ""
         bounds = zip(("minimum", "maximum"), ranges.get(name, (None, None)), strict=True)

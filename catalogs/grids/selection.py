@@ -42,7 +42,7 @@ class Condition(RootModel[dict[str, Value | Annotated[list[Value], Field(min_len
 
     @model_validator(mode="after")
     def _names_are_known(self) -> "Condition":
-        known = (*SCENARIO_FIELDS, CALIBRATION)
+        known = (*SCENARIO_FIELDS, "scene", CALIBRATION)
         problems = [
             f"{name}: no such field; there are {', '.join(known)}" for name in self.root if name not in known
         ]
@@ -73,7 +73,10 @@ class Condition(RootModel[dict[str, Value | Annotated[list[Value], Field(min_len
 
 def facts_of(scenario: Scenario) -> dict[str, Any]:
     """Return the facts that conditions test: the scenario's fields and its place in the calibrated range."""
-    return scenario.as_row() | {CALIBRATION: calibration_tag(scenario, load("calibrated range"))}
+    return scenario.as_row() | {
+        "scene": scenario.scene,
+        CALIBRATION: calibration_tag(scenario, load("calibrated range")),
+    }
 
 
 def split_of(facts: Mapping[str, Any], splits: Mapping[str, Condition]) -> str | None:

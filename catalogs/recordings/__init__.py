@@ -103,7 +103,9 @@ def read_signals(path: Path, channel_map: ChannelMap) -> dict[str, Signal]:
         for one in apply_checks(load_campaign_checks().clock, Clock(time=signal.time))
     }
     if restarts:
-        raise InputError([f"{path.name}: the clock of {name} {told}" for told, name in restarts.items()])
+        raise InputError(
+            [f"{path.name}: the clock of {name} {sentence}" for sentence, name in restarts.items()]
+        )
     return {name: _replace_values(signal, channel_map.meanings_of(name)) for name, signal in signals.items()}
 
 

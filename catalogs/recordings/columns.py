@@ -68,11 +68,11 @@ def convert_values(column: pd.Series, spelling: Spelling) -> tuple[NDArray[np.fl
     plain = plain if spelling.decimal == "." else plain.str.replace(spelling.decimal, ".")
     values = np.array(pd.to_numeric(plain, errors="coerce"), dtype=np.float64)
     low = text.str.lower()
-    told = low.isin(NO_VALUE).to_numpy()
+    known = low.isin(NO_VALUE).to_numpy()
     for word, number in spelling.meanings.items():
         same = (text == word).to_numpy()
-        values[same], told = np.nan if number is None else number, told | same
-    wrong = np.isnan(values) & ~told
+        values[same], known = np.nan if number is None else number, known | same
+    wrong = np.isnan(values) & ~known
     if not wrong.any():
         return values, ""
     numbers = values[~np.isnan(values)]
@@ -162,16 +162,16 @@ def read_clock(place: str, clock: TimeEntry, column: pd.Series, spelling: Spelli
         return _count_from_midnight(column)
     text = _strip_text(column)
     text = text.mask(text.str.lower().isin(NO_VALUE), "")
-    told = text[text != ""]
-    if told.str.fullmatch(_TIME).all():
+    given = text[text != ""]
+    if given.str.fullmatch(_TIME).all():
         return _read_times_of_day(text)
     try:
-        if told.str.contains(_DATE).all():
+        if given.str.contains(_DATE).all():
             return _count_from_midnight(_parse_dates(text.mask(text == "")))
     except (ValueError, OverflowError):
         pass
-    odd = told[~(told.str.contains(_DATE) | told.str.fullmatch(_TIME))]
-    row = (odd if len(odd) else told).index[0]
+    odd = given[~(given.str.contains(_DATE) | given.str.fullmatch(_TIME))]
+    row = (odd if len(odd) else given).index[0]
     raise InputError(
         f"{place}: signal {clock.source} must be of numbers, dates or times of day; row {row} below the names has"
         f" {shorten_value(text[row])}: write times as a number of seconds, 2026-08-04 13:16:03.05 or 13:16:03.05"

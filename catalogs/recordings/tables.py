@@ -91,8 +91,8 @@ def _read_with(open_table: Open) -> Callable[[Path, ChannelMap], dict[str, Signa
         except InputError as error:
             time, problems = np.full(0, np.nan), [*error.problems, *problems]
         if problems:
-            told = _describe_rows_of_text(table, series, [time, *columns.values()])
-            raise InputError(told or problems)
+            of_text = _describe_rows_of_text(table, series, [time, *columns.values()])
+            raise InputError(of_text or problems)
         first = 1 + len(channel_map.csv.rows_below) * bool(table.csv)
         rows = Clock(time=time, kind="row", where=" below the names", first=first)
         if restarts := apply_checks(load_campaign_checks().clock, rows):

@@ -6,12 +6,37 @@ from pathlib import Path
 
 from catalogs.scenes.folder import read_scene, scene_hash, write_scene
 from catalogs.scenes.street import CHANGES
-from catalogs.scenes.street_cache import cached_street
+from catalogs.scenes.street_cache import BUILT_IN_SEED, cached_street
 from catalogs.sentences import shorten
+from catalogs.street_names import KIND_FILES, KINDS, parse_street_name
 from tasks.errors import InputError
 from tasks.scene.scene import Scene
 
 BUILT_IN = tuple(CHANGES)
+"""Streets that have a name of their own; those of a kind and a seed are named ``KIND-SEED``."""
+
+
+def is_built_in(name: str) -> bool:
+    """Whether a scene is a street that muSync makes by itself: of the catalogue, or of a kind and a seed.
+
+    Parameters
+    ----------
+    name : of the scene
+    """
+    return find_recipe(name) is not None
+
+
+def find_recipe(name: str) -> tuple[tuple[Path, ...], int] | None:
+    """Return what `load_street_layout` and the seed make a street of; None of a scene that muSync does not make.
+
+    Parameters
+    ----------
+    name : of the scene
+    """
+    if name in BUILT_IN:
+        return CHANGES[name], BUILT_IN_SEED
+    street = parse_street_name(name)
+    return None if street is None else ((KIND_FILES[street.kind],), street.seed)
 
 
 def scene_folder(name_or_folder: str | Path) -> Path:
@@ -22,13 +47,14 @@ def scene_folder(name_or_folder: str | Path) -> Path:
     InputError
         If there is no such scene; the sentence lists the built-in ones.
     """
-    if str(name_or_folder) in BUILT_IN:
-        return cached_street(*CHANGES[str(name_or_folder)])
+    if (recipe := find_recipe(str(name_or_folder))) is not None:
+        return cached_street(*recipe[0], seed=recipe[1])
     folder = Path(name_or_folder)
     # unlike Path.is_file this takes a name that no file can have for one that is not there
     if not os.path.isfile(folder / "scene.json"):
         raise InputError(
-            f"scene {shorten(name_or_folder)}: no such scene; give a scene folder or one of: {', '.join(BUILT_IN)}"
+            f"scene {shorten(name_or_folder)}: no such scene; give a scene folder, one of {', '.join(BUILT_IN)}, or a"
+            f" street of a kind and a seed, such as town-7; kinds are {', '.join(KINDS)}"
         )
     return folder
 

@@ -22,7 +22,7 @@ from tasks.scene.scene import LOWEST_SUN_DEG, Scene, find_sun_problems
 
 SCENE_FORMAT = "musync-scene/1"
 GAUSSIAN_ARRAYS = ("means", "quats_wxyz", "scales", "opacities", "sh", "normals", "class_id")
-OPTIONAL_ARRAYS = ("surroundings",)
+OPTIONAL_ARRAYS = ("surroundings", "light")
 BLENDING_RULES = ("antialiased", "display_encoded")
 SCENE_ARRAYS = (*GAUSSIAN_ARRAYS, "station", "T_world_rig", "environment")
 SHAPES: dict[str, tuple[type[np.generic], tuple[int | None, ...]]] = {
@@ -34,6 +34,7 @@ SHAPES: dict[str, tuple[type[np.generic], tuple[int | None, ...]]] = {
     "normals": (np.float32, (None, 3)),
     "class_id": (np.uint8, (None,)),
     "surroundings": (np.float32, (None, 2)),
+    "light": (np.float32, (None, 4)),
     "station": (np.float64, (None,)),
     "T_world_rig": (np.float64, (None, 4, 4)),
     "environment": (np.float32, (None, None, 3)),
@@ -85,6 +86,8 @@ def write_scene(scene: Scene, folder: Path, facts: dict[str, Any]) -> None:
         }
         if scene.sun_direction_deg is not None:
             content["sun_direction_deg"] = list(scene.sun_direction_deg)
+        if scene.daylight is not None:
+            content["daylight"] = list(map(list, scene.daylight))
         (partial / "scene.json").write_text(json.dumps(content | facts, indent=1, sort_keys=True) + "\n")
         if folder.exists():
             folder.rmdir()
@@ -142,6 +145,7 @@ def read_scene(folder: Path) -> Scene:
         carriageway_left=content["carriageway_left"],
         carriageway_right=content["carriageway_right"],
         sun_direction_deg=None if (sun := content.get("sun_direction_deg")) is None else (sun[0], sun[1]),
+        daylight=None if (rows := content.get("daylight")) is None else tuple((r, g, b) for r, g, b in rows),
     )
 
 
@@ -167,8 +171,9 @@ def scene_hash(folder: Path) -> str:
     decisive = {
         key: content[key] for key in ("sha256", *BLENDING_RULES, "carriageway_left", "carriageway_right")
     }
-    if content.get("sun_direction_deg") is not None:
-        decisive["sun_direction_deg"] = content["sun_direction_deg"]
+    decisive |= {
+        key: content[key] for key in ("sun_direction_deg", "daylight") if content.get(key) is not None
+    }
     return hashlib.sha256(json.dumps(decisive, sort_keys=True).encode()).hexdigest()
 
 
@@ -220,6 +225,9 @@ def read_facts(folder: Path) -> dict[str, Any]:
         f"sun_direction_deg, where given, must be azimuth and elevation [deg], the latter {LOWEST_SUN_DEG:g} to 90": (
             _is_sun(content.get("sun_direction_deg"))
         ),
+        "daylight must be three colours of three numbers above 0, beside light.npy and sun_direction_deg": (
+            _is_daylight(content)
+        ),
         f"sha256 must name {', '.join(ARRAY_FILES)}, may name {', '.join(OPTIONAL_FILES)}, and nothing else": (
             isinstance(hashes, dict) and set(ARRAY_FILES) <= set(hashes) <= {*ARRAY_FILES, *OPTIONAL_FILES}
         ),
@@ -240,6 +248,21 @@ def _is_sun(value: Any) -> bool:
     """Whether an entry of scene.json is a sound direction of the sun, or none."""
     pair = isinstance(value, list) and len(value) == 2 and all(map(_is_number, value))
     return value is None or (pair and not find_sun_problems((value[0], value[1])))
+
+
+def _is_daylight(content: dict[str, Any]) -> bool:
+    """Whether scene.json says the light of `Gaussians.light`, or that there is none."""
+    rows, hashes = content.get("daylight"), content.get("sha256")
+    lit = isinstance(hashes, dict) and "light.npy" in hashes
+    if rows is None or not lit:
+        return rows is None and not lit
+    return (
+        isinstance(rows, list)
+        and len(rows) == 3
+        and all(isinstance(row, list) and len(row) == 3 for row in rows)
+        and all(_is_number(value) and value > 0 for row in rows for value in row)
+        and content.get("sun_direction_deg") is not None
+    )
 
 
 def _file_hash(path: Path) -> str | None:

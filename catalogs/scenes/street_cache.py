@@ -26,7 +26,13 @@ WRITTEN = ("scene.json", *ARRAY_FILES, *OPTIONAL_FILES, MARKER)
 """Files of a cached street; nothing else is ever deleted."""
 
 
-def cached_street(*changes: Path, seed: int = 2025) -> Path:
+BUILT_IN_SEED = 2025
+"""Of the streets that have a name of their own."""
+KEPT = 100
+"""Streets that stay on the disk, 60 MB each; of more, those that were used least recently go [1]."""
+
+
+def cached_street(*changes: Path, seed: int = BUILT_IN_SEED) -> Path:
     """The folder of a street with this seed; made on first use, when its code changes, and when it is damaged.
 
     Parameters
@@ -51,6 +57,7 @@ def cached_street(*changes: Path, seed: int = 2025) -> Path:
             f"{folder.parent}: the cache of generated scenes must be a folder that can be written, with room for 60 MB;"
             f" {error.strerror}: set MUSYNC_CACHE to one that is"
         ) from None
+    os.utime(folder)  # its time of use
     return folder
 
 
@@ -71,12 +78,19 @@ def _make_street(folder: Path, seed: int, *changes: Path) -> None:
         own.rename(folder)
     finally:
         _remove_street(own)
+    _forget_oldest(folder.parent)
+
+
+def _forget_oldest(root: Path) -> None:
+    kept = [(path.stat().st_mtime_ns, path) for path in root.iterdir() if STREET.fullmatch(path.name)]
+    for _, path in sorted(kept)[:-KEPT]:
+        _remove_street(path)
 
 
 def _build_street(seed: int, *changes: Path) -> Scene:
     from tasks.scene.street.build import build_street
 
-    return build_street(load_street_layout(STREET_FILE, *changes), seed)
+    return build_street(load_street_layout(STREET_FILE, *changes, seed=seed), seed)
 
 
 def _is_whole(folder: Path) -> bool:

@@ -1,16 +1,13 @@
-"""The paper's ablation: which coupling each variant cuts, and where the variants are compared."""
+"""The paper's ablation: which coupling each variant cuts."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated
 
-import numpy as np
-
 from catalogs.entries import load
 from catalogs.names import WeatherName
 from catalogs.quantities import CatalogueEntry, Scalar, Text, require_quantity
 from catalogs.scenario import Scenario
-from catalogs.studies import Condition, load_conditions
 from catalogs.variants import Variant
 from tasks.studies.sensitivity import StudyProtocol
 from tasks.surface.weather import DRY, find_weather
@@ -31,22 +28,6 @@ class AblationEntry(CatalogueEntry):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ablation:
-    """Where the variants are compared.
-
-    Parameters
-    ----------
-    stops : the braking condition at every rate, dry first, by kind of weather
-    pitch : the condition whose pitch is compared
-    reference_pitch_rmse_deg : printed distance of the full model from its reference [deg]
-    """
-
-    stops: dict[str, tuple[Scenario, ...]]
-    pitch: Condition
-    reference_pitch_rmse_deg: float
-
-
-@dataclass(frozen=True, kw_only=True)
 class FamilyWeather:
     """The one weather that stands for all of a kind in ``fixed-mu``.
 
@@ -58,28 +39,6 @@ class FamilyWeather:
 
     rates_mm_h: Mapping[str, float]
     accumulation_h: float
-
-
-def load_ablation() -> Ablation:
-    """The study of the paper's Section 4.4."""
-    entry: AblationEntry = load("ablation")
-    protocol = load("sensitivity study")[0]
-    conditions = {condition.name: condition for condition in load_conditions()}
-    dry = conditions[entry.stop_condition].scenario
-    stops: dict[str, tuple[Scenario, ...]] = {}
-    for study in protocol.weathers.values():
-        hours = protocol.snow_accumulation_h if find_weather(study.kind).accumulates else 0.0
-        rates = np.linspace(0.0, study.highest_rate, study.nominal_rates)[1:]
-        stops[study.kind] = (
-            dry,
-            *(replace(dry, weather=study.kind, precipitation_mm_h=float(rate), snow_accumulation_h=hours)
-              for rate in rates),
-        )  # fmt: skip
-    return Ablation(
-        stops=stops,
-        pitch=conditions[entry.pitch_condition],
-        reference_pitch_rmse_deg=entry.reference_pitch_rmse.value,
-    )
 
 
 def find_families(entry: AblationEntry, study: StudyProtocol) -> FamilyWeather:

@@ -14,8 +14,8 @@ from tasks.errors import InputError
 from tasks.render.weather.parameters import KindLook, WeatherParameters
 from tasks.surface.weather import WEATHERS
 
-OF_THE_PAVEMENT = ("full_cover_mm", "texture_depth_mm")
-"""Values that datasets made before keep here too, and that are now read from the surface's entry alone."""
+OF_BEFORE = ("full_cover_mm", "texture_depth_mm", "exposure_ev", "cloud_contrast", "cloud_size_m")
+"""Values that datasets made before keep here, and that are not read any more."""
 MOST_STEPS = 100
 """Size classes, or octaves of noise [1]: five times what ships; each one costs time in every frame."""
 WRITTEN: dict[Any, Any] = {
@@ -93,7 +93,7 @@ def _make_schema(form: Any) -> type[CatalogueEntry]:
         return create_model(
             "Look", __base__=CatalogueEntry, value=(value, ...), unit=(Text, ...), source=(Text, ...)
         )
-    passed_over = (*OF_THE_PAVEMENT, *(GRIP_SECTIONS if form is KindLook else ()))
+    passed_over = (*OF_BEFORE, *(GRIP_SECTIONS if form is KindLook else ()))
     fields: dict[str, Any] = dict.fromkeys(passed_over, (Any, None))
     for name, (kind, is_optional) in _list_fields(form).items():
         schema: Any = _make_schema(kind)

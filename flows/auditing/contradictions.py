@@ -14,7 +14,7 @@ from flows.auditing.grid_again import find_grid_contradictions
 from flows.auditing.stored_frames import compare_frame_metadata, compare_sheet
 from flows.auditing.stored_tables import compare_tables
 from flows.making.gathering import table_parts
-from flows.making.identity import identify_clip, identify_run, list_deciding
+from flows.making.identity import identify_clip, identify_run, list_deciding, narrow_deciding
 from flows.making.plan import Plan
 from flows.making.seal import SHEET
 from flows.making.summaries import SUMMARIES, summarise_clips
@@ -65,8 +65,8 @@ def find_contradictions(
         list(_compare_parts(layout, plan, damaged)),
         list(_compare_summaries(layout, manifest, plan, damaged)),
     ]
-    told = {sentence.partition(": ")[0] for kind in found for sentence in kind}
-    known = {*damaged, *told}
+    named = {sentence.partition(": ")[0] for kind in found for sentence in kind}
+    known = {*damaged, *named}
     others: list[str] = []
     for path, lies in chain(
         _compare_json(layout, manifest, plan, known),
@@ -140,9 +140,15 @@ def _list_names(record: type) -> Collection[str]:
 
 
 def _compare_ids(manifest: Manifest, plan: Plan) -> Iterator[str]:
-    deciding = list_deciding(plan.settings, plan.scene, plan.inputs, plan.backend)
+    deciding = list_deciding(plan.settings, plan.scene, plan.inputs, plan.backend, plan.scenes)
+    own = {
+        scene: narrow_deciding(deciding, plan.record_of(scene))
+        for scene in {clip.scenario.scene for clip in plan.clips}
+    }
     for clip in plan.clips:
-        if (wanted := identify_clip(deciding, clip.scenario.as_record(), clip.seed)) != clip.clip_id:
+        if (
+            wanted := identify_clip(own[clip.scenario.scene], clip.scenario.as_record(), clip.seed)
+        ) != clip.clip_id:
             yield (
                 f"manifest.json: the id of clip {clip.label} must be {wanted}, the hash of its inputs, scenario and"
                 f" seed; it is {clip.clip_id}"

@@ -83,7 +83,7 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
             f"{folder}: every tick must have every number; frame {frame} or 0 of clip {planned.label} has none in"
             f" {', '.join(dict.fromkeys(empty))}: musync lab repair makes the table again"
         )
-    catalogue = Catalogue(layout.inputs)
+    catalogue = Catalogue(layout.inputs, named=scenario.scene)
     vehicle, surface, steady = catalogue.vehicle, catalogue.surface, catalogue.steady
     mode = plan.settings.vehicle_mode
     driven = cut_coupling(scenario, variant, catalogue.families)
@@ -94,6 +94,7 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
         kind=driven.weather,
         friction=float(row["surface_friction"]),
         snow_depth_mm=float(row["snow_depth_mm"]),
+        grip=surface_of(driven, surface).grip,
     )
     ride = simulate_scenario(
         vehicle, state, controls_of(driven), hazard, mode=mode, duration_s=plan.duration_s, steady=steady,
@@ -102,9 +103,9 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
     response = compute_surface_response(vehicle, state.kind, state.friction)
     steps = [
         *surface_steps(weather_of(driven), surface, vehicle, row),
-        *force_steps(vehicle, response, hazard, mode, row),
+        *force_steps(vehicle, response, hazard, mode, row, state.grip),
         *pitch_steps(vehicle, response, hazard, row, ride, steady),
-        *picture_steps(vehicle, catalogue.camera, row, first, find_route(plan.scene)),
+        *picture_steps(vehicle, catalogue.camera, row, first, find_route(plan.record_of(scenario.scene))),
     ]  # fmt: skip
     result = {
         "dataset": str(layout.root),

@@ -4,10 +4,11 @@ from collections.abc import Iterator, Mapping
 from itertools import islice, permutations, product
 
 from catalogs.grids import GridFile
-from catalogs.grids.blocks import count_combinations, fields_set_by, list_combinations
+from catalogs.grids.blocks import count_combinations, fields_set_by, list_combinations, names_scenes
 from catalogs.grids.form import MOST_CLIPS
 from catalogs.grids.selection import CALIBRATION, facts_of
 from catalogs.scenario import Scenario
+from catalogs.street_names import find_default_split
 from flows.making.plan import ClipPlan, Plan, derive_seed, name_clip
 from manifests.explain import format_value
 
@@ -53,12 +54,14 @@ def _order_blocks(settings: GridFile) -> Iterator[GridFile]:
 def _compare_clips(settings: GridFile, plan: Plan, is_same_writer: bool) -> list[str]:
     if count_combinations(settings) > MOST_CLIPS:
         return []
-    base = fields_set_by(settings.base)
+    base, several = fields_set_by(settings.base), names_scenes(settings)
     asked: dict[str, Scenario] = {}
     for combination in list_combinations(settings):
         fields = dict(base)
         for _, partial in combination:
             fields |= partial
+        if several:
+            fields.setdefault("scene", settings.scene)
         asked["/".join(level for level, _ in combination)] = Scenario(**fields)
     seeds = range(settings.seed, settings.seed + settings.visual_seeds)
     wanted = {
@@ -91,7 +94,8 @@ def _compare_clip(
     clip: ClipPlan, scenario: Scenario, seed: int, settings: GridFile, is_same_writer: bool
 ) -> Iterator[str]:
     facts = facts_of(scenario)
-    splits = {name for name, condition in settings.splits.items() if condition.holds(facts)} or {""}
+    default = "" if scenario.scene is None else find_default_split(scenario.scene)
+    splits = {name for name, condition in settings.splits.items() if condition.holds(facts)} or {default}
     asked: Mapping[str, object] = {
         **scenario.as_record(),
         "seed": derive_seed(seed, scenario.as_row()),

@@ -130,19 +130,6 @@ COMMANDS = (
         output="sentences",
     ),
     Command(
-        name="lab lineage",
-        group=GROUP,
-        sentence="List the catalogue lines, works and measured runs that the numbers of a clip rest on, by column.",
-        function="flows.auditing.lineage:trace_lineage",
-        options=(
-            DATASET,
-            define_argument("clip", str, "Label or id of a clip."),
-            define_option("out", str | None, "Folder for lineage.json, lineage.csv and lineage.txt.", None),
-        ),
-        passed=require_key("follows"),
-        output="sentences",
-    ),
-    Command(
         name="lab replay-audit",
         group=GROUP,
         sentence="Prove that visual seeds change the weather in the picture and nothing in the motion.",

@@ -153,14 +153,14 @@ COMMANDS = (
             define_option(
                 "notify",
                 str | None,
-                "Who is told of runs: a command, an http(s) address, an Apprise address (mailto://, slack://, ...), or"
-                " env:NAME of a variable that holds one.",
+                "Who is notified of runs: a command, an http(s) address, an Apprise address (mailto://, slack://, ...),"
+                " or env:NAME of a variable that holds one.",
                 None,
             ),
             define_option(
                 "notify_on",
                 str,
-                "Runs that are told of, with commas between: failed, late, done.",
+                "Ends of a run of which a notice is sent, with commas between: failed, late, done.",
                 "failed,late",
             ),
             define_option(

@@ -1,6 +1,5 @@
 """Commands that judge pixels."""
 
-from collections import Counter
 from typing import Any
 
 from flows.commands.command import CAMERA, DATASET, OUT, Command, define_argument, define_option, require_key
@@ -13,38 +12,11 @@ def shorten_evaluation(result: dict[str, Any]) -> dict[str, Any]:
     """Return an evaluation's means over all clips and over the paper's, and what lacks; or a single clip's rows."""
     rows = [row for row in result["rows"] if not row["window"]]
     means = [row for row in rows if row["condition"] == "all" or row["condition"].startswith("paper/")]
-    told = [
+    shown = [
         {key: row[key] for key in EVALUATION_COLUMNS} for row in means or rows if row["value"] is not None
     ]
     lacking = {row["metric"]: row["note"] for row in rows if row["condition"] == "-" and row["value"] is None}
-    return result | {"rows": told, "lacking": [f"{metric} ({note})" for metric, note in lacking.items()]}
-
-
-def shorten_controls(result: dict[str, Any]) -> dict[str, Any]:
-    """Return of each negative control which metrics see it, and by how many methods; or why it was not tried."""
-    controls = []
-    for row in result["controls"]:
-        methods = Counter(reading.split(" by ")[0] for reading in row["seen_by"])
-        seen = ", ".join(f"{metric} ({count})" for metric, count in methods.items())
-        controls.append(
-            {"control": row["control"], "seen by metric (methods)": seen or row["reason"] or "none"}
-        )
-    return {key: result[key] for key in ("all_detected", "undetected")} | {"controls": controls}
-
-
-def show_table(result: dict[str, Any]) -> dict[str, Any]:
-    """Return the table of a judged set with a text in each cell, and what is missing."""
-    from flows.judging.video_sets.judge_set import format_cell
-
-    rows = [{key: format_cell(cell) for key, cell in row.items()} for row in result["table"]]
-    empty = {key for key in rows[0] if all(row[key] == "-" for row in rows)}
-    table = [{key: cell for key, cell in row.items() if key not in empty} for row in rows]
-    return {
-        "protocol": result["protocol"],
-        "window": result["window"],
-        "table": table,
-        "missing": result["missing"],
-    }
+    return result | {"rows": shown, "lacking": [f"{metric} ({note})" for metric, note in lacking.items()]}
 
 
 COMMANDS = (
@@ -100,15 +72,6 @@ COMMANDS = (
         brief=shorten_evaluation,
     ),
     Command(
-        name="lab controls",
-        group=GROUP,
-        sentence="Falsify a dataset's claims and motions in fourteen ways, and say which metric detects which fault.",
-        function="flows.judging.controls:run_controls",
-        options=(DATASET, OUT),
-        brief=shorten_controls,
-        passed=require_key("all_detected"),
-    ),
-    Command(
         name="lab judge",
         group=GROUP,
         sentence="Judge the motion of any video against the telemetry claimed for it, from pixels and intrinsics"
@@ -131,40 +94,6 @@ COMMANDS = (
             OUT,
         ),
         passed=require_key("passed"),
-    ),
-    Command(
-        name="lab judge-set",
-        group=GROUP,
-        sentence="Judge the clips of video editors by a protocol: a table of models, the paper's figures beside them.",
-        function="flows.judging.video_sets.judge_set:judge_video_set",
-        options=(
-            define_argument(
-                "folder", str, "Folder of models, sources, claims and targets (docs/evidence/evaluation.md)."
-            ),
-            define_option(
-                "protocol",
-                str,
-                "Protocol: YAML file, or the name of one in catalogs/video_protocols.",
-                "paper",
-                known="catalogs/video_protocols/*.yaml",
-            ),
-            define_option("out", str, "Folder for judge-set.json, judge-set.md and motion.svg."),
-            define_option(
-                "learned",
-                str | None,
-                "YAML file of local checkpoints of learned judges (CLIP, DOVER, FAST-VQA, LPIPS).",
-                None,
-            ),
-            define_option(
-                "window",
-                int | None,
-                "Smoothing of the table's motion figures [frames]: 0, 5, 7 or 9; by default the protocol's.",
-                None,
-                minimum=0,
-                maximum=9,
-            ),
-        ),
-        brief=show_table,
     ),
     Command(
         name="lab retention",

@@ -1,5 +1,7 @@
 """Commands that read measured data, calibrate vehicles and find the effects that the model lacks."""
 
+from typing import Any
+
 from flows.commands.command import (
     CAMPAIGN,
     CAMPAIGN_VEHICLE,
@@ -11,17 +13,91 @@ from flows.commands.command import (
     define_option,
     select_keys,
 )
-from flows.commands.measured_results import (
-    shorten_agreement,
-    shorten_brake_protocol,
-    shorten_bump_study,
-    shorten_import,
-    shorten_stop_study,
-    shorten_verdict,
-)
-from flows.commands.studies import MODE
 
 GROUP = "Measured data"
+MODE = define_option(
+    "mode",
+    str | None,
+    "Vehicle model: paper or coupled; by default the one that a frozen vehicle was fitted in, else paper.",
+    None,
+    known=("paper", "coupled"),
+)
+
+
+def shorten_import(result: dict[str, Any]) -> dict[str, Any]:
+    """Return the report of an import, or a narrow table of signals for each recording."""
+    if "signals" not in result:
+        assumed = result["assumed_tolerances_1sigma"]
+        listed_tolerances = ", ".join(f"{name} {sigma:g}" for name, sigma in assumed.items())
+        runs = [run | {"start_s": _write_time(run["start_s"])} for run in result.get("runs", [])]
+        listed = {"runs": runs} if runs else {}
+        return result | listed | {"assumed_tolerances_1sigma": listed_tolerances or "none"}
+    return {
+        file: [_shorten_signal(row, any(row["note"] for row in rows)) for row in rows]
+        for file, rows in result["signals"].items()
+    }
+
+
+def _shorten_signal(row: dict[str, Any], noted: bool) -> dict[str, Any]:
+    start, low = row["start_s"], row["lowest"]
+    return {
+        **{key: row[key] for key in ("signal", "unit", "samples", "rate_hz")},
+        "time_s": None if start is None else f"{_write_time(start)} to {_write_time(row['end_s'])}",
+        "range": None if low is None else f"{low:.6g} to {row['highest']:.6g}",
+        **({"note": row["note"]} if noted else {}),
+    }
+
+
+def _write_time(seconds: float) -> str:
+    """Return a logger's time to the millisecond [s]; one that counts from 1970 has ten digits before the point."""
+    return f"{round(seconds, 3) + 0.0:.3f}".rstrip("0").rstrip(".")  # -0.0004 is 0, and not -0
+
+
+def shorten_agreement(result: dict[str, Any]) -> dict[str, Any]:
+    """Return an agreement with the main columns of each case, and the groups."""
+    hidden = {"window", "note"}
+    cases = [{key: value for key, value in row.items() if key not in hidden} for row in result["cases"]]
+    figures = tuple(result["mean"])
+    groups = [
+        {"split": row["split"], "by": row["by"], "group": row["name"], "cases": row["cases"]}
+        | {name: _write_pair(row["mean"][name], row["maximum"][name]) for name in figures}
+        for row in result["groups"]
+    ]
+    printed = [
+        {"cases of": f"{row['split']}, {row['group']}", "figure": row["figure"],
+         "here": _write_pair(row["mean"], row["maximum"]),
+         "paper": _write_pair(row["paper_mean"], row["paper_maximum"]), "note": row["note"]}
+        for row in result["beside_print"]
+    ]  # fmt: skip
+    return {"cases": cases, "mean / maximum of groups": groups, "beside the paper's against CarSim": printed}
+
+
+def _write_pair(mean: float | None, maximum: float | None) -> str | None:
+    """Mean and, where there is one, maximum in one cell, as the paper prints them."""
+    if mean is None:
+        return None
+    return f"{mean:.4g}" if maximum is None else f"{mean:.4g} / {maximum:.4g}"
+
+
+def shorten_verdict(result: dict[str, Any]) -> dict[str, Any]:
+    """Return a verdict with a row for each parameter of a named effect, and for the error of each channel."""
+    effects = [
+        {
+            "name": effect["name"],
+            "class": effect["class"],
+            "parameter": name,
+            **{key: parameter[key] for key in ("value", "ci_low", "ci_high", "unit")},
+        }
+        for effect in result["effects"]
+        for name, parameter in effect["parameters"].items()
+    ]
+    error = [
+        {"channel": channel, **{key: entry[key] for key in ("frozen", "retuned", "after", "unit")}}
+        for channel, entry in result["error"].items()
+    ]
+    kept = {key: result[key] for key in ("verdict", "sentence", "reasons", "vehicle_file", "report")}
+    return kept | {"effects": effects, "error": error}
+
 
 COMMANDS = (
     Command(
@@ -55,80 +131,10 @@ COMMANDS = (
         passed=lambda result: not result.get("faulty"),
     ),
     Command(
-        name="lab brake-protocol",
-        group=GROUP,
-        sentence="Select braking events by the paper's rules and predict each drive from the others (Appendix C.5).",
-        function="flows.measured.protocol:brake_protocol",
-        options=(
-            define_argument("campaign", str, "Campaign folder with brake pressure and pitch."),
-            define_option(
-                "protocol",
-                str,
-                "Protocol: YAML file, or the name of one in catalogs/protocols.",
-                "brake-dive",
-                known="catalogs/protocols/*.yaml",
-            ),
-            CAMPAIGN_VEHICLE,
-            define_option("all_events", bool, "Use every candidate event, whatever rules it breaks.", False),
-            OUT,
-        ),
-        brief=shorten_brake_protocol,
-    ),
-    Command(
-        name="lab stop-study",
-        group=GROUP,
-        sentence="Calibrate on one stop of a car, predict another, and add what the model lacks step by step.",
-        function="flows.measured.stop_study:stop_study",
-        options=(
-            define_argument("campaign", str, "Campaign folder with brake and engine torque."),
-            define_option(
-                "study",
-                str,
-                "Stop study: YAML file, or the name of one in catalogs/stop_studies.",
-                "bmw-m8",
-                known="catalogs/stop_studies/*.yaml",
-            ),
-            CAMPAIGN_VEHICLE,
-            OUT,
-        ),
-        brief=shorten_stop_study,
-    ),
-    Command(
-        name="lab bump-study",
-        group=GROUP,
-        sentence="Find the road features in a recording's pitch rate, and fit the car that drove over them.",
-        function="flows.measured.bump_study:bump_study",
-        options=(
-            define_argument("campaign", str, "Campaign folder with pitch rate and speed."),
-            define_option(
-                "study",
-                str,
-                "Bump study: YAML file, or the name of one in catalogs/bump_studies.",
-                "comma2k19",
-                known="catalogs/bump_studies/*.yaml",
-            ),
-            CAMPAIGN_VEHICLE,
-            OUT,
-        ),
-        brief=shorten_bump_study,
-    ),
-    Command(
-        name="lab synthetic-drives",
-        group=GROUP,
-        sentence="Write drives as a car's bus logs them, with known truth, to try the brake protocol on.",
-        function="flows.measured.bus_drives:synthetic_drives",
-        options=(
-            define_option("out", str, "Folder for one bus log of each drive."),
-            define_option("drives", int, "Number of drives.", 3),
-            define_option("events", int, "Number of brake applications in each drive.", 46),
-            define_option("seed", int, "Seed of the random numbers.", 2020),
-        ),
-    ),
-    Command(
         name="vehicle agreement",
         group=GROUP,
         sentence="Compare the vehicle model with reference traces, as the paper's Appendix A.2 does.",
-        function="flows.studies.vehicle_model:measure_agreement",
+        function="flows.measured.agreement:measure_agreement",
         options=(TRACES, VEHICLE, MODE, OUT),
         brief=shorten_agreement,
     ),
@@ -172,34 +178,6 @@ COMMANDS = (
             CAMPAIGN_VEHICLE,
         ),
         brief=shorten_verdict,
-        one_thread=True,
-    ),
-    Command(
-        name="lab close-loop-benchmark",
-        group=GROUP,
-        sentence="Count how often close-loop is right on campaigns whose truth is known.",
-        function="flows.measured.closing_benchmark:close_loop_benchmark",
-        options=(
-            define_option(
-                "out",
-                str,
-                "Folder for closing-benchmark.json and campaigns.jsonl; a later call continues there.",
-            ),
-            define_option("seeds", int, "Number of campaigns for each known truth.", 10, minimum=0),
-            define_option("first_seed", int, "Of each truth; rules rest on some of 0 to 4.", 0, minimum=0),
-            define_option("nulls", int, "Number of campaigns without any effect.", 100, minimum=0),
-            define_option(
-                "harder",
-                int,
-                "Number of campaigns for each pair of effects, and for each truth driven with few kinds of manoeuvre.",
-                1,
-                minimum=0,
-            ),
-            define_option(
-                "minutes", float, "Begin no campaign after this time [min].", 1e9, shown_default="no limit"
-            ),
-        ),
-        brief=select_keys("false_discoveries", "summary", "power", "cpu_s"),
         one_thread=True,
     ),
 )

@@ -4,16 +4,17 @@ A mask is an uncompressed run-length code, column by column, as COCO counts it. 
 because trainers take 0 for "nothing". A class is no set of objects: where it appears in several places it is still one
 mask (``iscrowd`` 1). Boxes are x, y, width, height in pixels, from the picture's upper left corner.
 
-Parked cars, lamps, signs, bollards, bins and the letter box of the built-in street are objects. Each has a mask and a
-box of its own (``iscrowd`` 0, categories from 101 on), ``instance_id``, ``visibility``, ``truncation`` (null where too
-little of it is seen). ``objects`` has their 3D boxes in the world, each image its ``T_world_camera``, and ``camera`` is
-that of all images, with its lens and shutter.
+Parked cars, lamps, signs, bollards, bins and the letter box of a street that muSync makes are objects. Each has a mask
+and a box of its own (``iscrowd`` 0, categories from 101 on), ``instance_id``, ``visibility``, ``truncation`` (null
+where too little of it is seen). ``objects`` has their 3D boxes in the world, each image its ``T_world_camera``, and
+``camera`` is that of all images, with its lens and shutter. Images and objects name the scene where there are several.
 
 Format: https://cocodataset.org/#format-data
 """
 
 import json
 from collections.abc import Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -44,12 +45,17 @@ def write_coco(dataset: ExportedDataset, folder: Path) -> None:
     (folder / "images").mkdir()
     images: list[dict[str, Any]] = []
     count = 0
-    scene = find_scene_objects(dataset)
+    objects: dict[str | None, tuple[StreetObject, ...]] = {}
+    find_scene = lru_cache(maxsize=1)(
+        lambda name: find_scene_objects(dataset.plan.record_of(name), dataset.camera)
+    )
     with (folder / "annotations.json").open("w") as stream:
         stream.write('{"annotations": ')
         with open_array(stream) as annotations:
             for clip in dataset:
-                classes, poses = clip.read_array("class"), clip.T_world_camera
+                classes, poses, named = clip.read_array("class"), clip.T_world_camera, clip.scenario.scene
+                if (scene := find_scene(named)) is not None:
+                    objects[named] = scene.objects
                 depth = clip.read_array("depth") if scene else None
                 for frame, picture in enumerate(clip.read_array("rgb")):
                     name = f"{clip.name}_{frame:06d}.png"
@@ -57,6 +63,7 @@ def write_coco(dataset: ExportedDataset, folder: Path) -> None:
                     images.append(
                         _describe_image(len(images) + 1, name, clip.label, frame, picture)
                         | {"T_world_camera": poses[frame].tolist()}
+                        | ({} if named is None else {"scene": named})
                     )
                     masks = [
                         describe_mask(classes[frame] == kind, kind)
@@ -69,18 +76,24 @@ def write_coco(dataset: ExportedDataset, folder: Path) -> None:
                         count += 1
                         annotations.append({"id": count, "image_id": len(images)} | mask)
         categories = [{"id": kind + 1, "name": kind.name.lower()} for kind in SemanticClass]
-        if scene is not None:
+        if objects:
             categories += [
                 {"id": FIRST_KIND + 1 + place, "name": kind, "supercategory": "object"}
                 for place, kind in enumerate(KINDS)
             ]
-        rest = {
+        rest: dict[str, Any] = {
             "camera": describe_camera(dataset.camera),
             "images": images,
             "categories": categories,
             "info": {"description": f"muSync {dataset.name}", "version": dataset.manifest["run_id"]},
             "licenses": [],
-        } | ({} if scene is None else {"objects": [describe_object(thing) for thing in scene.objects]})
+        }
+        if objects:
+            rest["objects"] = [
+                describe_object(thing) | ({} if named is None else {"scene": named})
+                for named, things in objects.items()
+                for thing in things
+            ]
         stream.write(f", {json.dumps(rest, allow_nan=False)[1:]}")
 
 

@@ -21,6 +21,7 @@ from flows.exporting.dataset import ExportedDataset
 from flows.store.layout import write_json
 from flows.store.telemetry import copy_table
 from manifests.canonical import sha256_of_file
+from manifests.manifest import describe_scenes
 from tasks.conventions import CHANNELS_BY_NAME
 
 CONFORMS_TO = "http://mlcommons.org/croissant/1.0"
@@ -70,8 +71,8 @@ def _describe_dataset(dataset: ExportedDataset) -> dict[str, Any]:
         "@context": CONTEXT,
         "@type": "sc:Dataset",
         "name": dataset.name,
-        "description": f"Telemetry of {len(dataset)} simulated drives on {facts.scene} with {facts.vehicle},"
-        f" in step with rendered video; made by muSync. {warn_of_variant(facts.variant)}".rstrip(),
+        "description": f"Telemetry of {len(dataset)} simulated drives on {describe_scenes(dataset.manifest)} with"
+        f" {facts.vehicle}, in step with rendered video; made by muSync. {warn_of_variant(facts.variant)}".rstrip(),
         "conformsTo": CONFORMS_TO,
         "identifier": dataset.manifest["run_id"],
         "version": "1.0.0",

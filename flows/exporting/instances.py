@@ -1,16 +1,15 @@
 """Objects of the built-in street in a dataset's frames: found from depth, class and pose; no dataset stores them."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isnan
 from typing import Any
 
-from catalogs.scenes import load_scene, scene_identity
-from catalogs.scenes.street import load_street_layout
-from flows.exporting.dataset import ExportedDataset
+from catalogs.scenes import find_recipe, load_scene, scene_identity
+from catalogs.scenes.street import STREET_FILE, load_street_layout
+from tasks.render.camera import Camera
 from tasks.render.instances import InstanceFinder
 from tasks.scene.street.objects import StreetObject, list_objects, own_gaussians
-
-STREET = "street"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,23 +26,25 @@ class SceneObjects:
     finder: InstanceFinder
 
 
-def find_scene_objects(dataset: ExportedDataset) -> SceneObjects | None:
-    """Return the objects of the dataset's scene.
+def find_scene_objects(scene: Mapping[str, Any], camera: Camera) -> SceneObjects | None:
+    """Return the objects of a scene.
 
-    None where they are not known, or not to be found in its pictures: of every scene but the built-in street of this
-    version, with a lens that distorts, and with a shutter that takes the rows one after the other.
+    None where they are not known, or not to be found in its pictures: of a scene that is no street of this version of
+    muSync, with a lens that distorts, and with a shutter that takes the rows one after the other.
 
     Parameters
     ----------
-    dataset : with frames
+    scene : ``name`` and ``sha256``, of a plan
+    camera : of the pictures
     """
-    scene, camera = dataset.plan.scene, dataset.camera
-    if scene["name"] != STREET or camera.distortion is not None or camera.line_delay_s or camera.motion_blur:
+    name, recipe = scene["name"], find_recipe(scene["name"])
+    if recipe is None or camera.distortion is not None or camera.line_delay_s or camera.motion_blur:
         return None
-    if scene["sha256"] != scene_identity(STREET):
+    if scene["sha256"] != scene_identity(name):
         return None
-    objects, owners, classes = list_objects(load_street_layout())
-    cloud = load_scene(STREET).gaussians
+    changes, seed = recipe
+    objects, owners, classes = list_objects(load_street_layout(STREET_FILE, *changes, seed=seed), seed)
+    cloud = load_scene(name).gaussians
     return SceneObjects(objects=objects, finder=InstanceFinder(cloud, own_gaussians(cloud, owners, classes)))
 
 

@@ -47,13 +47,13 @@ def write_nerfstudio(dataset: ExportedDataset, folder: Path) -> None:
     InputError
         If the scene is not to be found.
     """
-    catalogue = catalogue_of(dataset.layout.root)
-    roads: dict[tuple[float, float, float], str] = {}
+    roads: dict[tuple[str | None, float, float, float], str] = {}
     (folder / "scenes").mkdir()
     for clip in dataset:
         scenario = clip.scenario
-        road = scenario.hazard_center_m, scenario.hazard_length_m, scenario.hazard_height_m
+        road = scenario.scene, scenario.hazard_center_m, scenario.hazard_length_m, scenario.hazard_height_m
         if road not in roads:
+            catalogue = catalogue_of(dataset.layout.root, scenario.scene)
             roads[road] = f"scenes/road-{len(roads):03d}.ply"
             drawn, _ = edit_scene(
                 catalogue.scene,

@@ -29,6 +29,7 @@ from flows.exporting.json_array import JsonArray, open_array
 from flows.exporting.poses import compute_quaternions
 from flows.store.layout import write_json
 from manifests.canonical import sha256_of
+from manifests.manifest import describe_scenes
 from tasks.errors import InputError
 from tasks.render.camera import PIXEL_CENTRE
 from tasks.render.contact_sheet import encode_png
@@ -217,7 +218,7 @@ def _describe_fixed(dataset: ExportedDataset) -> dict[str, list[dict[str, Any]]]
     log, sensor = make_token("log"), make_token("sensor")
     return {
         "log": [{"token": log, "logfile": dataset.manifest["run_id"], "vehicle": dataset.plan.settings.vehicle,
-                 "date_captured": "", "location": dataset.plan.settings.scene}],
+                 "date_captured": "", "location": describe_scenes(dataset.manifest)}],
         "map": [{"token": make_token("map"), "log_tokens": [log], "category": "semantic_prior",
                  "filename": "maps/none.png"}],
         "sensor": [{"token": sensor, "channel": CHANNEL, "modality": "camera"}],

@@ -21,6 +21,7 @@ from flows.exporting.dataset import ExportedDataset
 from flows.store.layout import write_json
 from flows.store.missing import has_nulls
 from manifests.canonical import sha256_of_file
+from manifests.manifest import describe_scenes
 
 METADATA = "ro-crate-metadata.json"
 VERSION = "https://w3id.org/ro/crate/1.1"
@@ -116,7 +117,8 @@ def _describe_root(dataset: ExportedDataset, names: list[str], tables: list[str]
         "@id": "./",
         "@type": "Dataset",
         "name": f"muSync dataset {dataset.name}",
-        "description": f"{len(dataset)} simulated drives on {facts.scene} with {facts.vehicle}: telemetry and record."
+        "description": f"{len(dataset)} simulated drives on {describe_scenes(dataset.manifest)} with"
+        f" {facts.vehicle}: telemetry and record."
         f" {absent}{warn_of_variant(facts.variant)}".rstrip(),
         "identifier": dataset.manifest["run_id"],
         "datePublished": datetime.now(UTC).date().isoformat(),

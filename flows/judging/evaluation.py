@@ -25,6 +25,7 @@ from flows.store.missing import null_missing
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest, refuse_changed_content, require_frames
 from flows.store.telemetry import write_parquet
+from manifests.manifest import list_scenes
 from tasks.errors import InputError
 from tasks.eval.severity import severity_agreement
 
@@ -83,13 +84,14 @@ def evaluate_dataset(
     manifest, root = read_manifest(layout), layout.root
     require_frames(manifest, layout)
     refuse_changed_content(layout, manifest, manifest["clips"])
-    refuse_changed_scene(manifest["scene"])
+    for scene in list_scenes(manifest):
+        refuse_changed_scene(scene)
     judges = load_judges(learned)
     facts = clip_facts(root)
-    told = trajectory_files(Path(trajectories), [row["clip_id"] for row in facts]) if trajectories else {}
+    outside = trajectory_files(Path(trajectories), [row["clip_id"] for row in facts]) if trajectories else {}
     cases = find_reference_cases(facts, Path(reference)) if reference is not None else None
     view = View(root=root, crf=crf)
-    clips = [run_as_stage(judge_clip)(view, row, told.get(row["clip_id"]), metric=metric) for row in facts]
+    clips = [run_as_stage(judge_clip)(view, row, outside.get(row["clip_id"]), metric=metric) for row in facts]
     standards = [own_telemetry(clips)]
     if cases is not None:
         standards.append(reference_traces(clips, cases))

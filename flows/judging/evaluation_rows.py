@@ -1,14 +1,19 @@
 """Rows of figures, and the clip with which a clip is compared."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
 from catalogs.scenario import SCENARIO_FIELDS
 from flows.judging.judged_clip import JudgedClip, Row
+from tasks.errors import InputError
+from tasks.eval.video_motion import WINDOWS
 from tasks.surface.weather import DRY, WEATHERS
+
+Scored = tuple[float | None, float]
+"""A figure and its floor."""
 
 
 class FigureDetails(TypedDict, total=False):
@@ -69,6 +74,26 @@ def figure_row(
     }
 
 
+def windowed_rows(
+    metric: str, method: str, condition: str, compute: Callable[[int | None], Scored], note: str = ""
+) -> Iterator[Row]:
+    """Return a figure [1] at every width of smoothing, beside what a perfect pose would score.
+
+    Parameters
+    ----------
+    metric, method, condition : as of `figure_row`
+    compute : value and floor at a width [frames]; the value is None where a pose is missing
+    note : why it is missing, or how to read it; what `compute` raises as `InputError` takes its place
+    """
+    for window in WINDOWS:
+        value, floor, said = None, None, note
+        try:
+            value, floor = compute(window)
+        except InputError as fault:
+            said = str(fault)
+        yield figure_row(metric, method, condition, value, "1", note=said, window=window, floor=floor)
+
+
 def read_visual_seed(label: str) -> str:
     """The visual seed in a clip's label; empty in a dataset of one seed."""
     found = re.search(r"(?:^|/)seed-(\d+)$", label)
@@ -87,7 +112,7 @@ def find_control(clip: JudgedClip, clips: list[JudgedClip], *, weather: bool) ->
     free = {"weather", "precipitation_mm_h", "snow_accumulation_h"} if weather else {
         "hazard_center_m", "hazard_length_m", "hazard_height_m"
     }  # fmt: skip
-    held = set(SCENARIO_FIELDS) - free
+    held = {*SCENARIO_FIELDS, "scene"} - free
     seed = read_visual_seed(clip.facts["label"])
     for other in (c for c in clips if read_visual_seed(c.facts["label"]) == seed):
         plain = other.facts["weather"] == DRY if weather else other.facts["hazard_height_m"] == 0

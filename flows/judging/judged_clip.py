@@ -106,7 +106,7 @@ def judge_clip(
         For a trajectory that cannot be read or does not cover the clip.
     """
     cv2.setNumThreads(1)
-    catalogue = catalogue_of(view.root)
+    catalogue = catalogue_of(view.root, facts.get("scene"))
     rgb, depth, kind = view.arrays(facts["index"], "rgb", "depth", "class")
     frames = clip_columns(view.root, "frames", facts)
     times = np.asarray(frames["t_ns"] * 1e-9, np.float64)

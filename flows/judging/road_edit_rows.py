@@ -32,8 +32,8 @@ def road_edit_rows(view: View, clips: list[JudgedClip]) -> list[Row]:
     clips : as their judges saw them
     """
     rows: list[Row] = []
-    catalogue = catalogue_of(view.root)
     for clip in clips:
+        catalogue = catalogue_of(view.root, clip.facts.get("scene"))
         flat = find_control(clip, clips, weather=False)
         if clip.facts["hazard_height_m"] == 0 or flat is None:
             continue

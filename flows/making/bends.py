@@ -14,6 +14,7 @@ from flows.making.driving import simulate_drive, surface_of
 from flows.making.grid_entries import GridEntries
 from tasks.scene.route import Route
 from tasks.scene.route_shape import find_lateral_demand, sample_curvature, sample_grade
+from tasks.surface.road_profile import RoadGrade
 from tasks.surface.weather import find_weather_problem
 
 WARNED_SHARE = 0.5
@@ -87,9 +88,13 @@ def list_tight_bends(grid: Grid, entries: GridEntries) -> Iterator[Bend]:
     entries : of the grid
     """
     settings = grid.settings
-    route = load_scene(settings.scene).route
-    vehicle, surface, steady, grade = entries.vehicle, entries.surface, entries.steady, sample_grade(route)
+    vehicle, surface, steady = entries.vehicle, entries.surface, entries.steady
+    roads: dict[str | None, tuple[Route, RoadGrade]] = {}
     for label, seen in grid.scenarios:
+        if seen.scene not in roads:
+            found = load_scene(seen.scene or settings.scene).route
+            roads[seen.scene] = found, sample_grade(found)
+        route, grade = roads[seen.scene]
         scenario = cut_coupling(seen, settings.variant)
         if find_weather_problem(scenario.weather) is not None or find_scenario_problems(scenario):
             continue

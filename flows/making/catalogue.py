@@ -8,13 +8,14 @@ from typing import Any
 from catalogs.entries import load
 from catalogs.low_speed import LOW_SPEED, LOW_SPEED_CUT
 from catalogs.references import read_reference
-from catalogs.road_grade import ROAD_GRADE
+from catalogs.road_grade import name_grade_file
 from catalogs.road_users import ROAD_USERS
 from catalogs.scenes import load_scene
 from catalogs.studies.ablation import ABLATION, FamilyWeather, find_families
 from catalogs.vehicles import VehicleFile, open_vehicle
 from catalogs.weather.grip import WeatherFolder
 from catalogs.weather.look import load_weather
+from catalogs.wet_friction import WET_FRICTION
 from flows.making.places import find_scene
 from flows.making.plan import read_plan
 from flows.making.traced import Reference
@@ -41,10 +42,11 @@ class Catalogue:
     ----------
     inputs : folder of the kept catalogue files
     scene : name or folder on this machine; empty where none is asked for
+    named : what the clips call their scene in a dataset of several; None where it has one
     """
 
-    def __init__(self, inputs: Path, scene: str = "") -> None:
-        self._inputs, self._scene = inputs, scene
+    def __init__(self, inputs: Path, scene: str = "", named: str | None = None) -> None:
+        self._inputs, self._scene, self._named = inputs, scene, named
 
     @cached_property
     def weather(self) -> WeatherFolder:
@@ -69,7 +71,9 @@ class Catalogue:
     @cached_property
     def surface(self) -> SurfaceParameters:
         """The pavement."""
-        return load("surface", self._inputs / "surface.yaml", self.weather)
+        pavement: SurfaceParameters = load("surface", self._inputs / "surface.yaml", self.weather)
+        wet = self._load_kept("wet friction", WET_FRICTION)
+        return pavement if wet is None else wet.apply(pavement)
 
     @cached_property
     def camera(self) -> Camera:
@@ -106,8 +110,17 @@ class Catalogue:
 
     @cached_property
     def grade(self) -> RoadGrade:
-        """Grade of the road, which is level where none is kept."""
-        return self._load_kept("grade of the road", ROAD_GRADE) or LEVEL_ROAD
+        """Grade of the scene's road."""
+        return self.grade_of(self._named)
+
+    def grade_of(self, scene: str | None) -> RoadGrade:
+        """Return the grade of the road in a scene, which is level where none is kept.
+
+        Parameters
+        ----------
+        scene : as the scenario of a clip calls it
+        """
+        return self._load_kept("grade of the road", name_grade_file(scene)) or LEVEL_ROAD
 
     @cached_property
     def road_user_sizes(self) -> dict[str, tuple[float, ...]]:
@@ -133,6 +146,12 @@ class Catalogue:
 
 
 @lru_cache(maxsize=2)
-def catalogue_of(root: Path) -> Catalogue:
-    """Return a dataset's frozen inputs and its scene."""
-    return Catalogue(Layout(root).inputs, find_scene(read_plan(root).scene))
+def catalogue_of(root: Path, scene: str | None = None) -> Catalogue:
+    """Return a dataset's frozen inputs, and a scene of it.
+
+    Parameters
+    ----------
+    root : of the dataset
+    scene : as the scenario of a clip calls it; None is the dataset's one, or the first of several
+    """
+    return Catalogue(Layout(root).inputs, find_scene(read_plan(root).record_of(scene)), scene)

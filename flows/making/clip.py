@@ -63,7 +63,7 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
     ----------
     layout : of the dataset
     index : of the clip [1]
-    scene : folder of the dataset's scene on this machine
+    scene : name of its scene, or folder on this machine
 
     Returns
     -------
@@ -71,8 +71,7 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
     """
     cost = Cost()
     layout = find_local(layout)
-    plan, catalogue = open_plan(layout, scene)
-    work = ClipWork(clip=plan.clips[index], plan=plan, catalogue=catalogue)
+    work = open_work(layout, index, scene)
 
     surface = map_surface(work)
     cost.end_step("surface")
@@ -88,28 +87,37 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
 
 
 def warm_up(layout: Layout, scene: str) -> None:
-    """Compile and load all that the clips of a dataset need: two frames of each weather, and nothing is written."""
-    plan, catalogue = open_plan(find_local(layout), scene)
+    """Compile and load all that the clips of a dataset need: two frames of each weather, and nothing is written.
+
+    Parameters
+    ----------
+    layout : of the dataset
+    scene : of its first clip, as of `make_clip`
+    """
+    first = open_work(find_local(layout), 0, scene)
+    plan = first.plan
     short = replace(plan, settings=plan.settings.model_copy(update={"frames": 2, "duration_s": None}))
-    for clip in {clip.scenario.weather: clip for clip in reversed(plan.clips)}.values():
-        work = ClipWork(clip=clip, plan=short, catalogue=catalogue)
+    shown = [clip for clip in plan.clips if clip.scenario.scene == first.clip.scenario.scene]
+    for clip in {clip.scenario.weather: clip for clip in reversed(shown)}.values():
+        work = replace(first, clip=clip, plan=short)
         surface = map_surface(work)
         frames, buffers = draw_frames(work, surface, _move_car(work))
         check_motion(work, surface, frames, buffers)
 
 
-def open_plan(layout: Layout, scene: str) -> tuple[Plan, Catalogue]:
-    """Read a dataset's frozen plan and catalogue entries, both kept for the next clip.
+def open_work(layout: Layout, index: int, scene: str) -> ClipWork:
+    """Read a dataset's frozen plan and the catalogue entries of a clip, both kept for the next clip.
 
     Parameters
     ----------
     layout : of the dataset, on this machine
-    scene : folder of its scene on this machine
+    index, scene : as of `make_clip`
     """
     cv2.setNumThreads(1)  # one thread a clip: more within a frame cost more than they give
     plan = read_plan(layout.root)
-    remember_place(plan.scene["sha256"], scene)
-    return plan, catalogue_of(layout.root)
+    clip = plan.clips[index]
+    remember_place(plan.record_of(clip.scenario.scene)["sha256"], scene)
+    return ClipWork(clip=clip, plan=plan, catalogue=catalogue_of(layout.root, clip.scenario.scene))
 
 
 def map_surface(work: ClipWork) -> SurfaceState:

@@ -38,7 +38,7 @@ from manifests.records import FrozenRun
 from tasks.errors import InputError
 
 SHOWN_DIFFERENCES = 8
-RULES = ("low_speed", "duration_s")
+RULES = ("low_speed", "duration_s", "hazard_marking", "wet_friction")
 """Settings that grids gained after runs of them were frozen."""
 
 
@@ -133,6 +133,7 @@ def frozen_run(grid: Grid) -> dict[str, Any]:
         "parameters": _read_parameters(plan, inputs),
         "clips": [clip | {"ticks": ticks[clip["label"]]} for clip in _list_records(plan)],
         "scene": dict(plan.scene),
+        **({"scenes": [dict(scene) for scene in plan.scenes]} if plan.scenes else {}),
         "made_with": {key: dict(value) for key, value in plan.made_with.items()},
         "processor": describe_processor(),
     })  # fmt: skip
@@ -239,7 +240,8 @@ def ticks_of(plan: Plan, asked: GridFile) -> dict[str, str]:
     plan : the clips
     asked : settings with the vehicle and the surface as they were asked for; the plan may record their names alone
     """
-    entries, grade = read_entries(asked), grade_of(asked.scene)
+    entries = read_entries(asked)
+    grades = {named: grade_of(named or asked.scene) for named in {clip.scenario.scene for clip in plan.clips}}
     rides = (
         simulate_drive(
             cut_coupling(clip.scenario, plan.settings.variant),
@@ -248,7 +250,7 @@ def ticks_of(plan: Plan, asked: GridFile) -> dict[str, str]:
             plan.settings.vehicle_mode,
             plan.duration_s,
             entries.steady,
-            grade,
+            grades[clip.scenario.scene],
         )[1]
         for clip in plan.clips
     )

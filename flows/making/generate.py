@@ -244,7 +244,7 @@ def open_workers(
     layout, plan : of the dataset
     runner, workers, scheduler : as of `generate_dataset`
     """
-    warm = partial(warm_up, layout, find_scene(plan.scene))
+    warm = partial(warm_up, layout, find_scene(plan.record_of(plan.clips[0].scenario.scene)))
     chosen = choose_runner(runner, plan.settings.pictures, scheduler)
     if chosen != "threads":
         load_scene.cache_clear()  # planning read its route; the workers read it again, and this process does not
@@ -253,11 +253,13 @@ def open_workers(
 
 
 def fan_out(layout: Layout, plan: Plan, indices: list[int], executor: Executor) -> RunCost:
-    """Make the clips on the runner; returns what they cost."""
+    """Make the clips on the runner, those of one scene one after the other; returns what they cost."""
     cost, committed = RunCost(), 0
     failures: dict[str, BaseException] = {}
-    scene = find_scene(plan.scene)
-    jobs = ((layout, index, scene) for index in indices)
+    named = {index: plan.clips[index].scenario.scene for index in indices}
+    places = {scene: find_scene(plan.record_of(scene)) for scene in set(named.values())}
+    # a worker then loads each scene once
+    jobs = ((layout, index, places[named[index]]) for index in sorted(indices, key=lambda k: named[k] or ""))
     with progress_bar("clips", len(indices)) as advance:
         for (_, index, _), future in run_unordered(executor, make_clip, jobs):
             label, error = plan.clips[index].label, future.exception()
@@ -265,8 +267,8 @@ def fan_out(layout: Layout, plan: Plan, indices: list[int], executor: Executor) 
                 receipt = future.result()
                 cost, committed = cost.with_clip(receipt["cost"]), committed + 1
                 advance(label, facts=list_step_times(receipt))
-            elif (told := disk_full_sentence(error)) is not None:
-                raise InputError(f"{layout}: {committed} of {len(indices)} clips are committed; {told}")
+            elif (full := disk_full_sentence(error)) is not None:
+                raise InputError(f"{layout}: {committed} of {len(indices)} clips are committed; {full}")
             else:
                 failures[label] = error
                 advance(label, failed=True)

@@ -1,14 +1,16 @@
 """A grid held against its catalogue entries and its scene: what the grid alone cannot tell to be wrong."""
 
 from collections.abc import Set
+from typing import Any
 
 from catalogs.entries import load
 from catalogs.grids import Grid
 from catalogs.physical_limits import find_limit_problem
-from catalogs.road_grade import ROAD_GRADE, write_road_grade
+from catalogs.road_grade import name_grade_file, write_road_grade
 from catalogs.scenario import find_range_problems, find_route_problems, find_scenario_problems
 from catalogs.scenes import load_scene, scene_identity
 from catalogs.sentences import cap_problems
+from catalogs.street_names import parse_street_name
 from catalogs.studies.ablation import cut_coupling
 from flows.making.bends import find_bend_problems
 from flows.making.driving import hazard_of, surface_of
@@ -26,9 +28,12 @@ from tasks.surface.weather import WEATHERS, find_weather_problem
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.strut_travel import compute_strut_travel
 
+Scenes = dict[str | None, dict[str, Any]]
+"""Name, hash, and of a drawn street kind and seed, by the name that scenarios call a scene: None is the grid's one."""
 
-def read_grid_inputs(grid: Grid, tick_rate_hz: int) -> tuple[GridEntries, dict[str, str], list[str]]:
-    """Return the catalogue entries and the scene of a grid, and the problems of these and of the grid with them.
+
+def read_grid_inputs(grid: Grid, tick_rate_hz: int) -> tuple[GridEntries, Scenes, list[str]]:
+    """Return the catalogue entries and the scenes of a grid, and the problems of these and of the grid with them.
 
     Parameters
     ----------
@@ -37,23 +42,22 @@ def read_grid_inputs(grid: Grid, tick_rate_hz: int) -> tuple[GridEntries, dict[s
 
     Returns
     -------
-    The entries, with the files that follow from scene and traces; name and hash of the scene; one sentence for each
-    problem.
+    The entries, with the files that follow from scenes and traces; the scenes; one sentence for each problem.
     """
     scenarios = [scenario for _, scenario in grid.scenarios]
     driven = [cut_coupling(scenario, grid.settings.variant) for scenario in scenarios]
     weathers = {scenario.weather for scenario in (*scenarios, *driven)}
     entries = read_entries(grid.settings, weathers)
-    scene, problems = _identify_scene(grid.settings.scene)
+    scenes, problems = _identify_scenes(grid)
     problems = entries.problems + problems
     if not problems:
         problems += _find_weather_problems(entries.vehicle, weathers)
         problems += _find_buried_cameras(grid, entries)
     sound = not problems
-    if scene:
-        problems += _find_route_problems(grid)
-        if grid.poses is None and not (grade := grade_of(grid.settings.scene)).is_level:
-            entries.contents[ROAD_GRADE] = write_road_grade(grade, scene["name"])
+    if scenes:
+        problems += _find_route_problems(grid, scenes)
+        if grid.poses is None:
+            entries.contents.update(_list_grades(grid, scenes))
     if sound:
         problems += cap_problems(_find_feature_problems(grid, entries.vehicle))
         problems += cap_problems(find_road_user_problems(grid, entries))
@@ -75,17 +79,52 @@ def read_grid_inputs(grid: Grid, tick_rate_hz: int) -> tuple[GridEntries, dict[s
         )
     if "camera.yaml" in entries.values:
         problems += _find_camera_problems(grid, entries, tick_rate_hz)
-    return entries, scene, problems
+    return entries, scenes, problems
 
 
-def _identify_scene(name_or_folder: str) -> tuple[dict[str, str], list[str]]:
-    """Return name and hash of a scene, and its problems."""
-    try:
-        scene = {"name": recorded_reference(name_or_folder), "sha256": scene_identity(name_or_folder)}
-        remember_place(scene["sha256"], name_or_folder)
-    except InputError as error:
-        return {}, list(error.problems)
-    return scene, []
+def _identify_scenes(grid: Grid) -> tuple[Scenes, list[str]]:
+    """Return the scenes of a grid's clips, and their problems; no scene where one has any."""
+    scenes: Scenes = {}
+    problems: list[str] = []
+    for named in dict.fromkeys(scenario.scene for _, scenario in grid.scenarios) or [None]:
+        try:
+            scenes[named] = _identify_scene(grid.settings.scene if named is None else named)
+        except InputError as error:
+            problems += error.problems
+            continue
+        if named is not None and named != scenes[named]["name"]:
+            problems.append(
+                f"scene {named}: a level must name a street or a folder below the working folder, which can be"
+                " recorded: copy it there and name it so"
+            )
+    files = [name_grade_file(name) for name in scenes]
+    problems += [
+        f"scene {name}: must differ from the others in letters, digits or one of . = _ -; another is so named"
+        for name, file in zip(scenes, files, strict=True)
+        if files.count(file) > 1
+    ]
+    return ({} if problems else scenes), problems
+
+
+def _identify_scene(name_or_folder: str) -> dict[str, Any]:
+    """Return name and hash of a scene, and kind and seed of a street that is drawn."""
+    scene: dict[str, Any] = {
+        "name": recorded_reference(name_or_folder),
+        "sha256": scene_identity(name_or_folder),
+    }
+    remember_place(scene["sha256"], name_or_folder)
+    street = parse_street_name(name_or_folder)
+    return scene if street is None else scene | {"kind": street.kind, "seed": street.seed}
+
+
+def _list_grades(grid: Grid, scenes: Scenes) -> dict[str, bytes]:
+    """Return the files with the grade of each scene that is not level."""
+    grades = {named: grade_of(named or grid.settings.scene) for named in scenes}
+    return {
+        name_grade_file(named): write_road_grade(grade, scenes[named]["name"])
+        for named, grade in grades.items()
+        if not grade.is_level
+    }
 
 
 def _find_weather_problems(vehicle: Vehicle, weathers: Set[str]) -> list[str]:
@@ -109,7 +148,7 @@ def _find_buried_cameras(grid: Grid, entries: GridEntries) -> list[str]:
         f"scenario {label}: snow must be less than {deepest_mm:g} mm deep in a picture: its lumps reach the camera"
         f" {height_m:g} m above the road; it is {depth_mm:g} mm: take a shorter snow_accumulation_h or pictures: false"
         for label, scenario in grid.scenarios
-        # a faulty scenario has been told of
+        # a faulty scenario has been reported
         if find_weather_problem(scenario.weather) is None
         and not find_range_problems(scenario)
         and (depth_mm := surface_of(scenario, entries.surface).snow_depth_mm) >= deepest_mm
@@ -136,7 +175,7 @@ def _find_feature_problems(grid: Grid, vehicle: Vehicle) -> list[str]:
     problems: dict[str, str] = {}
     for label, scenario in grid.scenarios:
         if scenario.hazard_height_m == 0 or find_scenario_problems(scenario):
-            continue  # a faulty scenario has been told of
+            continue  # a faulty scenario has been reported
         travel = compute_strut_travel(vehicle, hazard_of(scenario), scenario.initial_speed_km_h / 3.6)
         rule = (
             f"strut travel on the road feature of {scenario.hazard_length_m:g} x {scenario.hazard_height_m:g} m at"
@@ -154,17 +193,18 @@ def grade_of(scene: str) -> RoadGrade:
     return sample_grade(load_scene(scene).route)
 
 
-def _find_route_problems(grid: Grid) -> list[str]:
-    route = load_scene(grid.settings.scene).route
+def _find_route_problems(grid: Grid, scenes: Scenes) -> list[str]:
     problems: dict[str, str] = {}
-    steepest = max(map(abs, sample_grade(route).rise))
-    if problem := find_limit_problem(
-        "grade of the road", steepest, load("table of physical limits").road_grade
-    ):
-        problems["grade"] = (
-            f"scene {grid.settings.scene}: {problem}: its z axis must point up, against gravity"
-        )
-    for label, scenario in grid.scenarios:
-        for problem in find_route_problems(scenario, route.length, grid.settings.scene):
-            problems.setdefault(problem, f"scenario {label}: {problem}")
+    limit = load("table of physical limits").road_grade
+    for named in scenes:
+        scene = named or grid.settings.scene
+        route = load_scene(scene).route
+        steepest = max(map(abs, sample_grade(route).rise))
+        if problem := find_limit_problem("grade of the road", steepest, limit):
+            problems[scene] = f"scene {scene}: {problem}: its z axis must point up, against gravity"
+        for label, scenario in grid.scenarios:
+            for problem in (
+                find_route_problems(scenario, route.length, scene) if scenario.scene == named else ()
+            ):
+                problems.setdefault(problem, f"scenario {label}: {problem}")
     return list(problems.values())

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from typing import Any
 
-from catalogs.road_grade import ROAD_GRADE, write_road_grade
+from catalogs.road_grade import ROAD_GRADE, name_grade_file, write_road_grade
 from catalogs.scenes import scene_identity
 from catalogs.sentences import cap_problems
 from catalogs.vehicles import open_vehicle
@@ -54,15 +54,19 @@ def input_changes(layout: Layout, manifest: Manifest) -> list[dict[str, Any]]:
 
 
 def scene_changes(layout: Layout, manifest: Manifest) -> list[dict[str, Any]]:
-    """The row of `input_changes` on the scene, where the one at hand is another.
+    """The rows of `input_changes` on the scenes, where those at hand are others.
 
     Raises
     ------
     InputError
         The dataset's plan is missing or no JSON, or its scene cannot be found.
     """
-    found = scene_identity(find_scene(read_plan_record(layout)["scene"]))
-    return find_input_differences(manifest, {**manifest, "scene": {"sha256": found}}, {}, {})
+    plan = read_plan_record(layout)
+    here = {
+        name: [scene | {"sha256": scene_identity(find_scene(scene))} for scene in scenes]
+        for name, scenes in (("scene", [plan["scene"]]), ("scenes", plan.get("scenes", [])))
+    }
+    return find_input_differences(manifest, {**manifest, **here, "scene": here["scene"][0]}, {}, {})
 
 
 def recorded_inputs(layout: Layout, manifest: Manifest) -> dict[str, bytes]:
@@ -92,9 +96,10 @@ def _read_candidates(layout: Layout, manifest: Manifest, name: str, at_hand: byt
                     yield open_vehicle(file).content
     if at_hand is not None:
         yield at_hand
-    if name == ROAD_GRADE:
-        with suppress(InputError):
-            yield write_road_grade(grade_of(find_scene(manifest["scene"])), manifest["scene"]["name"])
+    for scene in [manifest["scene"]] if name == ROAD_GRADE else manifest.get("scenes", []):
+        if name in (ROAD_GRADE, name_grade_file(scene["name"])):
+            with suppress(InputError):
+                yield write_road_grade(grade_of(find_scene(scene)), scene["name"])
 
 
 def read_kept(layout: Layout, recorded: Mapping[str, str]) -> dict[str, bytes]:

@@ -121,7 +121,7 @@ def edit_scene(
     )
     carriageway = scene.carriageway_left, scene.carriageway_right
     gaussians = refine_road(scene.gaussians, relief)
-    if marking is not None and hazard.height_m > 0:
+    if marking is not None:
         gaussians = paint_feature(gaussians, relief, marking, *carriageway, asphalt_albedo)
     return extend_kerbs(apply_road_profile(gaussians, relief, *carriageway)[0], relief), relief
 
@@ -129,6 +129,6 @@ def edit_scene(
 def _anchors_of(scenario: Scenario, plan: Plan, catalogue: Catalogue) -> tuple[SurfaceState, ...]:
     """Return the anchors about the clip's rate that the paper's composition blends."""
     look = catalogue.weather_parameters.find_look(scenario.weather)
-    if plan.settings.composition != "paper" or look is None or look.anchors_mm_h is None:
+    if plan.settings.composition != "paper" or look.anchors_mm_h is None:
         return ()
     return adjacent_anchors(weather_of(scenario), look.anchors_mm_h, catalogue.surface)

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from catalogs.scenes import BUILT_IN, scene_identity
+from catalogs.scenes import is_built_in, scene_identity
 from flows.store.layout import read_json, write_json
 from tasks.errors import InputError
 from tasks.kernel_cache import cache_root
@@ -48,7 +48,7 @@ def find_scene(scene: Mapping[str, Any]) -> str:
     InputError
         If no place is known that holds it.
     """
-    if scene["name"] in BUILT_IN:
+    if is_built_in(scene["name"]):
         return str(scene["name"])
     shelves = [Path(folder) for folder in os.environ.get(SHELVES, "").split(os.pathsep) if folder]
     places = [
@@ -83,7 +83,7 @@ def refuse_changed_scene(scene: Mapping[str, Any]) -> None:
         If no place is known that holds it, or it is another one now.
     """
     place = find_scene(scene)
-    if scene["name"] not in BUILT_IN and _identity_at(Path(place)) != scene["sha256"]:
+    if not is_built_in(scene["name"]) and _identity_at(Path(place)) != scene["sha256"]:
         raise InputError(
             f"scene {scene['name']}: must be the recorded one (SHA-256 {scene['sha256'][:12]}...); {place} holds"
             f" another now: put the recorded one back, or set {SHELVES} to the folder in which it lies"

@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from catalogs.scenario import Scenario
 from catalogs.vehicles import open_vehicle
 from flows.making.grid_entries import recorded_settings
 from flows.making.grid_inputs import read_grid_inputs
-from flows.making.identity import identify_clip, identify_run, list_deciding
+from flows.making.identity import identify_clip, identify_run, list_deciding, narrow_deciding
 from flows.making.places import remember_place
 from flows.store.layout import Layout
 from flows.store.sealed import PLAN_FORMAT, read_plan_record, recorded_grid
@@ -73,6 +73,25 @@ class Plan:
     inputs: Mapping[str, str]
     made_with: Mapping[str, Any]
     clips: tuple[ClipPlan, ...]
+    scenes: tuple[Mapping[str, Any], ...] = ()
+
+    def record_of(self, scene: str | None) -> Mapping[str, Any]:
+        """Return name and hash of a scene.
+
+        Parameters
+        ----------
+        scene : as a scenario calls it; None is the dataset's one
+        """
+        return self.scene if scene is None else self._scenes_by_name[scene]
+
+    @property
+    def every_scene(self) -> tuple[Mapping[str, Any], ...]:
+        """Name and hash of each scene that the clips drive in."""
+        return self.scenes or (self.scene,)
+
+    @cached_property
+    def _scenes_by_name(self) -> dict[str, Mapping[str, Any]]:
+        return {scene["name"]: scene for scene in self.scenes}
 
     @property
     def duration_s(self) -> float:
@@ -94,6 +113,7 @@ class Plan:
             "run_id": self.run_id,
             "grid": self.settings.model_dump(mode="json"),
             "scene": dict(self.scene),
+            **({"scenes": [dict(scene) for scene in self.scenes]} if self.scenes else {}),
             "backend": self.backend,
             "inputs": dict(self.inputs),
             "made_with": {key: dict(value) for key, value in self.made_with.items()},
@@ -120,6 +140,7 @@ class Plan:
             run_id=content["run_id"],
             settings=recorded_grid(content["grid"], place),
             scene=content["scene"],
+            scenes=tuple(content.get("scenes", ())),
             backend=content["backend"],
             inputs=content["inputs"],
             made_with=content["made_with"],
@@ -164,12 +185,14 @@ def make_plan(
 def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, bytes]]:
     """`make_plan` of a grid that is already read; ``source`` is what messages call it."""
     settings = grid.settings
-    entries, scene, problems = read_grid_inputs(grid, TICK_RATE_HZ)
+    entries, scenes, problems = read_grid_inputs(grid, TICK_RATE_HZ)
     if problems:
         raise InputError([f"{source}: {problem}" for problem in problems])
     hashes = {name: sha256_of([content]) for name, content in entries.contents.items()}
-    deciding = list_deciding(settings, scene, hashes, backend)
-    clips = tuple(_clip_plans(grid, deciding))
+    several = tuple(scenes.values()) if None not in scenes else ()
+    scene = next(iter(scenes.values()))
+    deciding = list_deciding(settings, scene, hashes, backend, several)
+    clips = tuple(_clip_plans(grid, deciding, scenes))
     repeated = {clip.label for clip in clips} if len({clip.clip_id for clip in clips}) < len(clips) else set()
     if repeated:
         raise InputError(
@@ -187,6 +210,7 @@ def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, 
         run_id=run_id,
         settings=recorded,
         scene=scene,
+        scenes=several,
         backend=backend,
         inputs=hashes,
         made_with=made_with,
@@ -257,8 +281,11 @@ def _with_vehicle(settings: GridFile, vehicle: str) -> GridFile:
     return settings.model_copy(update={"vehicle": vehicle, "vehicle_mode": mode})
 
 
-def _clip_plans(grid: Grid, deciding: Mapping[str, Any]) -> Iterator[ClipPlan]:
+def _clip_plans(
+    grid: Grid, deciding: Mapping[str, Any], scenes: Mapping[str | None, Mapping[str, Any]]
+) -> Iterator[ClipPlan]:
     """The clips of a grid: its scenarios, each under every visual seed."""
+    own = {name: narrow_deciding(deciding, scene) for name, scene in scenes.items()}
     seeds = range(grid.settings.seed, grid.settings.seed + grid.settings.visual_seeds)
     named = [(label, scenario, tags, seed) for (label, scenario), tags in zip(grid.scenarios, grid.tags, strict=True)
              for seed in seeds]  # fmt: skip
@@ -267,7 +294,7 @@ def _clip_plans(grid: Grid, deciding: Mapping[str, Any]) -> Iterator[ClipPlan]:
         seed = derive_seed(grid_seed, row)
         yield ClipPlan(
             index=index,
-            clip_id=identify_clip(deciding, scenario.as_record(), seed),
+            clip_id=identify_clip(own[scenario.scene], scenario.as_record(), seed),
             label=name_clip(label, grid_seed, len(seeds)),
             seed=seed,
             scenario=scenario,

@@ -79,8 +79,9 @@ def replay_audit(
             plan, inputs = freeze_grid(replace(checked, settings=settings), grid, name)
             for file, content in inputs.items():
                 write_atomically(Path(folder) / file, content)
-            catalogue = Catalogue(Path(folder), settings.scene)
             for clip in plan.clips:
+                named = clip.scenario.scene
+                catalogue = Catalogue(Path(folder), named or settings.scene, named)
                 runs.append(_run_clip(clip, plan, catalogue, frames))
                 advance(f"{clip.label} seed {seed}")
     replays, again = runs[: count * seeds], runs[count * seeds :]

@@ -103,7 +103,7 @@ def find_road_user_problems(grid: Grid, entries: GridEntries) -> list[str]:
 
 
 def _find_problems(scenario: Scenario, grid: Grid, entries: GridEntries) -> list[str]:
-    sizes, scene = entries.values[ROAD_USERS], load_scene(grid.settings.scene)
+    sizes, scene = entries.values[ROAD_USERS], load_scene(scenario.scene or grid.settings.scene)
     friction = surface_of(scenario, entries.surface).friction
     time = np.arange(0.0, grid.settings.telemetry_s + CHECK_STEP_S, CHECK_STEP_S)
     time[-1] = grid.settings.telemetry_s

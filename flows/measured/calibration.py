@@ -14,9 +14,9 @@ from catalogs.names import find_name_problem
 from catalogs.references import ReferenceCase, Traces, read_reference, trace_file
 from catalogs.vehicles import open_vehicle
 from catalogs.vehicles.frozen import frozen_text
+from flows.measured.agreement import agreement_of
 from flows.measured.grown_vehicle import tyre_beside
 from flows.store.outputs import Outputs
-from flows.studies.vehicle_model import agreement_of
 from manifests.canonical import sha256_of, sha256_of_file
 from manifests.provenance import code_version
 from tasks.errors import InputError

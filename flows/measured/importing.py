@@ -83,8 +83,8 @@ def import_measurements(
     left_out += unused
     if problems := find_run_problems(planned, recordings, channel_map.sample_rate_hz):
         raise InputError(problems)
-    made, told = leave_out_faulty([(run, _assemble(run, recordings, channel_map)) for run in planned])
-    left_out += told
+    made, faults = leave_out_faulty([(run, _assemble(run, recordings, channel_map)) for run in planned])
+    left_out += faults
     lost += [run.name for run in planned if run.name not in {kept.name for kept, _ in made}]
     computed = dict.fromkeys(found.computed for _, found in made if found.computed)
     if computed:

@@ -35,7 +35,7 @@ def plan_runs(
 ) -> tuple[list[PlannedRun], list[str]]:
     """The runs that a map asks for: as it lists them, one per brake application, or one per file.
 
-    Brake applications that are no runs, and recordings without one, are told beside them, one sentence each.
+    Brake applications that are no runs, and recordings without one, are reported beside them, one sentence each.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def _cut_recordings(
         if not parts:
             left_out.append(
                 f"{shorten(file.relative_to(root))}: no run, for the brake is never applied above"
-                f" {rule.tell_pressure(segment.above_mpa)} for {segment.minimum_s:g} s: cut it by runs in place of"
+                f" {rule.describe_pressure(segment.above_mpa)} for {segment.minimum_s:g} s: cut it by runs in place of"
                 " segment where it is to be used, as a coast-down is"
             )
         for part in parts:
@@ -165,11 +165,11 @@ def _cut_recordings(
                 )
             )
     if not runs:
-        raise InputError([_say_why_none(faulty), *cap_problems(left_out)])
+        raise InputError([_explain_absence(faulty), *cap_problems(left_out)])
     return runs, left_out
 
 
-def _say_why_none(faulty: int) -> str:
+def _explain_absence(faulty: int) -> str:
     """Return why a map's segment makes no run, and what to do, by the number of brake applications that it finds."""
     if not faulty:
         return "the map's segment finds no brake application: lower above_mpa or minimum_s"

@@ -12,6 +12,7 @@ from flows.making.grid_entries import read_entries
 from flows.making.plan import make_plan
 from flows.store.address import open_for_reading, stored_bytes, want_manifest
 from flows.store.sealed import read_manifest, recorded_grid
+from manifests.manifest import describe_scenes
 
 CPU_SECONDS_PER_FRAME, CPU_SECONDS_PER_MEGAPIXEL = 0.1, 0.24
 """Of a finished frame with its pose check, on the built-in street: the demo, and a dry clip at 1280 x 720."""
@@ -36,7 +37,7 @@ def describe_dataset(dataset: str) -> dict[str, Any]:
     return {
         "run_id": manifest["run_id"],
         "grid": settings["name"],
-        "scene": settings["scene"],
+        "scene": describe_scenes(manifest),
         "vehicle": settings["vehicle"],
         "vehicle_mode": settings["vehicle_mode"],
         "variant": variant,

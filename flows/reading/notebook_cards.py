@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from catalogs.sentences import shorten
 from catalogs.variants import warn_of_variant
 from flows.pages.writer import Part, Picture, encode_picture, write_card
+from manifests.manifest import describe_scenes
 from tasks.errors import InputError
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ def dataset_card(data: "Dataset") -> str:
         ("weather", ", ".join(f"{kind} ({count})" for kind, count in counts.items())),
         ("stopping distance", _format_range(stops, len(clips))),
         ("in quarantine", f"{failed} clips, whose pose check failed" if failed else "no clip"),
-        ("scene", grid["scene"]),
+        ("scene", describe_scenes(data.manifest)),
         ("vehicle", f"{grid['vehicle']}, {grid['vehicle_mode']} mode"),
         *([("warning", warning)] if (warning := warn_of_variant(grid.get("variant", "full"))) else []),
         ("run", data.manifest["run_id"]),

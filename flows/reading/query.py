@@ -15,7 +15,7 @@ from flows.reading.connection import connect_views
 from flows.reading.suggestions import suggest_names
 from flows.reading.views import VIEWS
 from flows.store.arrays import EVERY_ARRAY
-from tasks.conventions import VARIANT_CHANNEL, Channel
+from tasks.conventions import SCENE_CHANNEL, VARIANT_CHANNEL, Channel
 from tasks.errors import InputError
 
 MOST_VALUES = 20_000_000
@@ -85,7 +85,7 @@ def query_dataset(
 
 def number_repeats(names: Sequence[str]) -> list[str]:
     """Return names of which no two are the same to SQL, which knows no case: a, A and a become a, A_1 and a_2."""
-    told: list[str] = []
+    names: list[str] = []
     repeats: dict[str, int] = {}
     for name in names:
         unique, known = name, name.casefold()
@@ -93,8 +93,8 @@ def number_repeats(names: Sequence[str]) -> list[str]:
             repeats[known] += 1
             unique = f"{name}_{repeats[known]}"
         repeats[unique.casefold()] = 0
-        told.append(unique)
-    return told
+        names.append(unique)
+    return names
 
 
 def refuse_several(connection: duckdb.DuckDBPyConnection, query: str, *, allow_files: bool) -> None:
@@ -223,7 +223,8 @@ def list_columns(*, grid: bool = False) -> dict[str, Any]:
 
         return grid_schema()
     views = {view: [_describe_channel(channel) for channel in channels] for view, channels in VIEWS.items()}
-    views["clips"].append(_describe_channel(VARIANT_CHANNEL))  # of a dataset in which a coupling is cut
+    # of a dataset in which a coupling is cut, and of one of several scenes
+    views["clips"] += [_describe_channel(VARIANT_CHANNEL), _describe_channel(SCENE_CHANNEL)]
     return views | {
         "arrays": [
             _describe_channel(array.channel)

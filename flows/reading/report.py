@@ -30,6 +30,7 @@ from flows.store.layout import Layout, list_abandoned
 from flows.store.outputs import MARKER, Outputs, read_marker
 from flows.store.sealed import read_manifest, recorded_grid, refuse_changed_clips
 from flows.store.telemetry import read_columns
+from manifests.manifest import describe_scenes, list_scenes
 from manifests.siblings import iterate_pairs
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
@@ -260,8 +261,9 @@ def summarise_run(manifest: Mapping[str, Any]) -> str:
     grid = manifest["grid"]
     warning = warn_of_variant(recorded_grid(grid, "manifest").variant)
     return (
-        f"{len(manifest['clips'])} clips of {grid['frames']} frames on {grid['scene']}, vehicle {grid['vehicle']}"
-        f" in {grid['vehicle_mode']} mode; run {manifest['run_id']}{f'. {warning}' if warning else ''}"
+        f"{len(manifest['clips'])} clips of {grid['frames']} frames on {describe_scenes(manifest)}, vehicle"
+        f" {grid['vehicle']} in {grid['vehicle_mode']} mode; run {manifest['run_id']}"
+        f"{f'. {warning}' if warning else ''}"
     )
 
 
@@ -272,7 +274,8 @@ def _list_manifest_facts(manifest: Mapping[str, Any]) -> dict[str, dict[str, Any
         "Run": {key: manifest[key] for key in ("run_id", "seal", "format", "backend")},
         "Grid": {key: str(value) for key, value in grid.items() if not isinstance(value, dict | list)},
         "Source": {key: made_with["code"][key] for key in ("version", "source_sha256")},
-        "Inputs": {"scene": manifest["scene"]["sha256"]} | manifest["inputs"],
+        "Inputs": {f"scene {one['name']}": one["sha256"] for one in list_scenes(manifest)}
+        | manifest["inputs"],
         "Tools": made_with["libraries"] | manifest["processor"],
         "Files": manifest["artifacts"],
     }

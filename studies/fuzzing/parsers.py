@@ -3,7 +3,6 @@
 from functools import partial
 
 from catalogs.campaigns import read_campaign
-from catalogs.drives import read_drives
 from catalogs.effects import load_effects
 from catalogs.effects.truths import load_sizes, load_truths
 from catalogs.entries import load
@@ -14,7 +13,7 @@ from catalogs.scenes.gaussian_files import read_gaussians
 from catalogs.scenes.route_files import read_route
 from catalogs.scenes.stereo_folder import read_stereo_folder
 from catalogs.scenes.street import load_street_layout
-from flows.judging.claims import read_claim
+from flows.judging.foreign import read_claim
 from flows.judging.foreign_sources import read_camera, read_footage
 from flows.judging.physics_constants import read_constants
 from flows.judging.trajectories import read_trajectory
@@ -47,6 +46,8 @@ from studies.fuzzing.rules import (
     ids_keep_their_form,
     limit_values,
 )
+from studies.measured_drives.drives import read_drives
+from studies.measured_drives.plans import load_plan
 
 NUMBERS_OF_A_GRID = (
     limit_values("precipitation_mm_h", -1, 50_000, 1e308),
@@ -57,6 +58,7 @@ NUMBERS_OF_A_GRID = (
     limit_values("seed", -1, 2**53),
 )
 RECORDED_FILES = r"(clips\|\d+\|)?artifacts\|[^|]+"
+PLANS = "../studies/measured_drives"
 PLANNED = (
     ids_keep_their_form(r"clips\|\d+\|clip_id|run_id"),
     hashes_keep_their_form(r"inputs\|[^|]+|scene\|sha256"),
@@ -86,13 +88,12 @@ PARSERS: tuple[Parser, ...] = (
     parse_entries("gates", "gates.yaml", partial(load, "gate file"), share=2),
     parse_entries("foreign gates", "foreign_gates.yaml", partial(load, "foreign gate file"), share=2),
     parse_entries("hazard marking", "hazard_markings/*.yaml", partial(load, "hazard marking"), share=2),
-    parse_entries("bus", "buses/*.yaml", partial(load, "bus"), share=2),
+    parse_entries("bus", f"{PLANS}/a2d2-like.yaml", partial(load_plan, "bus"), share=2),
     parse_entries("calibration procedure", "calibration/*.yaml", partial(load, "calibration procedure"), share=2),
-    parse_entries("protocol", "protocols/*.yaml", partial(load, "protocol"), share=2),
-    parse_entries("stop study", "stop_studies/*.yaml", partial(load, "stop study"), share=2),
-    parse_entries("bump study", "bump_studies/*.yaml", partial(load, "bump study"), share=2),
+    parse_entries("protocol", f"{PLANS}/brake-dive.yaml", partial(load_plan, "protocol"), share=2),
+    parse_entries("stop study", f"{PLANS}/bmw-m8.yaml", partial(load_plan, "stop study"), share=2),
+    parse_entries("bump study", f"{PLANS}/comma2k19.yaml", partial(load_plan, "bump study"), share=2),
     parse_entries("sensitivity study", "studies/surface-sensitivity.yaml", partial(load, "sensitivity study"), share=1),
-    parse_entries("closing study", "studies/closing.yaml", partial(load, "closing study"), share=2),
     parse_entries("street", "scenes/street.yaml", load_street_layout, share=2),
     parse_entries("effects library", "effects/library.yaml", load_effects, share=0.5),
     parse_entries("truths", "effects/truths.yaml", lambda path: (load_truths(path), load_sizes(path)), share=1),

@@ -4,17 +4,62 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tasks.campaign.campaign import MASKED_SPEED
 from tasks.campaign.channels import BRAKE_SIGNALS
 from tasks.campaign.checks import CheckTable, apply_checks
-from tasks.campaign.events import Episode, find_pressure_episodes
 from tasks.campaign.measured import LoggedSignal
 from tasks.campaign.signals import ChannelRule, Signal, average_sources, convert_to_channel
 from tasks.campaign.slow_channels import take_samples
 
 IDLING = 0.1
 """Share of the range of a brake signal, from its lowest, in which it is for a quarter of a drive if it idles [1]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Episode:
+    """One application of the brake.
+
+    Parameters
+    ----------
+    onset : index of the first active sample
+    onset_time, end_time : times of the first and the last active sample [s]
+    """
+
+    onset: int
+    onset_time: float
+    end_time: float
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last active sample [s]."""
+        return self.end_time - self.onset_time
+
+
+def find_pressure_episodes(
+    time: NDArray[np.float64], pressure: NDArray[np.float64], *, threshold: float, merge_gap: float
+) -> tuple[Episode, ...]:
+    """Return the episodes of samples at or above a threshold, merged over short gaps (paper, Appendix C.5).
+
+    Parameters
+    ----------
+    time : float64 [N] ascending [s]
+    pressure : float64 [N] [MPa]
+    threshold : smallest active pressure [MPa]
+    merge_gap : active samples at most this far apart belong together [s]
+    """
+    active = np.flatnonzero(pressure >= threshold)
+    if not active.size:
+        return ()
+    # the paper's gap is a time difference of samples, with the rounding of binary fractions
+    breaks = np.flatnonzero(np.diff(time[active]) > merge_gap + 1e-9)
+    firsts = active[np.concatenate(([0], breaks + 1))]
+    lasts = active[np.concatenate((breaks, [active.size - 1]))]
+    return tuple(
+        Episode(onset=int(first), onset_time=float(time[first]), end_time=float(time[last]))
+        for first, last in zip(firsts, lasts, strict=True)
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,8 +131,8 @@ def cut_segments(
     lowest, low, highest = np.nanquantile(pressure, (0.0, 0.25, 1.0))
     if lowest >= cut.threshold and low <= lowest + IDLING * (highest - lowest):
         fault = (
-            f"channel {brake.channel} never falls below {brake.tell_pressure(lowest)}: above_mpa must be more than it"
-            f" idles at; it is {brake.tell_pressure(cut.threshold)}"
+            f"channel {brake.channel} never falls below {brake.describe_pressure(lowest)}: above_mpa must be more than"
+            f" it idles at; it is {brake.describe_pressure(cut.threshold)}"
         )
         return [Segment(start=float(applied.time[0]), end=float(applied.time[-1]), fault=fault)]
     episodes = find_pressure_episodes(
@@ -129,8 +174,10 @@ def _judge_segment(
         inside = signal.cut_window(segment.start, segment.end)
         if len(inside.time) < 2:
             return replace(segment, fault=f"channel {channel} has {len(inside.time)} samples in it")
-        if told := apply_checks(table.times, LoggedSignal(channel=channel, logged=inside, converted=inside)):
-            return replace(segment, fault=f"channel {channel} {told[0].sentence}")
+        if violations := apply_checks(
+            table.times, LoggedSignal(channel=channel, logged=inside, converted=inside)
+        ):
+            return replace(segment, fault=f"channel {channel} {violations[0].sentence}")
     return segment
 
 

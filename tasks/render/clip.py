@@ -12,6 +12,7 @@ from tasks.render.camera import Camera, RigAt, world_to_camera
 from tasks.render.composition import compose_over_sky, round_depth
 from tasks.render.display_bytes import encode_picture
 from tasks.render.environment import environment_view
+from tasks.render.grain import add_grain
 from tasks.render.labels import MovedPixels, compute_clip_flow, compute_flow, compute_row_flow, label_frame
 from tasks.render.moving_bodies import BodiesInClip, MovingBody
 from tasks.render.rasterise.backend import Backend
@@ -84,6 +85,7 @@ def render_clip(
         route=scene.route,
         relief=relief,
         to_sun=scene.to_sun,
+        daylight=scene.daylight,
     )
     weathered, weather = weather_scene(clear_scene, conditions, float(camera.K[0, 0]))
     prepared = backend.prepare_gaussians(weathered)
@@ -100,6 +102,8 @@ def render_clip(
             normals=labels or weather.reads_normals,
             bodies=moving.place(frame), shade=moving.shade(frame),
         )  # fmt: skip
+        if scene.gaussians.surroundings is not None:
+            gbuffer = add_grain(gbuffer, pose, field.K)
         sky = environment_view(scene.environment, view, field.K, field.width, field.height)
         shutter = Shutter(
             T_world_camera=pose,

@@ -5,6 +5,9 @@ from numpy.typing import NDArray
 
 from tasks.render.rasterise.gbuffer import GBuffer
 
+LUMINANCE = np.array((0.2126, 0.7152, 0.0722))
+"""Linear sRGB to luminance (IEC 61966-2-1)."""
+
 DEPTH_BITS_DROPPED = 10
 """Number of the 23 explicit mantissa bits that are dropped; 13 stay, a relative error below 6.2e-5."""
 

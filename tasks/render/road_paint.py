@@ -1,4 +1,4 @@
-"""Marking paint on a raised road feature."""
+"""The finish of a road feature: marking paint on a hump, fresh asphalt in a depression, and the joints about either."""
 
 from dataclasses import dataclass, replace
 
@@ -7,23 +7,36 @@ import numpy as np
 from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.render.road_edit import RoadRelief
 from tasks.render.weather.ground_grid import read_between
-from tasks.render.weather.scene_light import ground_light, recolour_gaussians
+from tasks.render.weather.scene_light import ground_light, mean_colours, recolour_gaussians
+from tasks.render.weather.sky import LUMINANCE
 from tasks.scene.gaussians import Gaussians
 
 
 @dataclass(frozen=True, kw_only=True)
 class HazardMarking:
-    """Stripes along the direction of travel, marks and gaps of one width, over the feature's whole length.
+    """Stripes along the direction of travel on a hump, a patch where the road sinks, and a joint before and behind.
 
     Parameters
     ----------
-    stripe_width : of a mark and of a gap [m]
+    stripe_width : of a mark and of a gap on a hump, over its whole length [m]
     paint, gap : reflectance of the marks and of the paint between them, linear red, green, blue [1]
+    patch : reflectance of the asphalt laid where the road sinks; None leaves a depression as the road is [1]
+    patch_margin : of the patch beyond the depression, before and behind [m]
+    joint : reflectance of the sealed joints; None has none [1]
+    joint_width : of a joint, whose middle is the end of the paint or of the patch [m]
     """
 
     stripe_width: float
     paint: tuple[float, float, float]
     gap: tuple[float, float, float]
+    patch: tuple[float, float, float] | None = None
+    patch_margin: float = 0.0
+    joint: tuple[float, float, float] | None = None
+    joint_width: float = 0.0
+
+
+GRAIN = (0.75, 1.3)
+"""Range of the road's own grain that shows through paint and in a patch, by the light on it [1]."""
 
 
 def paint_feature(
@@ -34,31 +47,45 @@ def paint_feature(
     carriageway_right: float,
     asphalt_albedo: float,
 ) -> Gaussians:
-    """Paint a feature's marking on the flat street, in the light that falls on the road there.
+    """Return the flat street with the finish of a feature, in the light that falls on the road there.
 
-    Marks become class marking; the gaps between them keep their class. The middle of a mark lies on the route, so that
-    the layout does not depend on the side to which the carriageway widens.
+    Marks become class marking; all else keeps its class. The middle of a mark lies on the route, so that the layout
+    does not depend on the side to which the carriageway widens. The road's own markings lie on a patch, too.
 
     Parameters
     ----------
     gaussians : the clear street, before the feature lifts it
     relief : the feature
-    marking : its paint
+    marking : its finish
     carriageway_left, carriageway_right : lateral extent of the carriageway, leftward positive [m]
     asphalt_albedo : reflectance of the road, from which the incident light follows [1]
     """
-    road = np.flatnonzero(np.isin(gaussians.class_id, ROAD_CLASSES))
+    sinks = float(relief.elevation(np.array([(relief.near + relief.far) / 2]))[0]) < 0
+    ground = marking.patch if sinks else marking.gap
+    if ground is None:
+        return gaussians
+    margin = marking.patch_margin if sinks else 0.0
+    near, far = relief.near - margin, relief.far + margin
+    seam = 0.0 if marking.joint is None else marking.joint_width / 2
+    covered = (SemanticClass.ROAD,) if sinks else ROAD_CLASSES
+    road = np.flatnonzero(np.isin(gaussians.class_id, covered))
     station, lateral, _ = relief.route.project(gaussians.means[road])
-    on = (station >= relief.near) & (station <= relief.far)
+    on = (station >= near - seam) & (station <= far + seam)
     on &= (lateral <= carriageway_left) & (lateral >= carriageway_right)
     index, across = road[on], lateral[on]
-    mark = np.floor(across / marking.stripe_width + 0.5) % 2 == 0
+    to_end = np.minimum(station[on] - near, far - station[on])
+    mark = (not sinks) & (np.floor(across / marking.stripe_width + 0.5) % 2 == 0) & (to_end >= seam)
+    reflectance = np.where(mark[:, None], marking.paint, ground)
+    if marking.joint is not None:
+        reflectance[to_end < seam] = marking.joint
     light = ground_light(gaussians, SemanticClass.ROAD)
     here = read_between(light.grid, light.illumination, gaussians.means[index, :2])
-    reflectance = np.where(mark[:, None], marking.paint, marking.gap)
+    plain = gaussians.class_id[index] == SemanticClass.ROAD
+    own = mean_colours(gaussians)[index] @ LUMINANCE / (here * float(light.lit @ LUMINANCE))
+    grain = np.where(plain, np.clip(own, *GRAIN), 1.0)
     gain, add = np.ones(len(gaussians)), np.zeros((len(gaussians), 3))
     gain[index] = 0
-    add[index] = reflectance * here[:, None] * light.lit / asphalt_albedo
+    add[index] = reflectance * (grain * here)[:, None] * light.lit / asphalt_albedo
     sh, kind = gaussians.sh.copy(), gaussians.class_id.copy()
     sh[index] = recolour_gaussians(gaussians, gain, add).sh[index]
     kind[index[mark]] = SemanticClass.MARKING

@@ -95,13 +95,13 @@ def take_frame_through_sensor(
     )
     picture = seen.picture
     changes = attribute_pixels(weather, still, gbuffer, wide).ravel()[seen.source] if labelled else None
-    if weather.overcast is not None and weather.overcast.population is not None:
+    if weather.outside is not None and weather.outside.population is not None:
         own = Shutter(
             T_world_camera=wide.T_world_camera, K=camera.K, width=camera.width, height=camera.height,
             velocity=wide.velocity, time_s=wide.time_s, exposure_s=wide.exposure_s, lens=camera.lens,
             line_delay_s=camera.line_delay_s,
         )  # fmt: skip
-        layer = particle_layer(weather, weather.overcast.population, weather.overcast.sky, seen.depth, own)
+        layer = particle_layer(weather, weather.outside.population, weather.outside.sky, seen.depth, own)
         picture = recompose_layers(seen.picture, (layer,))
         if changes is not None:
             changes |= mark_changed_pixels(seen.picture, picture, layer)

@@ -30,6 +30,9 @@ class Gaussians:
     surroundings : float32 [N, 2] overlap of the surface about each Gaussian, and root mean square size of its
         neighbours over its own, see `tasks.scene.surroundings`: the cloud is drawn without the painter's bias
         (`tasks.render.rasterise.painters_bias`) [1]; None: as its trainer drew it, with the bias
+    light : float32 [N, 4] share of `Scene.daylight` that reaches each Gaussian: of the sun, cosine and shadow
+        included, of the sky and of the sunlit surroundings; and share of its colour that mirrors the sky, so that
+        it can be lit anew [1]; None: not known
     antialiased : splats narrower than a pixel fade instead of growing (Yu et al. 2024, Mip-Splatting,
         doi:10.1109/CVPR52733.2024.01839); False: the rule of the INRIA code, for which most files are made
     display_encoded : the colours blend in sRGB display space (scenes trained on pictures) and the
@@ -44,6 +47,7 @@ class Gaussians:
     normals: NDArray[np.float32]
     class_id: NDArray[np.uint8]
     surroundings: NDArray[np.float32] | None = None
+    light: NDArray[np.float32] | None = None
     antialiased: bool = False
     display_encoded: bool = False
 
@@ -58,10 +62,9 @@ def check_gaussians(gaussians: Gaussians, place: str = "scene") -> None:
     shapes = {
         "means": (n, 3), "quats_wxyz": (n, 4), "scales": (n, 3), "opacities": (n,), "normals": (n, 3), "class_id": (n,),
     }  # fmt: skip
-    if gaussians.surroundings is not None:
-        shapes["surroundings"] = (n, 2)
-        if not gaussians.antialiased:
-            problems.append(f"{place}: surroundings are counted for antialiased Gaussians; these are not")
+    shapes |= {k: (n, w) for k, w in (("surroundings", 2), ("light", 4)) if getattr(gaussians, k) is not None}
+    if gaussians.surroundings is not None and not gaussians.antialiased:
+        problems.append(f"{place}: surroundings are counted for antialiased Gaussians; these are not")
     for name, shape in shapes.items():
         if getattr(gaussians, name).shape != shape:
             problems.append(
@@ -98,6 +101,7 @@ def check_gaussians(gaussians: Gaussians, place: str = "scene") -> None:
             ),
             ("opacities", (gaussians.opacities > 0) & (gaussians.opacities <= 1), "in (0, 1]"),
             ("surroundings", _is_surrounded(gaussians), "an overlap of 0 or more and a positive size"),
+            ("light", _is_lit(gaussians), "shares from 0 to 1"),
         ):
             if not ok.all():
                 bad = np.flatnonzero(~ok)
@@ -117,3 +121,9 @@ def _is_surrounded(gaussians: Gaussians) -> NDArray[np.bool_]:
     if gaussians.surroundings is None:
         return np.ones(len(gaussians), dtype=np.bool_)
     return (gaussians.surroundings[:, 0] >= 0) & (gaussians.surroundings[:, 1] > 0)
+
+
+def _is_lit(gaussians: Gaussians) -> NDArray[np.bool_]:
+    if gaussians.light is None:
+        return np.ones(len(gaussians), dtype=np.bool_)
+    return ((gaussians.light >= 0) & (gaussians.light <= 1)).all(axis=1)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.route import Route
@@ -27,6 +27,9 @@ class Scene:
         left positive (y left): ``carriageway_right < 0 < carriageway_left``
     sun_direction_deg : azimuth and elevation of a sun that the panorama does not show; azimuth from world +x, the
         direction of travel where a reconstruction begins, towards +y; None leaves it to the panorama [deg]
+    daylight : colours, linear red, green and blue, of the three parts of the light that `Gaussians.light` counts:
+        irradiance over pi of the sun on a surface that faces it, of the whole sky, radiance of the surroundings [1];
+        None where that light is not known
     """
 
     name: str
@@ -36,6 +39,7 @@ class Scene:
     carriageway_left: float
     carriageway_right: float
     sun_direction_deg: tuple[float, float] | None = None
+    daylight: tuple[tuple[float, float, float], ...] | None = None
 
     @property
     def to_sun(self) -> NDArray[np.float64] | None:
@@ -57,3 +61,17 @@ def find_sun_problems(sun_direction_deg: tuple[float, float] | None) -> list[str
         f"sun: azimuth must be finite and elevation {LOWEST_SUN_DEG:g} to 90 deg;"
         f" they are {sun_direction_deg[0]:g} and {sun_direction_deg[1]:g}"
     ]
+
+
+def mix_daylight(light: NDArray[np.floating], daylight: ArrayLike) -> NDArray[np.float64]:
+    """Return the light on Gaussians: radiance of a white surface in place of each, float64 [N, 3] [1].
+
+    Parameters
+    ----------
+    light : [N, 3 or more] as `Gaussians.light` [1]
+    daylight : [3, 3] as `Scene.daylight` [1]
+    """
+    sun, sky, around = np.asarray(daylight, dtype=np.float64)
+    # three by three by hand: a BLAS rounds as its processor likes
+    a, b, c = np.asarray(light, dtype=np.float64).T[:3, :, None]
+    return a * sun + b * sky + c * around

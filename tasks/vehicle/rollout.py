@@ -102,7 +102,8 @@ def simulate_scenario(
     Parameters
     ----------
     vehicle : the vehicle
-    surface : kind of weather, mu_c, and the depth of the snow for vehicles with the ploughing effect
+    surface : kind of weather, mu_c and how it depends on speed, which paper mode does not know, and the depth of the
+        snow for vehicles with the ploughing effect
     controls : initial speed and brake
     hazard : road feature
     mode : paper follows the publication, coupled is the physical model
@@ -131,7 +132,7 @@ def simulate_scenario(
             simulate(
                 vehicle, response,
                 make_command_input(controls.brake.profile, hold_speed=controls.hold_speed_until_brake),
-                Conditions(hazard=hazard, snow_depth_mm=snow_depth_mm, grade=grade),
+                Conditions(hazard=hazard, snow_depth_mm=snow_depth_mm, grade=grade, grip=surface.grip),
                 Recording(samples=ticks + 1, interval=0.001, substeps=per_tick),
                 initial_speed=controls.initial_speed,
             )

@@ -4,8 +4,9 @@ import sys
 
 import pytest
 
-from benchmarks import pipeline, queries, severity
+from benchmarks import pipeline, queries
 from flows.cli import run_to_end
+from studies import severity
 
 
 @pytest.mark.parametrize(

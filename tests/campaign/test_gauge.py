@@ -8,6 +8,7 @@ from scipy.signal import lfilter
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from catalogs.entries import load
+from studies.closing_benchmark.harder import load_harder
 from tasks.campaign.gauge import denoise_pressure, estimate_gauge_noise
 from tasks.identification.benchmark import make_synthetic_campaign
 from tasks.identification.decision.verdict import judge_runs
@@ -66,6 +67,6 @@ def test_a_gauge_that_cannot_read_below_zero_brakes_no_wheel_at_rest() -> None:
 def test_stops_of_one_kind_and_a_noisy_gauge_are_no_discovery() -> None:
     """Judged with the pressure as read, a form at the brake is found in it."""
     model, surface = load("vehicle", "paper-reference"), load("surface", "dense-asphalt")
-    campaign = make_synthetic_campaign(model, surface, {}, 700_100, design=load("closing study").drives())
+    campaign = make_synthetic_campaign(model, surface, {}, 700_100, design=load_harder().drives())
     lag = tuple(effect for effect in load_effects() if effect.name in {"brake_lag", "pressure_nonlinearity"})
     assert judge_runs(campaign, model, surface, lag, load_decision_rules()).verdict.verdict == "NOTHING"

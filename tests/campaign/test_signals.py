@@ -5,7 +5,7 @@ import pytest
 
 from tasks.campaign.assembly import assemble_run
 from tasks.campaign.channels import UNITS, guess_unit, unit_factor
-from tasks.campaign.events import find_pressure_episodes
+from tasks.campaign.segments import find_pressure_episodes
 from tasks.campaign.signals import (
     ChannelRule,
     Gain,

@@ -68,24 +68,6 @@ Change = Callable[[Any], None]
             "paint: must be red, green and blue; it has 2 values",
         ),
         (
-            "buses/a2d2-like.yaml",
-            partial(load, "bus"),
-            lambda c: c["signals"][1].update(unit="bar"),
-            "signals.1: unit bar is of pressure, m/s of speed",
-        ),
-        (
-            "buses/a2d2-like.yaml",
-            partial(load, "bus"),
-            lambda c: c["signals"][1].update(rate_hz=True),
-            "1.rate_hz: must",
-        ),
-        (
-            "stop_studies/bmw-m8.yaml",
-            partial(load, "stop study"),
-            lambda c: c["rungs"][2]["fixed"]["drag_area"].update(unit="furlong"),
-            "rungs.2.fixed: unit of drag_area must be m2; it is furlong",
-        ),
-        (
             "channel_maps/bmw-m8.yaml",
             partial(load, "channel map"),
             lambda c: c.update(sample_rate_hz=1e300),

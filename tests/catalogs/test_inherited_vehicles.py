@@ -120,7 +120,7 @@ def test_a_line_of_files_has_an_end(write):
     )
 
 
-def test_a_problem_of_the_other_vehicle_is_told_of_its_file(write):
+def test_a_problem_of_the_other_vehicle_wants_notice_its_file(write):
     base = write("base.yaml", "extends: paper-reference\nwheel_radius: {value: -1, unit: m, source: tape}")
     problem = refusal(write("car.yaml", "extends: base.yaml"))
     assert problem.startswith(f"{base}: wheel_radius")

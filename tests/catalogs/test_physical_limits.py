@@ -7,7 +7,7 @@ import pytest
 from catalogs.entries import find_entry, load
 from catalogs.scenario import Scenario, find_scenario_problems
 from catalogs.studies import load_conditions
-from catalogs.studies.ablation import load_ablation
+from studies.paper.ablation import load_ablation
 
 BRAKING = Scenario(peak_pressure_mpa=2.3, brake_onset_s=1.0)
 SNOW = Scenario(weather="snow", precipitation_mm_h=1.0, snow_accumulation_h=1.0)

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from benchmarks.synthetic_street import Clip
 from catalogs.entries import load
+from studies.negative_controls.false_rigs import FALSE_RIGS, show_rig
 from tasks.errors import InputError
 from tasks.eval.body_agreement import BodyClaim, compare_body, pose_body
-from tasks.eval.false_rigs import FALSE_RIGS, show_rig
 from tasks.eval.motion_agreement import PoseVerdict, judge_pose
 from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.poses.pnp import recover_motion_pnp

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.physics_judge.__main__ import draw_braked_clip, judge
-from benchmarks.physics_judge.clips import TYRE, StudyClip, draw_clip, make_clip
-from benchmarks.physics_judge.errors import ERRORS
 from catalogs.entries import load
 from catalogs.scenario import Scenario
+from studies.physics_judge.__main__ import draw_braked_clip, judge
+from studies.physics_judge.clips import TYRE, StudyClip, draw_clip, make_clip
+from studies.physics_judge.errors import ERRORS
 from tasks.eval.physics.audit import audit_clip
 from tasks.eval.physics.constants import DT
 from tasks.eval.physics.tyres import find_curve

@@ -11,9 +11,11 @@ from scipy.stats import binom
 
 from catalogs.effects.truths import load_sizes, load_truths
 from catalogs.entries import load
-from flows.measured import closing_benchmark
-from flows.measured.closing_benchmark_summary import pair_outcome, summarise_benchmark
+from flows.measured.closing_error_rates import JUDGES
 from manifests.provenance import source_hashes
+from studies.closing_benchmark import benchmark as closing_benchmark
+from studies.closing_benchmark.harder import load_harder
+from studies.closing_benchmark.summary import pair_outcome, summarise_benchmark
 from tasks.campaign.planned_runs import TRAINING
 from tasks.identification.benchmark import (
     classify_outcome,
@@ -160,7 +162,7 @@ def test_a_form_counts_by_its_port_and_variable_and_a_set_by_the_truth_in_it(
 
 def test_every_truth_is_in_two_pairs_and_no_pair_comes_twice() -> None:
     library = tuple(truth for truth in load_truths() if truth.in_library)
-    pairs = [frozenset(truth.name for truth in pair) for pair in load("closing study").pairs(library)]
+    pairs = [frozenset(truth.name for truth in pair) for pair in load_harder().pairs(library)]
     assert len(set(pairs)) == len(pairs) == len(library)
     assert {name: sum(name in pair for pair in pairs) for name in set().union(*pairs)} == {
         truth.name: 2 for truth in library
@@ -217,11 +219,11 @@ def test_every_source_that_a_verdict_imports_counts_in_its_hash_or_is_known_to_d
     own = [file[len(f"{ROOT}/") :] for file in out.stdout.split() if file.startswith(f"{ROOT}/")]
     own = [file for file in own if "site-packages" not in file]
     assert len(own) > 100
-    untold = [file for file in own if not file.startswith((*closing_benchmark.JUDGES, *NO_JUDGE))]
+    untold = [file for file in own if not file.startswith((*JUDGES, *NO_JUDGE))]
     assert untold == []
-    assert all(any(file.startswith(place) for file in source_hashes()) for place in closing_benchmark.JUDGES)
+    assert all(any(file.startswith(place) for file in source_hashes()) for place in JUDGES)
 
 
 def test_the_counts_of_the_benchmark_are_no_source_of_a_verdict() -> None:
     """Else the file that says which version judged again would make that version another one."""
-    assert not "catalogs/studies/closing_error_rates.json".startswith(closing_benchmark.JUDGES)
+    assert not "catalogs/studies/closing_error_rates.json".startswith(JUDGES)

@@ -24,7 +24,7 @@ def read_colours(cloud):
 def test_marks_and_gaps_are_as_wide_as_the_catalogue_says():
     flat = road()
     out = paint_feature(flat, relief_of(HAZARD), MARKING, 3.0, -3.0, ASPHALT)
-    on = (np.abs(flat.means[:, 0] - 8.1) < 1.0) & (np.abs(flat.means[:, 1]) < 3.0)
+    on = (np.abs(flat.means[:, 0] - 8.1) < 0.9) & (np.abs(flat.means[:, 1]) < 3.0)
     yellow = (read_colours(out)[:, 0] > 3 * read_colours(out)[:, 2]) & on
     place = np.unique(flat.means[on, 1].round(4))
     marked = np.array([yellow[on & (flat.means[:, 1].round(4) == y)].all() for y in place])
@@ -37,7 +37,8 @@ def test_marks_and_gaps_are_as_wide_as_the_catalogue_says():
 def test_only_the_feature_within_the_carriageway_is_painted():
     flat = road()
     out = paint_feature(flat, relief_of(HAZARD), MARKING, 3.0, -2.0, ASPHALT)
-    on = (np.abs(flat.means[:, 0] - 8.1) <= 1.0) & (flat.means[:, 1] <= 3.0) & (flat.means[:, 1] >= -2.0)
+    half = 1.0 + MARKING.joint_width / 2
+    on = (np.abs(flat.means[:, 0] - 8.1) <= half) & (flat.means[:, 1] <= 3.0) & (flat.means[:, 1] >= -2.0)
     np.testing.assert_array_equal((out.sh != flat.sh).any(axis=(1, 2)), on)
     np.testing.assert_array_equal(out.means, flat.means)
     assert set(np.unique(out.class_id[on])) == {SemanticClass.ROAD, SemanticClass.MARKING}
@@ -61,6 +62,28 @@ def test_paint_in_the_shade_is_as_much_darker_as_the_road_there():
     yellow = (read_colours(out)[:, 0] > 3 * read_colours(out)[:, 2]) & (np.abs(flat.means[:, 1]) > 1.5)
     dark, bright = (read_colours(out)[yellow & side].mean(axis=0) for side in (shade, ~shade))
     np.testing.assert_allclose(dark / bright, 0.4, rtol=0.02)
+
+
+def test_a_depression_is_a_patch_with_joints_under_the_road_s_own_markings():
+    flat = road()
+    line = np.abs(flat.means[:, 1] - 1.0) < 0.1
+    flat = replace(flat, class_id=np.where(line, SemanticClass.MARKING, flat.class_id).astype(np.uint8))
+    sunk = replace(HAZARD, height_m=-0.08)
+    out = paint_feature(flat, relief_of(sunk), MARKING, 3.0, -3.0, ASPHALT)
+    np.testing.assert_array_equal(out.class_id, flat.class_id)
+    changed = (out.sh != flat.sh).any(axis=(1, 2))
+    end = 1.0 + MARKING.patch_margin
+    away = np.abs(flat.means[:, 0] - 8.1)
+    inside = (np.abs(flat.means[:, 1]) <= 3.0) & ~line
+    np.testing.assert_array_equal(changed, inside & (away <= end + MARKING.joint_width / 2))
+    for colour, chosen in ((MARKING.patch, away < end - 0.05), (MARKING.joint, np.abs(away - end) < 0.04)):
+        np.testing.assert_allclose(read_colours(out)[inside & chosen].mean(axis=0), colour, rtol=0.05)
+
+
+def test_a_marking_without_a_patch_leaves_a_depression_as_it_is():
+    flat = road()
+    bare = replace(MARKING, patch=None)
+    assert paint_feature(flat, relief_of(replace(HAZARD, height_m=-0.08)), bare, 3.0, -3.0, ASPHALT) is flat
 
 
 def test_a_marking_that_is_not_there_lists_those_that_are():

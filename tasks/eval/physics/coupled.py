@@ -8,7 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
-from tasks.eval.physics.constants import DT, Constants, Floats, pressure_at, read_grade
+from tasks.eval.physics.constants import (
+    DT,
+    Constants,
+    Floats,
+    compute_wet_friction,
+    grips_by_speed,
+    pressure_at,
+    read_grade,
+)
 from tasks.eval.physics.effects import (
     bound_lateral_hold,
     compute_engine_torque,
@@ -162,9 +170,11 @@ def _compute_axle(
     squeeze = static + np.maximum(stiff * (height - u), -static)
     damped = np.maximum(squeeze + e("tyre_damping", 0.0) * (v * slope - rate), 0.0)
     ratio, wet = load / static, facts["weather"] in WET
+    by_speed = _compare_with_reference(v, facts, constants)
 
     def grip(slip: Floats) -> Floats:
-        return load * compute_friction(slip, load, v, ratio, wet=wet, curve=curve, effects=constants.effects)
+        friction = compute_friction(slip, load, v, ratio, wet=wet, curve=curve, effects=constants.effects)
+        return load * friction * by_speed
 
     # what holds a standing car is what its weight asks for
     rest = -load * slope - static / sum(map(constants.static_load, "fr")) * constants.mass * climb
@@ -211,6 +221,16 @@ def _compute_axle(
         strut=strut - links if axle == "f" else strut + links,
         strut_error=(damper * (1.0 + abs(e("damper_asymmetry", 0.0))) + dry) * rate_error,
     )  # fmt: skip
+
+
+def _compare_with_reference(v: Floats, facts: Mapping[str, Any], constants: Constants) -> Floats:
+    """Wet friction at each speed over that which the clip's mu_c tells [1]."""
+    surface = constants.surface
+    if facts["weather"] not in WET or not grips_by_speed(surface):
+        return np.ones(len(v))
+    film = facts["film_depth_mm"]
+    told = compute_wet_friction(surface["wet_reference_speed"], film, surface)
+    return compute_wet_friction(v, film, surface) / told
 
 
 def _drag_shaft(ticks: Mapping[str, Floats], moves: NDArray[np.bool_], constants: Constants) -> Floats:

@@ -177,6 +177,19 @@ def weigh_explanation(
     )  # fmt: skip
 
 
+def compute_likelihood(grams: RunGrams, explanation: Explanation) -> float:
+    """Return the log likelihood of the runs at an explanation's numbers, less that at the linearisation point [1].
+
+    Parameters
+    ----------
+    grams : of the runs
+    explanation : its numbers
+    """
+    used = np.flatnonzero(explanation.everything != 0.0)
+    moved = (explanation.everything - grams.centre)[used]
+    return float(grams.total_score[used] @ moved - 0.5 * moved @ grams.total[np.ix_(used, used)] @ moved)
+
+
 def search_explanations(
     grams: RunGrams, *, most: int, width: int, spread: bool = True, forms: bool = True
 ) -> list[Explanation]:

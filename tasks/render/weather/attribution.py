@@ -77,14 +77,14 @@ def snow_on(
     bool [H, W]
     """
     mask = np.zeros(gbuffer.depth.shape, dtype=bool)
-    overcast = weather.overcast
-    if overcast is None or overcast.snow is None or overcast.look.snow_cover is None:
+    outside = weather.outside
+    if outside is None or outside.snow is None or outside.look.snow_cover is None:
         return mask
     road = np.isin(gbuffer.class_id, ROAD_CLASSES)
-    bears = road | (gbuffer.normal[..., 2] > steepest_bearing(overcast.look.snow_cover.anchors))
+    bears = road | (gbuffer.normal[..., 2] > steepest_bearing(outside.look.snow_cover.anchors))
     ground = np.isin(gbuffer.class_id, list(classes)) & bears & (gbuffer.alpha > 0.5)
     place = shutter.T_world_camera[:3, 3] + gbuffer.depth[ground, None] * pixel_rays(shutter)[ground]
-    field, x, y = overcast.snow, place[:, 0], place[:, 1]
+    field, x, y = outside.snow, place[:, 0], place[:, 1]
     tracks = np.where(road[ground], tracks_at(field, x, y), 0.0)
     mask[ground] = coverage_rank(field, x, y, tracks) <= weather.state.snow_coverage
     return mask

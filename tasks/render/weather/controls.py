@@ -78,29 +78,28 @@ def road_controls(state: SurfaceState, look: KindLook) -> RoadControls:
     )
 
 
-def air_controls(kind: str, rate_mm_h: float, parameters: WeatherParameters) -> AirControls:
-    """Return the look of the air under cloud, psi_atm(w, r).
+def air_controls(
+    kind: str, rate_mm_h: float, parameters: WeatherParameters, visual_range_m: float | None = None
+) -> AirControls:
+    """Return the look of the air, psi_atm(w, r).
 
     Parameters
     ----------
-    kind : kind of weather with an overcast sky
+    kind : kind of weather
     rate_mm_h : precipitation rate, water equivalent [mm/h]
     parameters : the catalogue's values
+    visual_range_m : meteorological optical range of the air without precipitation; None for the catalogue's [m]
 
     Raises
     ------
     InputError
-        The kind is unknown or of a clear sky, or has precipitation without a rate.
+        The kind is unknown, or has precipitation without a rate.
     """
     look = parameters.find_look(kind)
-    if look is None:
-        raise InputError(
-            f"weather: the air of {kind} is the clear one; only weather under cloud has controls"
-        )
     if look.particles is not None and rate_mm_h == 0:
         raise InputError(f"weather: {kind} needs precipitation_mm_h above 0; it is 0: use {DRY}")
     falls = None if look.particles is None else make_population(look.particles, rate_mm_h)
-    haze = extinction_of_visual_range(parameters.air.haze_visual_range_m)
+    haze = extinction_of_visual_range(visual_range_m or parameters.air.haze_visual_range_m)
     return AirControls(
         population=falls,
         extinction=haze if falls is None else falls.extinction + haze,

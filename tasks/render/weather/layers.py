@@ -23,22 +23,25 @@ from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.road_edit import RoadRelief, measure_road_lift
 from tasks.render.weather.atmosphere import air_layer, light_layer
 from tasks.render.weather.controls import road_controls
+from tasks.render.weather.daylight import relight_street
 from tasks.render.weather.falling.particles import Shutter, visible_streaks
 from tasks.render.weather.falling.precipitation import Population
 from tasks.render.weather.falling.streaks import draw_streaks
 from tasks.render.weather.layer import Layer, recompose_layers
-from tasks.render.weather.overcast import Overcast, make_overcast
+from tasks.render.weather.outside import LitScene, Outside, make_outside
 from tasks.render.weather.parameters import WeatherParameters
 from tasks.render.weather.rays import pixel_rays
-from tasks.render.weather.relief import clear_light, overcast_light, relight_gaussians
+from tasks.render.weather.relief import clear_light, light_outside, relight_gaussians
 from tasks.render.weather.scene_light import ground_light, without_sun
-from tasks.render.weather.sky import SkyLight, light_from
+from tasks.render.weather.skies import OVERCAST, Daylight, draw_sky_kind, draw_sun, light_of_sky
+from tasks.render.weather.sky import SkyLight, cloud_transmittance, light_from
 from tasks.render.weather.snow.field import LyingSnow, snow_field
 from tasks.render.weather.snow.layer import snow_layer, snowed_over, whiten_gaussians
 from tasks.render.weather.wet.wet_road import LightOnRoad, RoadFilm, wet_layer
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.route import Route
 from tasks.surface.state import SurfaceParameters, SurfaceState
+from tasks.surface.weather import find_weather
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,13 +55,15 @@ class ClearScene:
     route : path of the wheels that left tracks in the snow; None for snow without tracks
     relief : road feature of the clip, which is relit by the weather's light; None for a flat road
     to_sun : [3] unit vector to the clear sky's sun, as in `Scene.to_sun` [1]
+    daylight : colours of its light, as in `Scene.daylight` [1]; None where they are not known
     """
 
     gaussians: Gaussians
     environment: NDArray[np.float32]
     route: Route | None = None
     relief: RoadRelief | None = None
-    to_sun: NDArray[np.floating] | None = None
+    to_sun: NDArray[np.float64] | None = None
+    daylight: tuple[tuple[float, float, float], ...] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +98,7 @@ class ClipWeather:
     pavement : the road itself
     parameters : numbers of the catalogue
     seed : visual seed of the clip [1]
-    overcast : None under a clear sky
+    outside : None where a scene keeps the light it was made in
     anchors : weathers of the two anchors, in one scene and of one seed, that the paper's composition blends
     refracts : whether the film on the road refracts
     """
@@ -102,14 +107,14 @@ class ClipWeather:
     pavement: SurfaceParameters
     parameters: WeatherParameters
     seed: int
-    overcast: Overcast | None
+    outside: Outside | None
     anchors: "tuple[ClipWeather, ...]" = ()
     refracts: bool = False
 
     @property
     def reads_normals(self) -> bool:
         """Whether `apply_weather` reads the normals of a rasterisation: only a film on the road mirrors."""
-        return self.overcast is not None and self.overcast.look.film is not None
+        return self.outside is not None and self.outside.look.film is not None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -171,15 +176,25 @@ def weather_scene(
     gaussians, environment, relief = clear.gaussians, clear.environment, clear.relief
     state, p, seed = conditions.state, conditions.parameters, conditions.seed
     look = p.find_look(state.kind)
-    if look is None:
-        dry = ClipWeather(state=state, pavement=conditions.pavement, parameters=p, seed=seed, overcast=None)
+    light = choose_light(clear, conditions)
+    if light is None and not find_weather(state.kind).overcast:
+        dry = ClipWeather(state=state, pavement=conditions.pavement, parameters=p, seed=seed, outside=None)
         if relief is None:
             return gaussians, dry
         return relight_gaussians(
             gaussians, relief, clear_light(gaussians, environment, p.sky, clear.to_sun)
         ), dry
-    white = ground_light(gaussians, SemanticClass.ROAD).lit / p.sky.asphalt_albedo
-    scene = without_sun(gaussians, p.sky.shadow_kept)
+    if light is None or gaussians.light is None:
+        incident = ground_light(gaussians, SemanticClass.ROAD).lit / p.sky.asphalt_albedo
+        scene, lit = (
+            without_sun(gaussians, p.sky.shadow_kept),
+            LitScene(environment=environment, white=incident),
+        )
+    else:
+        before, own_sun = np.array(clear.daylight), np.asarray(clear.to_sun)
+        scene, incident, strength = relight_street(gaussians, gaussians.light, before, own_sun, light)
+        white = (light.to_sun[2] * light.colours[0] + light.colours[1]) / strength
+        lit = LitScene(environment=environment, white=white, daylight=light, strength=strength)
     field = None
     if (cover := look.snow_cover) is not None:
         field = snow_field(gaussians, cover.patches, cover.tracks, cover.anchors, clear.route, seed)
@@ -190,22 +205,44 @@ def weather_scene(
             full_cover_mm=conditions.pavement.full_cover_depth_mm,
         )
         lift = None if relief is None else measure_road_lift(scene, relief)
-        snow = snow_layer(scene, field, white, amount, cover, lift)
-        scene = snowed_over(whiten_gaussians(scene, field, white, amount, cover), snow)
+        snow = snow_layer(scene, field, incident, amount, cover, lift)
+        scene = snowed_over(whiten_gaussians(scene, field, incident, amount, cover), snow)
     own, *anchors = (
         ClipWeather(
             state=one,
             pavement=conditions.pavement,
             parameters=p,
             seed=seed,
-            overcast=make_overcast(look, one, p, seed, environment, white, field, focal_px),
+            outside=make_outside(look, one, p, seed, lit, field, focal_px),
             refracts=conditions.refracts,
         )
         for one in (state, *conditions.anchors)
     )
-    if relief is not None and own.overcast is not None:
-        scene = relight_gaussians(scene, relief, overcast_light(own.overcast.environment, own.overcast.sky))
+    if relief is not None and own.outside is not None:
+        scene = relight_gaussians(
+            scene,
+            relief,
+            light_outside(scene, own.outside.environment, own.outside.sky, p.sky, own.outside.to_sun),
+        )
     return scene, replace(own, anchors=tuple(anchors))
+
+
+def choose_light(clear: ClearScene, conditions: ClipConditions) -> Daylight | None:
+    """Return sky and sun of a clip; None over a scene that does not know its own light.
+
+    Parameters
+    ----------
+    clear : the scene
+    conditions : the weather; in dry weather the visual seed draws the sky
+    """
+    if clear.gaussians.light is None or clear.daylight is None or clear.to_sun is None:
+        return None
+    p, seed = conditions.parameters.sky, conditions.seed
+    name = OVERCAST if find_weather(conditions.state.kind).overcast else draw_sky_kind(p.skies, seed)
+    kind = getattr(p.skies, name)
+    through = cloud_transmittance(conditions.state.precipitation_mm_h, p)
+    own = np.array(clear.daylight)
+    return light_of_sky(name, kind, draw_sun(kind, seed), own, clear.to_sun, p.sun, through)
 
 
 def apply_weather(
@@ -233,13 +270,13 @@ def apply_weather(
     -------
     WeatherFrame
     """
-    overcast = weather.overcast
-    if overcast is None:
+    outside = weather.outside
+    if outside is None:
         return WeatherFrame(base=picture, layers=(), picture=picture)
-    sky, air, film = overcast.sky, overcast.air, overcast.look.film
+    sky, air, film = outside.sky, outside.air, outside.look.film
     rays = pixel_rays(shutter)
     view = world_to_camera(shutter.T_world_camera)
-    cloudy = environment_view(overcast.environment, view, shutter.K, shutter.width, shutter.height)
+    cloudy = environment_view(outside.environment, view, shutter.K, shutter.width, shutter.height)
     layers = [light_layer(picture, gbuffer, clear_sky, cloudy, sky)]
     if film is not None:
         state = weather.state
@@ -251,28 +288,28 @@ def apply_weather(
             rate_mm_h=state.precipitation_mm_h,
             refracts=weather.refracts,
         )
-        light = LightOnRoad(environment=overcast.environment, sky=sky, extinction=air.extinction)
+        light = LightOnRoad(environment=outside.environment, sky=sky, extinction=air.extinction)
         dry = recompose_layers(picture, layers)
         layers.append(wet_layer(dry, gbuffer, shutter, rays, on_road, light))
     layers.append(air_layer(gbuffer, cloudy, air, sky, rays))
-    if particles and overcast.population is not None:
-        layers.append(particle_layer(weather, overcast.population, overcast.sky, gbuffer.depth, shutter))
+    if particles and outside.population is not None:
+        layers.append(particle_layer(weather, outside.population, outside.sky, gbuffer.depth, shutter))
     return WeatherFrame(
         base=picture,
         layers=tuple(layers),
         picture=recompose_layers(picture, layers),
-        blend=_blend_anchors(weather, overcast, (picture, clear_sky, gbuffer, shutter)),
+        blend=_blend_anchors(weather, outside, (picture, clear_sky, gbuffer, shutter)),
     )
 
 
-def _blend_anchors(weather: ClipWeather, overcast: Overcast, view: Any) -> AnchorBlend | None:
+def _blend_anchors(weather: ClipWeather, outside: Outside, view: Any) -> AnchorBlend | None:
     """The frames of the anchors in a view, and how much the higher one weighs."""
     if not weather.anchors:
         return None
     low, high = weather.anchors
     rates, counts = [], []
     for one in (low, weather, high):
-        air = overcast.atmosphere if one.overcast is None else one.overcast.atmosphere
+        air = outside.atmosphere if one.outside is None else one.outside.atmosphere
         rates.append(one.state.precipitation_mm_h)
         counts.append(air.particles_m3)
     still, falling = ((own - least) / (most - least) for least, own, most in (rates, counts))

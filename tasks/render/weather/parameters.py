@@ -33,14 +33,12 @@ class KindLook:
 
     Parameters
     ----------
-    exposure_ev : how much further the camera opens than in clear weather, set once for the clip [EV]
     particles : what falls, with its extinction
     film : the film on the road, of water or of ice
     snow_cover : snow on the ground
     anchors_mm_h : rates, ascending, between which the paper's composition blends pictures [mm/h]
     """
 
-    exposure_ev: float
     particles: ParticleParameters | None = None
     film: RoadFilmParameters | None = None
     snow_cover: SnowCoverParameters | None = None
@@ -62,8 +60,8 @@ class WeatherParameters:
     sky: SkyParameters
     kinds: Mapping[str, KindLook]
 
-    def find_look(self, kind: str) -> KindLook | None:
-        """How a kind of weather looks; None under a clear sky, which changes nothing.
+    def find_look(self, kind: str) -> KindLook:
+        """How a kind of weather looks; in dry weather nothing falls and nothing lies.
 
         Parameters
         ----------
@@ -75,7 +73,7 @@ class WeatherParameters:
             If there is no such kind, or the catalogue has no entry of it.
         """
         if not find_weather(kind).overcast:
-            return None
+            return KindLook()
         if kind not in self.kinds:
             raise InputError(
                 f"weather {kind}: the weather catalogue has no {kind}.yaml, which says how it looks"

@@ -34,6 +34,16 @@ def stream_key(seed: int, stream: str) -> int:
     return int.from_bytes(digest, "little")
 
 
+def unit_number(seed: int, stream: str) -> float:
+    """One number in [0, 1) of a named stream of a seed, for what a clip draws once [1].
+
+    Parameters
+    ----------
+    seed, stream : see `stream_key`
+    """
+    return (stream_key(seed, stream) >> 11) * 2.0**-53
+
+
 @numba.njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def philox(c0, c1, c2, c3, key):  # type: ignore[no-untyped-def]
     """Philox4x32-10 (Salmon et al. 2011, doi:10.1145/2063384.2063405).

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.conventions import ROAD_CLASSES, SemanticClass
+from tasks.render.composition import LUMINANCE
 from tasks.render.road_edit import RoadRelief
 from tasks.render.weather.ground_grid import read_between
 from tasks.render.weather.scene_light import GroundLight, ground_light, recolour_gaussians
-from tasks.render.weather.sky import LUMINANCE, SkyLight, SkyParameters
+from tasks.render.weather.sky import SkyLight, SkyParameters
 from tasks.scene.gaussians import Gaussians
 
 Floats = NDArray[np.float64]
@@ -114,14 +115,25 @@ def clear_light(
     )
 
 
-def overcast_light(environment: NDArray[np.floating], sky: SkyLight) -> ReliefLight:
-    """The light under cloud: its sky and the ground below, no sun.
+def light_outside(
+    gaussians: Gaussians,
+    environment: NDArray[np.floating],
+    sky: SkyLight,
+    parameters: SkyParameters,
+    to_sun: NDArray[np.floating] | None = None,
+) -> ReliefLight:
+    """The light of a clip's sky: with a sun as `clear_light` reads it, under cloud sky and ground alone.
 
     Parameters
     ----------
-    environment : [H, W, 3] panorama under cloud [1]
+    gaussians : the scene in that light, before its exposure
+    environment : [H, W, 3] exposed panorama [1]
     sky : the light of the clip
+    parameters : reflectance of the road and share of open sky
+    to_sun : [3] unit vector to the sun; None under cloud [1]
     """
+    if to_sun is not None:
+        return clear_light(gaussians, environment / sky.relight[0, 0], parameters, to_sun)
     return ReliefLight(
         sky=_coarse(np.asarray(environment, dtype=np.float64) @ LUMINANCE),
         ground=float(LUMINANCE @ sky.ground),

@@ -9,9 +9,8 @@ from scipy.ndimage import distance_transform_edt
 
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
-from tasks.render.composition import to_linear
+from tasks.render.composition import LUMINANCE, to_linear
 from tasks.render.weather.ground_grid import GroundGrid, ground_grid, read_between, window_sums
-from tasks.render.weather.sky import LUMINANCE
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.spherical_harmonics import C0
 
@@ -68,22 +67,23 @@ def recolour_gaussians(
     Parameters
     ----------
     gaussians : the set of Gaussians
-    gain : [N] factor on the colour, not negative [1]
-    add : [N, 3] linear light to add [1]
+    gain : [N], or [N, 3] by colour, factor on the colour, not negative [1]
+    add : [N, 3] or [1, 3] linear light to add [1]
 
     Returns
     -------
     Gaussians
     """
     old = np.maximum(gaussians.sh[:, 0].astype(np.float64) * C0 + 0.5, 0)
-    new = gain[:, None] * (to_linear(old) if gaussians.display_encoded else old) + add
+    gain = gain[:, None] if gain.ndim == 1 else gain
+    new = gain * (to_linear(old) if gaussians.display_encoded else old) + add
     if gaussians.display_encoded:
         new = to_display_unclipped(new)
     sh = gaussians.sh.copy()
     sh[:, 0] = (new - 0.5) / C0
     # directional detail scales with the colour that it modulates; added light has none
     kept = gain ** (1 / 2.2) if gaussians.display_encoded else gain
-    sh[:, 1:] *= kept[:, None, None].astype(np.float32)
+    sh[:, 1:] *= kept[:, None, :].astype(np.float32)
     return replace(gaussians, sh=sh)
 
 

@@ -1,8 +1,9 @@
-"""The overcast sky and the light under it.
+"""The sky over a clip and the light under it.
 
-Clear-weather pictures carry the light they were made in. What they say about its strength is read off the
-road, whose reflectance is known well enough: the radiance of a white surface lying in it. Under cloud this
-light loses its sun, keeps a share of its strength, and comes from the whole sky.
+A scene carries the light it was made in. How strong that is follows from the light on its road: where the scene does
+not know it, the road's reflectance, which is known well enough, tells the radiance of a white surface lying there.
+Under cloud this light loses its sun, keeps a share of its strength, and comes from the whole sky. The camera opens by
+part of what the light loses, once for the clip, as one that meters road and street does: a bright sky may clip.
 """
 
 from dataclasses import dataclass
@@ -11,18 +12,21 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.render.weather.coverage_field import FieldParameters, height_field
-
-LUMINANCE = np.array((0.2126, 0.7152, 0.0722))
-"""Linear sRGB to luminance (IEC 61966-2-1)."""
+from tasks.render.composition import LUMINANCE
+from tasks.render.weather.clouds import CloudParameters
+from tasks.render.weather.skies import Skies, SunParameters
 
 
 @dataclass(frozen=True, kw_only=True)
 class SkyParameters:
-    """How cloud changes the light.
+    """Light of the sky, and how cloud changes it.
 
     Parameters
     ----------
+    skies : the kinds of sky
+    sun : how sunlight comes through the air
+    clouds : how sky and cloud look
+    exposure_compensation : share of the light's loss, in stops, by which the camera opens [1]
     cloud_transmittance : light under full cloud by light under clear sky, where hardly anything falls [1]
     rain_cloud_transmittance : the same under the thick cloud of heavy precipitation [1]
     thickening_mm_h : rate over which the cloud grows from the one to the other [mm/h]
@@ -30,15 +34,17 @@ class SkyParameters:
     saturation : share of the clear picture's colour saturation that is left [1]
     zenith_gradient : zenith by horizon radiance of the overcast sky, less 1 [1]
     cloud_base_m : height of the cloud, below which precipitation scatters the gradient away [m]
-    cloud_contrast : relative variation of the cloud's radiance [1]
-    cloud_size_m : longest wave of that variation [m]
     sky_view : share of the upper hemisphere that is open sky in a street [1]
     asphalt_albedo : reflectance of dry road, from which the light is read [1]
-    shadow_kept : power to which large light and shade on the road are left [1]
+    shadow_kept : power to which light and shade are left on the ground of a scene that does not know its light [1]
     far_field_m : distance at which the environment's far field is seen through the air [m]
     eye_height_m : height over the ground from which what lies below the horizon is seen through the air [m]
     """
 
+    skies: Skies
+    sun: SunParameters
+    clouds: CloudParameters
+    exposure_compensation: float
     cloud_transmittance: float
     rain_cloud_transmittance: float
     thickening_mm_h: float
@@ -46,8 +52,6 @@ class SkyParameters:
     saturation: float
     zenith_gradient: float
     cloud_base_m: float
-    cloud_contrast: float
-    cloud_size_m: float
     sky_view: float
     asphalt_albedo: float
     shadow_kept: float
@@ -103,8 +107,10 @@ def sky_light(
     extinction: float,
     ground_albedo: float,
     parameters: SkyParameters,
+    *,
+    true_colours: bool = False,
 ) -> SkyLight:
-    """The light under precipitating cloud.
+    """Return the light under closed cloud.
 
     The sky is the overcast sky of Moon & Spencer (1942, Trans. Illum. Eng. Soc. 37), radiance proportional to
     1 + b sin(elevation), with b reduced by the precipitation between cloud and ground, and as bright as it must
@@ -117,14 +123,16 @@ def sky_light(
     extinction : extinction coefficient of the air [m-1]
     ground_albedo : mean reflectance of the ground: wet asphalt, or snow [1]
     parameters : how cloud changes the light
+    true_colours : the scene's colours are those of its surfaces, without those of sun and shade
 
     Returns
     -------
     SkyLight
     """
     p = parameters
+    kept = 1.0 if true_colours else p.saturation
     grey = np.outer(np.ones(3), LUMINANCE)
-    relight = level * np.diag(p.tint) @ (p.saturation * np.eye(3) + (1 - p.saturation) * grey)
+    relight = level * np.diag(p.tint) @ (kept * np.eye(3) + (1 - kept) * grey)
     # light under cloud has no colour but the tint
     white = level * np.array(p.tint) * float(LUMINANCE @ clear_white)
     b = p.zenith_gradient * float(np.exp(-extinction * p.cloud_base_m))
@@ -157,25 +165,63 @@ def light_from(sky: SkyLight, up: NDArray[np.floating], parameters: SkyParameter
     return above * parameters.sky_view * sky.white + (1 - above * parameters.sky_view) * sky.ground
 
 
-def overcast_environment(
+def sunny_light(
+    white: NDArray[np.floating],
+    level: float,
+    rows: NDArray[np.float32],
+    ground_albedo: float,
+) -> SkyLight:
+    """Return the light under a sky with a sun.
+
+    Parameters
+    ----------
+    white : [3] radiance of a white surface lying on the sunny road, as bright as in the scene's own light [1]
+    level : exposed light by that of the scene's own light [1]
+    rows : float32 [h, w, 3] exposed radiance of the sky, from the zenith to the horizon [1]
+    ground_albedo : mean reflectance of the ground [1]
+    """
+    zenith, horizon = (rows[k].mean(axis=0).astype(np.float64) for k in (0, -1))
+    return SkyLight(
+        clear_white=np.asarray(white, dtype=np.float64),
+        relight=level * np.eye(3),
+        white=level * np.asarray(white, dtype=np.float64),
+        gradient=float(LUMINANCE @ zenith / (LUMINANCE @ horizon)) - 1,
+        zenith=zenith,
+        airlight=horizon,
+        ground=ground_albedo * level * np.asarray(white, dtype=np.float64),
+    )
+
+
+def expose_light(strength: float, parameters: SkyParameters) -> float:
+    """Return how much further the camera opens under a light than in the scene's own [1].
+
+    Parameters
+    ----------
+    strength : light on the road by that of the scene's own light [1]
+    parameters : share of the loss that the camera makes up for
+    """
+    return float(strength**-parameters.exposure_compensation)
+
+
+def replace_sky(
     environment: NDArray[np.floating],
+    rows: NDArray[np.float32],
     sky: SkyLight,
     extinction: float,
     parameters: SkyParameters,
-    seed: int,
     snow: float = 0.0,
 ) -> NDArray[np.float32]:
-    """The environment under precipitating cloud: new sky, and the far field as the air lets it through.
+    """Return the environment in another light: its sky replaced, and the far field as the air lets it through.
 
     Below the horizon the environment is ground, and as near as the eye's height over it says.
 
     Parameters
     ----------
     environment : [H, W, 3] clear environment, equirectangular, zenith first, +x in the middle column [1]
+    rows : float32 [h, W, 3] radiance of the new sky on the rows above the horizon [1]
     sky : the light
     extinction : extinction coefficient of the air [m-1]
-    parameters : how cloud changes the light
-    seed : visual seed of the clip [1]
+    parameters : distance of the far field
     snow : share of the ground that snow covers [1]
 
     Returns
@@ -183,8 +229,7 @@ def overcast_environment(
     float32 [H, W, 3] linear light [1]
     """
     p = parameters
-    height = len(environment)
-    elevation = pi / 2 - (np.arange(height) + 0.5) / height * pi
+    elevation = row_elevations(len(environment))
     far = np.asarray(environment, dtype=np.float32)
     distance = np.minimum(p.far_field_m, p.eye_height_m / np.maximum(np.sin(-elevation), 1e-9))
     air = np.exp(-extinction * distance).astype(np.float32)[:, None, None]
@@ -194,30 +239,20 @@ def overcast_environment(
     ground = (1 - covered) * np.stack(relit, axis=-1) + covered * sky.ground.astype(np.float32)
     out = air * ground + (1 - air) * sky.airlight.astype(np.float32)
     above = elevation > 0
-    cloud = _cloud(elevation[above], environment.shape[1], sky, extinction, p, seed)
     luminance = sum(np.float32(weight) * far[above, :, c] for c, weight in enumerate(LUMINANCE))
     open_sky = _sky_share(np.asarray(luminance), elevation[above])[..., None]
-    out[above] += open_sky * (cloud - out[above])
+    out[above] += open_sky * (rows - out[above])
     return out
 
 
-def _cloud(
-    elevation: NDArray[np.float64], width: int, sky: SkyLight, extinction: float, p: SkyParameters, seed: int
-) -> NDArray[np.float32]:
-    """Radiance of the overcast sky on rows of elevations, with a faint pattern.
+def row_elevations(height: int) -> NDArray[np.float64]:
+    """Return the elevation of each row of a panorama [rad].
 
-    The cloud is a ceiling: its pattern shrinks towards the horizon, and the air hides it there.
+    Parameters
+    ----------
+    height : number of rows [1]
     """
-    azimuth = pi - (np.arange(width) + 0.5) / width * 2 * pi
-    up = np.sin(elevation)
-    slant = p.cloud_base_m / np.maximum(up, 0.03)
-    away = (slant * np.cos(elevation))[:, None]
-    waves = FieldParameters(coarsest_m=p.cloud_size_m, octaves=4, roughness=0.6)
-    footprint = (slant * (elevation[0] - elevation[1]) / np.maximum(up, 0.03))[:, None]
-    pattern = height_field(away * np.cos(azimuth), away * np.sin(azimuth), waves, seed, "cloud", footprint)
-    seen = (p.cloud_contrast * np.exp(-extinction * slant)).astype(np.float32)
-    profile = (sky.airlight * (1 + sky.gradient * up[:, None])).astype(np.float32)
-    return profile[:, None, :] * (1 + seen[:, None] * np.clip(pattern, -2, 2))[..., None]
+    return pi / 2 - (np.arange(height) + 0.5) / height * pi
 
 
 def _sky_share(luminance: NDArray[np.float32], elevation: NDArray[np.float64]) -> NDArray[np.float32]:

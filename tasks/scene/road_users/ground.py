@@ -21,7 +21,7 @@ Gaussians inside that are an obstacle and no stray ones [1]."""
 
 
 def measure_ground(places: Floats, scene: Scene) -> Floats:
-    """Return the height of the ground beside the carriageway at places [N, 3] above these [N] [m]; 0 on the carriageway.
+    """Return by how much the ground beside the carriageway lies above places [N, 3] of the road's plane [N] [m].
 
     Parameters
     ----------

@@ -3,15 +3,16 @@
 import numpy as np
 
 from tasks.scene.gaussians import Gaussians
-from tasks.scene.scene import Scene
+from tasks.scene.scene import Scene, mix_daylight
 from tasks.scene.street.bend import integrate_course, lay_route
 from tasks.scene.street.cars.parked import build_cars, car_boxes, car_footprints
 from tasks.scene.street.furniture import build_furniture, post_boxes
+from tasks.scene.street.ground import build_ground
 from tasks.scene.street.houses.adornments import awning_boxes, build_adornments
 from tasks.scene.street.houses.facades import build_facades
 from tasks.scene.street.houses.roofs import build_roofs, house_boxes
 from tasks.scene.street.layout import StreetLayout
-from tasks.scene.street.light import Casters, lit_radiance
+from tasks.scene.street.light import Casters, share_light
 from tasks.scene.street.pavement import build_pavement
 from tasks.scene.street.plan import CROWN_BALLS, plan_street
 from tasks.scene.street.road import build_road
@@ -24,7 +25,7 @@ _SH_BAND_0 = 0.28209479177387814
 
 
 def build_street(layout: StreetLayout, seed: int) -> Scene:
-    """A two-lane city street on a summer morning, with houses, trees and parked cars.
+    """A two-lane road with what the layout puts beside it: houses, trees, parked cars, gardens, fields.
 
     The same seed and layout give the same bytes.
 
@@ -44,6 +45,7 @@ def build_street(layout: StreetLayout, seed: int) -> Scene:
     surfels = join_surfels(
         [
             build_road(layout, seed),
+            build_ground(layout, seed),
             build_pavement(layout, plan.trees, seed),
             build_facades(layout, plan.buildings, seed),
             build_roofs(layout, plan.buildings, seed),
@@ -66,7 +68,11 @@ def build_street(layout: StreetLayout, seed: int) -> Scene:
         balls=np.array([tree.balls for tree in plan.trees]).reshape(-1, CROWN_BALLS, 4),
         leaf_extinction=LEAF_EXTINCTION,
     )
-    radiance = lit_radiance(surfels, layout, line, casters)
+    light = share_light(surfels, layout, line, casters)
+    daylight = layout.sun_rgb, layout.sky_rgb, layout.bounce_rgb
+    # Lambert's law, and the surfel's own glow
+    radiance = surfels.albedo * mix_daylight(light, daylight) + surfels.glow
+    glowing = surfels.glow.sum(axis=1) / np.maximum(radiance.sum(axis=1), 1e-9)
     station = surfels.centre[:, 0]
     # a disc stays thinner than it is wide, so that its shortest axis is its normal
     thickness = np.minimum(THICKNESS, 0.5 * surfels.scale.min(axis=1, keepdims=True))
@@ -81,6 +87,7 @@ def build_street(layout: StreetLayout, seed: int) -> Scene:
                 sh=((radiance - 0.5) / _SH_BAND_0).astype(np.float32)[:, None, :],
                 normals=line.to_world_directions(station, surfels.axes[:, 2]).astype(np.float32),
                 class_id=surfels.class_id,
+                light=np.column_stack([light, glowing]).astype(np.float32),
                 antialiased=True,
             )
         ),
@@ -88,4 +95,6 @@ def build_street(layout: StreetLayout, seed: int) -> Scene:
         environment=draw_panorama(layout, seed),
         carriageway_left=layout.carriageway_left,
         carriageway_right=layout.carriageway_right,
+        sun_direction_deg=(layout.sun_azimuth_deg, layout.sun_elevation_deg),
+        daylight=daylight,
     )

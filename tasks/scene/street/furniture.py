@@ -38,11 +38,12 @@ def list_furniture(layout: StreetLayout, plan: Plan, seed: int) -> list[tuple[st
     seed : the street's seed [1]
     """
     pieces = [("lamp", join_surfels(_build_lamp(layout, station, side))) for station, side in plan.lamps]
-    pieces += _build_crossing_signs(layout)
+    pieces += _build_crossing_signs(layout) if layout.has_crossing else []
     rng = named_generator(seed, "bins")
-    for station, side in plan.lamps[::2]:
+    for station, side in plan.lamps[::2] if layout.has_pavement else ():
         pieces.append(("bin", join_surfels(_build_bin(layout, station + rng.uniform(1.2, 2.2), side))))
-    pieces.append(("letter box", _build_letter_box(layout, layout.crossing_station - 12.0)))
+    if layout.has_pavement:
+        pieces.append(("letter box", _build_letter_box(layout, layout.crossing_station - 12.0)))
     return pieces
 
 
@@ -53,7 +54,7 @@ def post_boxes(layout: StreetLayout, plan: Plan) -> Floats:
     for station, side in plan.lamps:
         foot = np.array([station, _post_line(layout, side), layout.kerb_height])
         boxes.append([foot - half, foot + half + [0, 0, layout.lamp_height]])
-    return np.array(boxes)
+    return np.array(boxes).reshape(-1, 2, 3)
 
 
 def _post_line(layout: StreetLayout, side: int) -> float:
@@ -144,5 +145,5 @@ def _build_bin(layout: StreetLayout, station: float, side: int) -> list[Surfels]
 
 def _build_letter_box(layout: StreetLayout, station: float) -> Surfels:
     side = -1
-    low = np.array([station, layout.front_position(side) + 0.35, layout.kerb_height + 0.25])
+    low = np.array([station, layout.pavement_end(side) + 0.35, layout.kerb_height + 0.25])
     return build_box(low, low + np.array([0.5, 0.4, 1.0]), 0.1, SemanticClass.OTHER, palette.POST_YELLOW)

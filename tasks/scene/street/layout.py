@@ -15,6 +15,13 @@ PIXEL = 1 / 400
 """Width of one of its pixels at unit depth [1]."""
 
 
+MAY_BE_NONE = (
+    "parking_width", "crossing_length", "kerb_height", "kerb_width", "pavement_width", "front_garden", "open_ground",
+    "lamp_spacing", "tree_spacing",
+)  # fmt: skip
+"""Lengths of a `StreetLayout` that may be 0, where the street has no such thing."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class StreetLayout:
     """A two-lane street: the ego route in the right lane, parking, pavement and facades on both sides.
@@ -31,18 +38,30 @@ class StreetLayout:
     grade_transition : length over which the grade grows to its full value [m]
     grade : rise of the road per metre of way from there on; negative falls [1]
     lane_width : width of a traffic lane [m]
-    parking_width : width of the parking strip on either side [m]
+    parking_width : width of the parking strip, or of the shoulder, on either side [m]
+    parked_share : share of the parking places that are taken [1]
     marking_width : width of a longitudinal marking [m]
     dash_length, dash_gap : stroke and gap of the centre line [m]
     crossing_station : where the pedestrian crossing begins [m]
-    crossing_length : extent of the crossing along the road [m]
+    crossing_length : extent of the crossing along the road; 0 for none [m]
     crossing_bar : width of a bar of the crossing, and of the gap between two [m]
     kerb_height, kerb_width : upstand and top width of the kerb [m]
-    pavement_width : from the kerb to the facades [m]
+    pavement_width : of the paved footway beside the kerb; 0 for none [m]
+    front_garden : from the pavement to the facades; 0 without gardens [m]
+    open_ground : grass beyond the pavement, under gardens and houses and behind them; 0 without [m]
     slab : edge of a paving slab [m]
     ground_storey_height, storey_height : floor to floor [m]
-    lamp_spacing, lamp_height : of the street lamps on one side [m]
-    tree_spacing : between the trees of one side [m]
+    fewest_storeys, most_storeys : of a house, the ground floor among them [1]
+    fewest_bays, most_bays : window bays of a front [1]
+    gap_share : share of the houses after which there is a gap [1]
+    shortest_gap, longest_gap : such gaps [m]
+    shop_share : share of the houses with a shop [1]
+    flat_share, mansard_share : share of flat and of mansard roofs; the others are pitched [1]
+    canyon_height : mean height of the houses, which hide the low sky [m]
+    lamp_spacing, lamp_height : of the street lamps on one side; no lamps with a spacing of 0 [m]
+    tree_spacing : between the trees of one side; 0 for none [m]
+    tree_share : share of the places of trees that are planted [1]
+    tree_scale : size of a tree over that of a young lime of 7 m [1]
     sun_azimuth_deg : direction of the sun, from the route's start heading to the left [deg]
     sun_elevation_deg : height of the sun [deg]
     sun_rgb : irradiance of the sun over pi, on a surface that faces it, linear light [1]
@@ -62,6 +81,7 @@ class StreetLayout:
     grade: float
     lane_width: float
     parking_width: float
+    parked_share: float
     marking_width: float
     dash_length: float
     dash_gap: float
@@ -71,12 +91,27 @@ class StreetLayout:
     kerb_height: float
     kerb_width: float
     pavement_width: float
+    front_garden: float
+    open_ground: float
     slab: float
     ground_storey_height: float
     storey_height: float
+    fewest_storeys: float
+    most_storeys: float
+    fewest_bays: float
+    most_bays: float
+    gap_share: float
+    shortest_gap: float
+    longest_gap: float
+    shop_share: float
+    flat_share: float
+    mansard_share: float
+    canyon_height: float
     lamp_spacing: float
     lamp_height: float
     tree_spacing: float
+    tree_share: float
+    tree_scale: float
     sun_azimuth_deg: float
     sun_elevation_deg: float
     sun_rgb: tuple[float, float, float]
@@ -84,11 +119,21 @@ class StreetLayout:
     bounce_rgb: tuple[float, float, float]
 
     def __post_init__(self) -> None:
-        if not 0 < self.crossing_station < self.route_length - self.crossing_length:
+        if self.has_crossing and not 0 < self.crossing_station < self.route_length - self.crossing_length:
             raise InputError(
                 f"the crossing must lie on the route of {self.route_length:g} m; it is {self.crossing_length:g} m"
                 f" long and begins at crossing_station {self.crossing_station:g} m"
             )
+
+    @property
+    def has_crossing(self) -> bool:
+        """Whether pedestrians have a crossing."""
+        return self.crossing_length > 0
+
+    @property
+    def has_pavement(self) -> bool:
+        """Whether there is a kerb with a paved footway behind it."""
+        return self.pavement_width > 0
 
     @property
     def carriageway_left(self) -> float:
@@ -111,6 +156,10 @@ class StreetLayout:
 
     def front_position(self, side: int) -> float:
         """Lateral position of the facades on the left (side 1) or the right (side -1) [m]."""
+        return self.pavement_end(side) + side * self.front_garden
+
+    def pavement_end(self, side: int) -> float:
+        """Lateral position at which the pavement ends on the left (side 1) or the right (side -1) [m]."""
         return self.kerb_position(side) + side * (self.kerb_width + self.pavement_width)
 
 

@@ -1,4 +1,4 @@
-"""Sun, shade and skylight on the street, which are baked into the colours.
+"""Sun, shade and skylight on the street: how much of each reaches every surfel.
 
 Shadows are cast by simple proxies, boxes and balls of leaves, along the sun's direction in route
 coordinates; over the length of a shadow the road is nearly straight.
@@ -17,8 +17,6 @@ Floats = NDArray[np.float64]
 
 _LIFT = 0.03
 """Start of a shadow ray above its surface [m]."""
-_CANYON_HEIGHT = 12.0
-"""Mean height of the houses, which hide the low sky [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,8 +46,8 @@ def sun_direction(layout: StreetLayout) -> Floats:
     )
 
 
-def lit_radiance(surfels: Surfels, layout: StreetLayout, line: Course, casters: Casters) -> Floats:
-    """Return the outgoing radiance of every surfel: Lambert's law for sun, sky and surroundings, plus its own glow.
+def share_light(surfels: Surfels, layout: StreetLayout, line: Course, casters: Casters) -> Floats:
+    """Return the shares of sun, sky and sunlit surroundings that reach every surfel, as `Gaussians.light` has them.
 
     Parameters
     ----------
@@ -60,7 +58,7 @@ def lit_radiance(surfels: Surfels, layout: StreetLayout, line: Course, casters: 
 
     Returns
     -------
-    float64 [N, 3] linear light [1]
+    float64 [N, 3] in 0..1 [1]
     """
     order = np.argsort(surfels.centre[:, 0], kind="stable")
     normal = surfels.axes[order, 2]
@@ -82,14 +80,9 @@ def lit_radiance(surfels: Surfels, layout: StreetLayout, line: Course, casters: 
     openness = surfels.openness[order] * _ambient_share(point, casters.footprints)
     sky = sky_share(point, normal, layout) * openness
     around = (1 - sky) * (0.25 + 0.75 * openness)
-    light = (
-        direct[:, None] * np.array(layout.sun_rgb)
-        + sky[:, None] * np.array(layout.sky_rgb)
-        + around[:, None] * np.array(layout.bounce_rgb)
-    )
-    radiance = np.empty_like(light)
-    radiance[order] = surfels.albedo[order] * light + surfels.glow[order]
-    return radiance
+    light = np.empty((len(point), 3))
+    light[order] = np.clip(np.stack([direct, sky, around], axis=1), 0.0, 1.0)
+    return light
 
 
 def sky_share(point: Floats, normal: Floats, layout: StreetLayout) -> Floats:
@@ -105,7 +98,7 @@ def sky_share(point: Floats, normal: Floats, layout: StreetLayout) -> Floats:
     -------
     float64 [N] in 0..1 [1]
     """
-    height = np.maximum(_CANYON_HEIGHT - point[:, 2], 0.0)
+    height = np.maximum(layout.canyon_height - point[:, 2], 0.0)
     right = np.arctan2(height, np.maximum(point[:, 1] - layout.front_position(-1), 0.05))
     left = np.pi - np.arctan2(height, np.maximum(layout.front_position(1) - point[:, 1], 0.05))
     tilt = np.arctan2(normal[:, 2], normal[:, 1])

@@ -41,6 +41,8 @@ FLOWERS = _linear_light("#a8324a", "#c46a8c", "#c9a23a", "#b8452e")
 HEDGE = _linear_light("#46632e")[0]
 EARTH = _linear_light("#5b4a3a")[0]
 GRASS = _linear_light("#6a7c40")[0]
+FIELDS = _linear_light("#7d8a46", "#a39a5c", "#6b5a45", "#5f7a3c", "#b5a66a", "#8a7a56")
+"""Meadow, ripe grain, ploughed earth, beet, stubble, fallow."""
 CAR_PAINT = _linear_light(
     "#c2c2c0",
     "#979b9f",

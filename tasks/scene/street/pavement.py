@@ -24,12 +24,16 @@ _PIT = 0.58
 def build_pavement(layout: StreetLayout, planted: tuple[Tree, ...], seed: int) -> Surfels:
     """Build the surfels of the kerbstones (class kerb), the slabs (sidewalk) and the earth about the trees (terrain).
 
+    There are none without a pavement.
+
     Parameters
     ----------
     layout : dimensions
     planted : the trees
     seed : the street's seed [1]
     """
+    if not layout.has_pavement:
+        return join_surfels([])
     parts = []
     for side in (-1, 1):
         parts += [_build_kerb(layout, seed, side), *_build_slabs(layout, seed, side)]

@@ -126,11 +126,15 @@ def plan_street(layout: StreetLayout, seed: int) -> Plan:
     first, last = layout.station_range
     # one lamp stands by the crossing; those of the other side stand between the lamps of this side
     beside = layout.crossing_station + layout.crossing_length + 1.5
-    start = beside - layout.lamp_spacing * int((beside - first) / layout.lamp_spacing)
-    lamps = tuple(
-        (float(s), side)
-        for side, offset in ((-1, 0.0), (1, layout.lamp_spacing / 2))
-        for s in np.arange(start + offset, last, layout.lamp_spacing)
+    start = beside - layout.lamp_spacing * int((beside - first) / (layout.lamp_spacing or 1.0))
+    lamps = (
+        tuple(
+            (float(s), side)
+            for side, offset in ((-1, 0.0), (1, layout.lamp_spacing / 2))
+            for s in np.arange(start + offset, last, layout.lamp_spacing)
+        )
+        if layout.lamp_spacing
+        else ()
     )
     buildings = tuple(b for side in (-1, 1) for b in _row_of_houses(layout, seed, side))
     trees = tuple(t for side in (-1, 1) for t in _row_of_trees(layout, seed, side, lamps))
@@ -142,10 +146,13 @@ def _row_of_houses(layout: StreetLayout, seed: int, side: int) -> list[Building]
     rng = named_generator(seed, f"houses {side}")
     first, last = layout.station_range
     houses: list[Building] = []
-    station, storeys = first - rng.uniform(0, 8), 4
+    fewest, most = round(layout.fewest_storeys), round(layout.most_storeys)
+    station, storeys = first - rng.uniform(0, 8), (fewest + most) // 2
+    flat, mansard = layout.flat_share, layout.mansard_share
     while station < last + 12:
-        storeys = int(np.clip(storeys + rng.choice([-1, 1, 0, 1, -1]), 3, 5))
-        bay, bays = float(rng.uniform(2.7, 3.3)), int(rng.integers(3, 6))
+        storeys = int(np.clip(storeys + rng.choice([-1, 1, 0, 1, -1]), fewest, most))
+        bay = float(rng.uniform(2.7, 3.3))
+        bays = int(rng.integers(round(layout.fewest_bays), round(layout.most_bays) + 1))
         houses.append(
             Building(
                 number=2 * len(houses) + (side > 0),
@@ -156,14 +163,15 @@ def _row_of_houses(layout: StreetLayout, seed: int, side: int) -> list[Building]
                 storeys=storeys,
                 setback=float(rng.choice([0.0, 0.0, 0.15, 0.3])),
                 door=int(rng.integers(bays)),
-                shop=bool(rng.random() < 0.45),
+                shop=bool(rng.random() < layout.shop_share),
                 awnings=bool(rng.random() < 0.6),
                 balconies=bool(rng.random() < 0.4),
                 flowers=bool(rng.random() < 0.4),
-                roof=("flat", "pitched", "mansard")[rng.choice(3, p=[0.25, 0.45, 0.3])],
+                roof=("flat", "pitched", "mansard")[rng.choice(3, p=[flat, 1 - flat - mansard, mansard])],
             )
         )
-        station += bay * bays + (rng.uniform(3.5, 6.5) if rng.random() < 0.16 else 0.0)
+        gap = rng.uniform(layout.shortest_gap, layout.longest_gap) if rng.random() < layout.gap_share else 0.0
+        station += bay * bays + gap
     touching = [0.0 if b.start - a.start - a.width > 0.5 else 1.0 for a, b in pairwise(houses)]
     before = [
         0.0,
@@ -186,12 +194,17 @@ def _row_of_trees(
     posts = np.array([s for s, post_side in lamps if post_side == side])
     lateral = layout.kerb_position(side) + side * (layout.kerb_width + 0.75)
     trees: list[Tree] = []
-    for slot in np.arange(first + 4.0, last, layout.tree_spacing):
+    for slot in np.arange(first + 4.0, last, layout.tree_spacing) if layout.tree_spacing else ():
         station = float(slot + rng.uniform(-1.5, 1.5))
         crown = _draw_crown(rng, station, lateral, layout)
         girth = float(rng.uniform(0.11, 0.17))
-        near_crossing = -9.0 < station - layout.crossing_station < layout.crossing_length + 2.0
-        if rng.random() < 0.12 or near_crossing or np.abs(posts - station).min(initial=np.inf) < 2.0:
+        beyond = station - layout.crossing_station
+        near_crossing = layout.has_crossing and -9.0 < beyond < layout.crossing_length + 2.0
+        if (
+            rng.random() < 1 - layout.tree_share
+            or near_crossing
+            or np.abs(posts - station).min(initial=np.inf) < 2.0
+        ):
             continue
         number = 2 * len(trees) + (side > 0)
         trees.append(Tree(number=number, station=station, lateral=lateral, girth=girth, balls=crown))
@@ -202,7 +215,7 @@ def _draw_crown(
     rng: np.random.Generator, station: float, lateral: float, layout: StreetLayout
 ) -> NDArray[np.float64]:
     """Draw balls of leaves that fill an egg shape: large ones inside, smaller ones around them."""
-    height, radius = rng.uniform(6.3, 8.3), rng.uniform(1.7, 2.2)
+    height, radius = np.array([rng.uniform(6.3, 8.3), rng.uniform(1.7, 2.2)]) * layout.tree_scale
     base = 2.7 + layout.kerb_height
     middle = np.array([station, lateral, (base + height) / 2 + 0.2])
     half = np.array([radius, radius, (height - base) / 2])
@@ -217,6 +230,7 @@ def _draw_crown(
 def _park_cars(layout: StreetLayout, seed: int, side: int) -> list[Car]:
     rng = named_generator(seed, f"cars {side}")
     first, last = layout.station_range
+    taken = named_generator(seed, f"places {side}")
     lateral = layout.kerb_position(side) - side * (layout.parking_width / 2 - 0.12)
     cars: list[Car] = []
     station = first + rng.uniform(2, 6)
@@ -228,8 +242,9 @@ def _park_cars(layout: StreetLayout, seed: int, side: int) -> list[Car]:
             facing=-side,
             model=str(rng.choice(MODELS, p=[0.4, 0.25, 0.22, 0.13])),
         )
-        crossing = -8.5 < station - layout.crossing_station < layout.crossing_length + 5.5
-        if not crossing:
+        beyond = station - layout.crossing_station
+        crossing = layout.has_crossing and -8.5 < beyond < layout.crossing_length + 5.5
+        if not crossing and taken.random() < layout.parked_share:
             cars.append(car)
         station += rng.choice([5.8, 6.4, 12.0, 20.0], p=[0.27, 0.23, 0.22, 0.28]) + rng.uniform(0, 1.0)
     return cars

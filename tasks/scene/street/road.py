@@ -33,12 +33,13 @@ def build_road(layout: StreetLayout, seed: int) -> Surfels:
     seed : the street's seed [1]
     """
     first, last = layout.station_range
-    crossing = (layout.crossing_station, layout.crossing_station + layout.crossing_length)
+    begin = layout.crossing_station
+    crossing = (begin, begin + layout.crossing_length) if layout.has_crossing else ()
     stops = [first, -2.0, *crossing, layout.route_length + 3.0]
     while stops[-1] < last:
         stops.append(min(stops[-1] + 0.6 * (stops[-1] - layout.route_length) + 2.0, last))
     stretches = [
-        _lay_cells(layout, seed, start, stop, is_crossing=start == crossing[0])
+        _lay_cells(layout, seed, start, stop, is_crossing=start in crossing[:1])
         for start, stop in pairwise(stops)
     ]
     s, d, length, width, mark = np.concatenate(stretches, axis=1)
@@ -127,7 +128,10 @@ def _cross_section(layout: StreetLayout, is_crossing: bool) -> tuple[NDArray[np.
     lines = [-layout.lane_width / 2, layout.lane_width / 2, 1.5 * layout.lane_width]
     breaks = [right, *(line + side * half for line in lines for side in (-1, 1)), left]
     # the wide intervals are cut where the nearest view changes, so that cells grow outward
-    cuts = np.sort(np.concatenate([breaks, [-0.875, 0.0, 0.875, 3.0, 4.2, 6.3]]))
+    further = [
+        cut for cut in (-0.875, 0.0, 0.875, 3.0, 4.2, 6.3) if np.abs(cut - np.array(breaks)).min() > 0.02
+    ]
+    cuts = np.sort(np.concatenate([breaks, [cut for cut in further if right < cut < left]]))
     kinds = dict(zip(breaks[1:-1:2], ["solid", "dashed", "solid"], strict=True))
     return cuts, [kinds.get(edge, "asphalt") for edge in cuts[:-1]]
 
@@ -139,4 +143,4 @@ def _is_on_paint(layout: StreetLayout, s: NDArray[np.float64], d: NDArray[np.flo
     for middle in (-layout.lane_width / 2, layout.lane_width / 2):
         line |= np.abs(d - middle) < layout.marking_width / 2 + margin
     along = s - layout.crossing_station
-    return line | (along > -margin) & (along < layout.crossing_length + margin)
+    return line | layout.has_crossing & (along > -margin) & (along < layout.crossing_length + margin)

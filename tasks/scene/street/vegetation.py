@@ -114,6 +114,8 @@ def _build_wood(tree: Tree, ground: float, rng: np.random.Generator) -> list[Sur
 def build_gardens(layout: StreetLayout, buildings: tuple[Building, ...], seed: int) -> Surfels:
     """Build low walls, hedges, lawns and shrubs in the gaps between houses, classes other, vegetation and terrain.
 
+    Where the ground is open, a gap stays open too.
+
     Parameters
     ----------
     layout : dimensions
@@ -123,7 +125,7 @@ def build_gardens(layout: StreetLayout, buildings: tuple[Building, ...], seed: i
     parts = []
     for house, after in pairwise(buildings):
         start, stop = house.start + house.width, after.start
-        if house.side == after.side and stop - start > 1.0:
+        if house.side == after.side and stop - start > 1.0 and layout.open_ground == 0:
             parts += _build_garden(layout, seed, house.side, start, stop)
     return join_surfels(parts)
 

@@ -11,9 +11,7 @@ from catalogs.entries import load
 from catalogs.road_grade import ROAD_GRADE
 from catalogs.scenes import write_scene
 from flows.auditing.audit import audit_dataset
-from flows.auditing.driven_lines import Asked, drive_clip, is_driven
 from flows.auditing.explain import explain_frame
-from flows.auditing.kept_lines import list_lines
 from flows.auditing.repair import repair_dataset
 from flows.judging.physics import audit_physics, clip_columns, clip_facts
 from flows.judging.physics_constants import read_constants
@@ -23,6 +21,8 @@ from flows.making.generate import generate_dataset
 from flows.making.plan import make_plan, read_plan
 from flows.store.layout import Layout
 from flows.store.telemetry import columns_hash
+from studies.lineage.driven_lines import Asked, drive_clip, is_driven
+from studies.lineage.kept_lines import list_lines
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.eval.physics.audit import audit_clip

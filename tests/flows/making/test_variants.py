@@ -12,9 +12,7 @@ from catalogs.entries import load
 from catalogs.grids import FaultyGrid, GridFile
 from catalogs.scenes import write_scene
 from flows.auditing.audit import audit_dataset
-from flows.auditing.driven_lines import Asked, drive_clip, is_driven, move_lines
 from flows.auditing.explain import explain_frame
-from flows.auditing.kept_lines import list_lines
 from flows.auditing.repair import repair_dataset
 from flows.exporting.export import export_dataset
 from flows.judging.physics import audit_physics, clip_columns, clip_facts
@@ -30,6 +28,8 @@ from flows.reading.report import summarise_run
 from flows.store.frames import read_clip
 from flows.store.sealed import read_manifest
 from manifests.explain import find_input_differences
+from studies.lineage.driven_lines import Asked, drive_clip, is_driven, move_lines
+from studies.lineage.kept_lines import list_lines
 from tasks.errors import InputError
 from tests.toy_street import TOY_CAMERA, toy_street
 

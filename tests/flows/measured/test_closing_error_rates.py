@@ -3,10 +3,9 @@
 import pytest
 
 from catalogs.effects.truths import load_truths
-from catalogs.studies.closing import load_error_rates
 from flows.measured import closing_error_rates
-from flows.measured.closing_benchmark_summary import summarise_benchmark
-from flows.measured.closing_error_rates import tell_error_rates
+from flows.measured.closing_error_rates import describe_error_rates, load_error_rates
+from studies.closing_benchmark.summary import summarise_benchmark
 
 
 def row(kind: str, truth: str | None, outcome: str, named: list[str], seed: int) -> dict[str, object]:
@@ -27,7 +26,7 @@ def test_it_names_what_was_right_and_what_was_taken_for_the_effect(monkeypatch: 
     rates = summarise_benchmark(rows) | {"engine_sha256": "e" * 64}
     monkeypatch.setattr(closing_error_rates, "load_error_rates", lambda: rates)
     monkeypatch.setattr(closing_error_rates, "engine_hash", lambda: "f" * 64)
-    page = "; ".join(tell_error_rates(["brake_lag", "headwind"]))
+    page = "; ".join(describe_error_rates(["brake_lag", "headwind"]))
     assert "nothing is missing: something named in 1 of 2 (95 % interval 1.3 to 98.7 %)" in page
     assert "named exactly in 1 of 3" in page
     assert "brake_lag in the data: 1 refused, 1 right" in page
@@ -35,10 +34,10 @@ def test_it_names_what_was_right_and_what_was_taken_for_the_effect(monkeypatch: 
     assert "headwind: not among the effects that were tried" in page
     assert page.endswith("counted with engine eeeeeeeeeeee; this verdict is of ffffffffffff")
     rates["repeated_by"] = {"engine_sha256": "f" * 64, "campaigns": 57}
-    page = "; ".join(tell_error_rates(["brake_lag"]))
+    page = "; ".join(describe_error_rates(["brake_lag"]))
     assert page.endswith("which judged 57 of those campaigns again, with the same digits")
     monkeypatch.setattr(closing_error_rates, "engine_hash", lambda: "e" * 64)
-    assert "engine" not in "; ".join(tell_error_rates(["brake_lag"]))
+    assert "engine" not in "; ".join(describe_error_rates(["brake_lag"]))
 
 
 def test_the_counts_that_ship_have_nulls_and_every_truth() -> None:

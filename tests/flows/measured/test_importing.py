@@ -11,7 +11,7 @@ import yaml
 from catalogs.campaigns import read_campaign
 from catalogs.channel_maps.tolerances import RunTolerances, Tolerances, load_assumed_tolerances
 from catalogs.entries import entry_names, load
-from flows.commands.measured_results import shorten_import
+from flows.commands.measured import shorten_import
 from flows.measured.importing import import_measurements
 from tasks.campaign.campaign import CHANNELS
 from tasks.errors import InputError

@@ -9,7 +9,7 @@ import pytest
 
 from flows.pages.figures import Figure, Line, Panel, Style, as_plotly
 from flows.pages.writer import Cell, Command, Picture, Section, Table, make_policy, write_page
-from flows.studies.vehicle_model import run_sensitivity
+from studies.paper.sensitivity import run_sensitivity
 from tests.browsers import find_barriers, open_chromium
 
 HOSTILE = [

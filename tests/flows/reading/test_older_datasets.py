@@ -8,7 +8,6 @@ import pyarrow.parquet as pq
 import pytest
 
 import musync
-from flows.auditing import lineage
 from flows.auditing.audit import audit_dataset
 from flows.auditing.dataset_diff import compare_datasets
 from flows.auditing.explain import explain_frame
@@ -18,6 +17,7 @@ from flows.reading.query import query_dataset
 from flows.reading.report import make_report
 from flows.store.layout import Layout
 from flows.store.telemetry import read_columns
+from studies.lineage import trace as lineage
 from tests.flows.older import make_older
 
 LATER = (

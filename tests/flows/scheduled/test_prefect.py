@@ -17,10 +17,10 @@ import pytest
 import yaml
 from prometheus_client.parser import text_string_to_metric_families
 
-from benchmarks import scheduled_runs
 from flows.making.generate import generate_dataset
 from flows.scheduled.scheduling import checked_parameters
 from manifests.provenance import SOURCE_ROOT
+from studies import scheduled_runs
 from tests.toy_street import write_toy_grid
 
 RUNS = """

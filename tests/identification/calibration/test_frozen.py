@@ -12,8 +12,8 @@ from catalogs.effects import load_effects
 from catalogs.entries import entry_names, find_entry, load
 from catalogs.vehicles import open_vehicle
 from flows.cli import app
+from flows.measured.agreement import measure_agreement
 from flows.measured.calibration import calibrate_on_traces
-from flows.studies.vehicle_model import measure_agreement
 from manifests.canonical import sha256_of_file
 from tasks.errors import InputError
 from tests.flows.measured.findings import found_effect, found_form, grown_file

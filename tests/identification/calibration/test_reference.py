@@ -6,7 +6,7 @@ import pytest
 
 from catalogs.references import trace_file
 from catalogs.vehicles import open_vehicle
-from flows.studies.vehicle_model import measure_agreement
+from flows.measured.agreement import measure_agreement
 from manifests.canonical import sha256_of_file
 
 # docs/evidence/calibration.md, "Before and after"; speed [m/s], pitch [deg], slip [1], wheel load [N]

@@ -7,8 +7,8 @@ import yaml
 
 from catalogs.entries import find_entry, load
 from catalogs.references import read_reference
+from flows.measured.agreement import agreement_of
 from flows.measured.calibration import calibrate_on_traces, calibration_case
-from flows.studies.vehicle_model import agreement_of
 from tasks.identification.calibration.identifiability import (
     compute_staged_information,
     summarise_information,

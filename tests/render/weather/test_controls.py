@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from catalogs.entries import load
-from tasks.errors import InputError
 from tasks.render.weather.controls import air_controls, road_controls
 from tasks.surface.anchors import adjacent_anchors
 from tasks.surface.weather import Weather, surface_state
@@ -56,19 +55,19 @@ def test_the_road_follows_from_its_state_alone_and_both_act_in_the_renderer(kind
     harder = replace(state, precipitation_mm_h=2 * state.precipitation_mm_h)
     assert road_controls(harder, look) == road_controls(state, look)
     for one in (state, harder):
-        overcast = weather_over(road(), clear_sky(), one, parameters)[1].overcast
-        assert overcast.road == road_controls(one, look)
-        assert overcast.air.extinction == overcast.atmosphere.extinction
-        assert overcast.population is overcast.atmosphere.population
+        outside = weather_over(road(), clear_sky(), one, parameters)[1].outside
+        assert outside.road == road_controls(one, look)
+        assert outside.air.extinction == outside.atmosphere.extinction
+        assert outside.population is outside.atmosphere.population
         assert (
-            overcast.atmosphere.extinction
-            == air_controls(kind, one.precipitation_mm_h, parameters).extinction
+            outside.atmosphere.extinction == air_controls(kind, one.precipitation_mm_h, parameters).extinction
         )
 
 
-def test_clear_air_has_no_controls(parameters):
-    with pytest.raises(InputError, match="only weather under cloud"):
-        air_controls("dry", 0.0, parameters)
+def test_dry_air_holds_haze_alone(parameters):
+    air = air_controls("dry", 0.0, parameters, visual_range_m=3000.0)
+    assert air.population is None
+    assert air.visual_range_m == pytest.approx(3000.0)
 
 
 def test_a_rate_between_two_anchors_has_these_two(surface):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tasks.render.composition import LUMINANCE
 from tasks.render.weather.atmosphere import (
     air_layer,
     extinction_of_visual_range,
@@ -12,14 +13,15 @@ from tasks.render.weather.atmosphere import (
     optical_depth,
     precipitating_air,
 )
+from tasks.render.weather.clouds import draw_closed_sky
 from tasks.render.weather.falling.precipitation import make_population
 from tasks.render.weather.layer import recompose_layers
 from tasks.render.weather.rays import pixel_rays
 from tasks.render.weather.sky import (
-    LUMINANCE,
     cloud_transmittance,
     light_from,
-    overcast_environment,
+    replace_sky,
+    row_elevations,
     sky_light,
 )
 from tests.render.weather.conftest import shutter
@@ -38,6 +40,15 @@ def air(parameters):
 @pytest.fixture
 def sky(parameters, air):
     return sky_light(WHITE, 0.6, air.extinction, 0.1, parameters.sky)
+
+
+def cloud_over(environment, sky, air, parameters, snow=0.0):
+    """The environment under closed cloud of seed 1."""
+    p, elevation = parameters.sky, row_elevations(len(environment))
+    fade = air.extinction * p.cloud_base_m
+    above = elevation[elevation > 0]
+    rows = draw_closed_sky(sky.airlight, sky.gradient, fade, p.clouds, 1, above, environment.shape[1])
+    return replace_sky(environment, rows, sky, air.extinction, p, snow)
 
 
 def test_visual_range_is_where_contrast_falls_to_its_threshold():
@@ -71,20 +82,17 @@ def test_cloud_takes_three_quarters_of_the_light_and_more_when_it_rains_hard(par
 
 
 def test_the_sun_is_gone_from_the_overcast_environment(parameters, sky, air):
-    cloudy = overcast_environment(clear_sky(), sky, air.extinction, parameters.sky, 1)
+    cloudy = cloud_over(clear_sky(), sky, air, parameters)
     up = cloudy[:16]
     assert up.max() < 1.5 * sky.zenith.max()
     assert up.std(axis=(0, 1)).max() < 0.1
-    assert (
-        cloudy.tobytes()
-        == overcast_environment(clear_sky(), sky, air.extinction, parameters.sky, 1).tobytes()
-    )
+    assert cloudy.tobytes() == cloud_over(clear_sky(), sky, air, parameters).tobytes()
 
 
 def test_what_stands_dark_against_the_clear_sky_stays_and_fades(parameters, sky, air):
     environment = clear_sky(64)
     environment[28:32, 20:24] = 0.01
-    cloudy = overcast_environment(environment, sky, air.extinction, parameters.sky, 1)
+    cloudy = cloud_over(environment, sky, air, parameters)
     hill, beside = cloudy[30, 22], cloudy[30, 40]
     assert np.all(hill < beside)
     through = np.exp(-air.extinction * parameters.sky.far_field_m)
@@ -94,12 +102,12 @@ def test_what_stands_dark_against_the_clear_sky_stays_and_fades(parameters, sky,
 def test_ground_below_the_horizon_is_as_near_as_the_eye_is_high_and_white_under_snow(parameters, sky, air):
     """Straight down it lies at 1.4 m, through air that takes under half a percent; far fog is no ground."""
     dark = np.where(np.arange(64)[:, None, None] < 32, clear_sky(64), np.float32(0))
-    bare = overcast_environment(dark, sky, air.extinction, parameters.sky, 1)
+    bare = cloud_over(dark, sky, air, parameters)
     assert bare[-1].max() < 0.01 * sky.airlight.max()
     down = np.sin((np.arange(33, 64) + 0.5 - 32) / 64 * np.pi)
     through = np.exp(-air.extinction * 1.4 / down)
     np.testing.assert_allclose(bare[33:, 0], np.outer(1 - through, sky.airlight), rtol=1e-3)
-    white = overcast_environment(dark, sky, air.extinction, parameters.sky, 1, snow=1.0)
+    white = cloud_over(dark, sky, air, parameters, snow=1.0)
     np.testing.assert_allclose(white[-1, 0], sky.ground, rtol=0.05)
     np.testing.assert_array_equal(white[:32], bare[:32])
 
@@ -114,7 +122,7 @@ def test_the_sky_is_replaced_and_the_street_relit(parameters, sky, air):
     view = shutter(width=96, height=64, focal=80.0)
     picture, gbuffer = flat_gbuffer(view)
     clear = clear_sky()
-    cloudy = overcast_environment(clear, sky, air.extinction, parameters.sky, 1)
+    cloudy = cloud_over(clear, sky, air, parameters)
     lit = recompose_layers(
         picture, [light_layer(picture, gbuffer, see_sky(clear, view), see_sky(cloudy, view), sky)]
     )

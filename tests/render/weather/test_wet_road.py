@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from tasks.conventions import SemanticClass
+from tasks.render.composition import LUMINANCE
 from tasks.render.weather.layer import recompose_layers
 from tasks.render.weather.rays import pixel_rays
-from tasks.render.weather.sky import LUMINANCE, sky_light
+from tasks.render.weather.sky import sky_light
 from tasks.render.weather.wet import wet_road
 from tasks.render.weather.wet.lobe import average_over_lobe
 from tasks.render.weather.wet.puddles import compute_struck_slope, compute_wetness, water_surface

@@ -107,7 +107,7 @@ def snow_layer(
     ----------
     gaussians : the scene with the clip's road edit
     field : its coverage field
-    white : [3] radiance of a white surface lying on the road, as the scene's colours have it [1]
+    white : [3] or [N, 3] radiance of a white surface lying on the road, or there, as the scene's colours have it [1]
     amount : how much snow lies
     parameters : how snow lies and looks
     lift : [N] height of a road feature under each Gaussian, as `road_anchors` takes it [m]
@@ -146,7 +146,7 @@ def snow_layer(
     thin = np.argmin(scales, axis=1)
     scales[np.arange(len(index)), thin] = np.clip(0.3 * rise, 1e-3, 5e-3)
 
-    colour = _snow_colour(lumps, tracks[on], white, p)
+    colour = _snow_colour(lumps, tracks[on], _at(white, index), p)
     if gaussians.display_encoded:
         colour = to_display_unclipped(colour)
     sh = np.zeros((len(index), *gaussians.sh.shape[1:]), dtype=np.float32)
@@ -207,7 +207,7 @@ def whiten_gaussians(
     ----------
     gaussians : the scene
     field : its coverage field
-    white : [3] radiance of a white surface lying on the road, as the scene's colours have it [1]
+    white : [3] or [N, 3] radiance of a white surface lying on the road, or there, as the scene's colours have it [1]
     amount : how much snow lies
     parameters : how snow lies and looks
 
@@ -234,6 +234,11 @@ def whiten_gaussians(
     even = np.zeros(len(gaussians))
     snow = _snow_colour(even, even, white, p)
     return recolour_gaussians(gaussians, (1 - hidden) * damp, hidden[:, None] * snow)
+
+
+def _at(white: NDArray[np.floating], index: NDArray[np.int64]) -> NDArray[np.floating]:
+    """The light at some Gaussians, or everywhere."""
+    return white[index] if np.ndim(white) == 2 else white
 
 
 def _steepness(

@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.conventions import ROAD_CLASSES, SemanticClass
+from tasks.render.composition import LUMINANCE
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.weather.falling.particles import Shutter
 from tasks.render.weather.layer import Layer
-from tasks.render.weather.sky import LUMINANCE, SkyLight
+from tasks.render.weather.sky import SkyLight
 from tasks.render.weather.wet.lobe import average_over_lobe
 from tasks.render.weather.wet.puddles import (
     RoadWaterParameters,

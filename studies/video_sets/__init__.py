@@ -1,0 +1,1 @@
+"""Edited videos of many models judged by one protocol: ``musync lab judge-set``."""

@@ -1,0 +1,111 @@
+"""Grain of road, paving, walls and earth that is finer than a disc, drawn at every pixel that resolves it.
+
+The discs of a generated street carry its colours down to some pixels of a 480x320 picture. Closer by, and with a longer
+focal length, the camera sees more: stones, sand, roughcast. Band-limited noise that is fixed to the world's coordinates
+modulates the blended colour there. Each octave fades in between two and four pixels a wave, so that no picture aliases,
+and a pixel's cost does not depend on the street.
+"""
+
+from dataclasses import replace
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.conventions import SemanticClass
+from tasks.render.rasterise.gbuffer import GBuffer
+
+WAVES = np.array([0.008, 0.016, 0.032, 0.064, 0.128])
+"""Wavelengths of the octaves [m]."""
+DEVIATION = {
+    SemanticClass.ROAD: 0.12,
+    SemanticClass.MARKING: 0.05,
+    SemanticClass.KERB: 0.06,
+    SemanticClass.SIDEWALK: 0.06,
+    SemanticClass.BUILDING: 0.045,
+    SemanticClass.TERRAIN: 0.16,
+}
+"""Relative deviation of the reflectance by one octave; declared, after photographs of dense asphalt and plaster [1]."""
+BRIGHTEST = 0.5
+"""Linear light from which nothing shows: lying snow is smooth [1]."""
+_TILE = 256
+_TEXELS_A_WAVE = 3.0
+_PIXELS_A_WAVE = 2.0
+_UPRIGHT = np.array([c in (SemanticClass.BUILDING,) for c in range(256)])
+_STRENGTH = np.array([DEVIATION.get(c, 0.0) for c in range(256)], dtype=np.float32)  # type: ignore[call-overload]
+
+
+def _draw_tile() -> NDArray[np.float32]:
+    """Return noise of waves about three texels long that repeats at its edges, of deviation 1, float32 [256, 256]."""
+    white = np.random.Generator(np.random.Philox(20250527)).standard_normal((_TILE, _TILE))
+    row, column = np.meshgrid(np.fft.fftfreq(_TILE), np.fft.fftfreq(_TILE), indexing="ij")
+    octaves = np.log2(np.maximum(np.hypot(row, column), 1e-6) * _TEXELS_A_WAVE)
+    noise = np.fft.ifft2(np.fft.fft2(white) * np.exp(-((octaves / 0.7) ** 2))).real
+    # rounded, so that the last bit of a library's transform does not reach a picture
+    return (noise / noise.std()).round(3).astype(np.float32)
+
+
+_NOISE = _draw_tile()
+
+
+def add_grain(gbuffer: GBuffer, T_world_camera: NDArray[np.float64], K: NDArray[np.float64]) -> GBuffer:
+    """Return the view with the grain of its surfaces in its colours; all else is as it was.
+
+    Parameters
+    ----------
+    gbuffer : one rasterised view in linear light
+    T_world_camera : [4, 4] pose [m]
+    K : [3, 3] intrinsics, pixel centres at +0.5 [px]
+    """
+    rgb = gbuffer.rgb.copy()
+    _modulate(
+        rgb, gbuffer.depth, gbuffer.class_id, np.ascontiguousarray(T_world_camera[:3]), np.ascontiguousarray(K, dtype=np.float64),
+        _NOISE, WAVES, _STRENGTH, _UPRIGHT,
+    )  # fmt: skip
+    return replace(gbuffer, rgb=rgb)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _modulate(rgb, depth, class_id, pose, K, noise, waves, strength, upright):  # type: ignore[no-untyped-def]
+    height, width = depth.shape
+    size = noise.shape[0]
+    coarsest = waves[-1]
+    for i in range(height):
+        down = (i + 0.5 - K[1, 2]) / K[1, 1]
+        for j in range(width):
+            kind = class_id[i, j]
+            deviation = strength[kind]
+            z = np.float64(depth[i, j])
+            if deviation == 0 or not z * _PIXELS_A_WAVE < coarsest * K[0, 0]:
+                continue
+            red, green, blue = rgb[i, j]
+            light = 0.2126 * red + 0.7152 * green + 0.0722 * blue
+            deviation *= max(1 - light / BRIGHTEST, 0.0)
+            across = (j + 0.5 - K[0, 2]) / K[0, 0]
+            dx = pose[0, 0] * across + pose[0, 1] * down + pose[0, 2]
+            dy = pose[1, 0] * across + pose[1, 1] * down + pose[1, 2]
+            dz = pose[2, 0] * across + pose[2, 1] * down + pose[2, 2]
+            x, y, up = pose[0, 3] + z * dx, pose[1, 3] + z * dy, pose[2, 3] + z * dz
+            if upright[kind]:
+                u, v, facing = 0.8 * x + 0.6 * y, up, 0.45
+            else:
+                u, v = x, y + up
+                facing = max(abs(dz) / np.sqrt(dx * dx + dy * dy + dz * dz), 0.02)
+            pixel = z / K[0, 0] / np.sqrt(facing)
+            total = 0.0
+            for k in range(len(waves)):
+                share = min(waves[k] / pixel / _PIXELS_A_WAVE - 1, 1.0)
+                if share <= 0:
+                    continue
+                a, b = u * _TEXELS_A_WAVE / waves[k], v * _TEXELS_A_WAVE / waves[k]
+                r, c = np.floor(a), np.floor(b)
+                ta, tb = a - r, b - c
+                r0, c0 = int(r) % size, int(c) % size
+                r1, c1 = (r0 + 1) % size, (c0 + 1) % size
+                total += share * (
+                    (1 - ta) * ((1 - tb) * noise[r0, c0] + tb * noise[r0, c1])
+                    + ta * ((1 - tb) * noise[r1, c0] + tb * noise[r1, c1])
+                )
+            gain = np.float32(max(1 + deviation * total, 0.3))
+            for channel in range(3):
+                rgb[i, j, channel] *= gain
