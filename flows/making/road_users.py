@@ -25,7 +25,7 @@ Sizes = Mapping[str, tuple[float, ...]]
 CHECK_STEP_S = 0.05
 """Time between the poses that are held against the street [s]."""
 EGO_OVERHANG_M, EGO_WIDTH_M = 0.9, 1.8
-"""Of the ego vehicle before its front axle and behind its rear one, and its width, where its start is to be free [m]."""
+"""Of the ego vehicle before its front axle and behind its rear one, and its width, to be free at its start [m]."""
 
 
 def move_road_users(

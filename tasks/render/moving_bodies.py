@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
+from tasks.render.composition import LUMINANCE
 from tasks.render.moving_light import BodyLight, find_body_light, light_body, reach_of_shade, shade_ground
 from tasks.render.rasterise.backend import Backend
 from tasks.render.rasterise.placed_body import PlacedBody, Shade
 from tasks.render.weather.layers import ClipWeather
 from tasks.render.weather.scene_light import mean_colours, to_display_unclipped
-from tasks.render.weather.sky import LUMINANCE
 from tasks.render.weather.snow.bearing import GROUND_CLASSES
 from tasks.render.weather.snow.field import LyingSnow
 from tasks.render.weather.snow.layer import whiten_gaussians
@@ -75,7 +75,7 @@ class BodiesInClip:
         self._bodies, self._scene, self._weather, self._backend = tuple(bodies), scene, weather, backend
         if not bodies:
             return
-        self._light: BodyLight = find_body_light(scene, weather)
+        self._light: BodyLight = find_body_light(scene, weathered, weather)
         self._clouds = [self._wrap(moving.body) for moving in bodies]
         self._ground = np.flatnonzero(np.isin(weathered.class_id, GROUND_CLASSES))
         self._places = weathered.means[self._ground].astype(np.float64)
@@ -132,25 +132,25 @@ class BodiesInClip:
         weather, body = self._weather, moving.body
         radiance = light_body(body, self._light, moving.T_world_body[frame])
         falls = False
-        if (overcast := weather.overcast) is not None:
-            falls = overcast.population is not None
-            film, cover = overcast.look.film, overcast.look.snow_cover
+        if (outside := weather.outside) is not None:
+            falls = outside.population is not None
+            film, cover = outside.look.film, outside.look.snow_cover
             if film is not None and body.porous:
                 soaked = compute_wetness(weather.state.film_depth_mm, film.water)
                 albedo = body.surfels.albedo.mean(axis=1)
                 ratio = wet_albedo_ratio(albedo, film.refractive_index, film.diffuse_reflectance)
                 radiance *= (1 - soaked * (1 - ratio))[:, None]
-            if cover is not None and overcast.snow is not None:
+            if cover is not None and outside.snow is not None:
                 amount = LyingSnow(
-                    coverage=overcast.road.snow_coverage,
-                    depth_mm=overcast.road.snow_depth_mm,
+                    coverage=outside.road.snow_coverage,
+                    depth_mm=outside.road.snow_depth_mm,
                     full_cover_mm=weather.pavement.full_cover_depth_mm,
                 )
                 # snow lies on a body as it did where the body stood first
                 standing = _stand(_colour_cloud(self._wrap(body), radiance, False), moving.T_world_body[0])
                 standing = replace(standing, display_encoded=False)
                 radiance = mean_colours(
-                    whiten_gaussians(standing, overcast.snow, self._light.white, amount, cover)
+                    whiten_gaussians(standing, outside.snow, self._light.white, amount, cover)
                 )
         if braking or falls:
             white = float(LUMINANCE @ self._light.white)

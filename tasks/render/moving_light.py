@@ -9,11 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tasks.conventions import SemanticClass
+from tasks.render.composition import LUMINANCE
 from tasks.render.weather.ground_grid import read_between
 from tasks.render.weather.layers import ClipWeather
 from tasks.render.weather.relief import clear_light
-from tasks.render.weather.scene_light import GroundLight
-from tasks.render.weather.sky import LUMINANCE, light_from
+from tasks.render.weather.scene_light import GroundLight, ground_light
+from tasks.render.weather.sky import light_from
+from tasks.scene.gaussians import Gaussians
 from tasks.scene.road_users.bodies import Body
 from tasks.scene.scene import Scene
 
@@ -57,34 +60,44 @@ class BodyLight:
         return np.clip((relative - (1 - self.sun_share)) / self.sun_share, 0, 1)
 
 
-def find_body_light(scene: Scene, weather: ClipWeather) -> BodyLight:
-    """Return the light on bodies, read off the scene and its weather.
+def find_body_light(scene: Scene, weathered: Gaussians, weather: ClipWeather) -> BodyLight:
+    """Return the light on bodies: that of the clip's sky where it is known, else what the scene's road tells.
 
     Parameters
     ----------
-    scene : in clear weather
+    scene : in its own light
+    weathered : its Gaussians in the light of the clip
     weather : of the clip
     """
-    p = weather.parameters.sky
-    if weather.overcast is not None:
-        sky = weather.overcast.sky
-        flat = float(LUMINANCE @ light_from(sky, np.array(1.0), p))
-        level = float(LUMINANCE @ light_from(sky, np.array(-1.0), p))
+    p, outside = weather.parameters.sky, weather.outside
+    if outside is None:
+        light = clear_light(scene.gaussians, scene.environment, p, scene.to_sun)
+        lit = light.shade.lit if light.shade is not None else np.full(3, light.ground)
+        return BodyLight(
+            white=lit / p.asphalt_albedo,
+            sun_share=light.sun_share,
+            to_sun=light.to_sun,
+            ground=p.asphalt_albedo,
+            shade=light.shade,
+        )
+    sky, daylight = outside.sky, outside.daylight
+    if daylight is not None and daylight.has_sun:
+        sun, above, around = (float(LUMINANCE @ colour) for colour in daylight.colours)
+        falling = sun * float(daylight.to_sun[2])
         return BodyLight(
             white=sky.clear_white,
-            sun_share=0.0,
-            to_sun=np.array((0.0, 0.0, 1.0)),
-            ground=level / flat,
-            shade=None,
+            sun_share=falling / (falling + above),
+            to_sun=daylight.to_sun,
+            ground=around / (falling + above),
+            shade=ground_light(weathered, SemanticClass.ROAD),
         )
-    light = clear_light(scene.gaussians, scene.environment, p, scene.to_sun)
-    lit = light.shade.lit if light.shade is not None else np.full(3, light.ground)
+    flat, level = (float(LUMINANCE @ light_from(sky, np.array(up), p)) for up in (1.0, -1.0))
     return BodyLight(
-        white=lit / p.asphalt_albedo,
-        sun_share=light.sun_share,
-        to_sun=light.to_sun,
-        ground=p.asphalt_albedo,
-        shade=light.shade,
+        white=sky.clear_white,
+        sun_share=0.0,
+        to_sun=np.array((0.0, 0.0, 1.0)),
+        ground=level / flat,
+        shade=None,
     )
 
 

@@ -73,10 +73,10 @@ def test_arrays_say_their_dimensions_and_camera(layout):
 
 
 def test_arrays_carry_unit_and_meaning_and_the_names_of_their_codes(tmp_path):
-    create_arrays(tmp_path / "frames", (1, *SHAPE), True, {})
+    create_arrays(tmp_path / "frames", (1, *SHAPE), True, {}, objects=True)
     group = zarr.open_group(tmp_path / "frames", mode="r")
     assert {name: array.attrs["units"] for name, array in group.arrays()} == {
-        "rgb": "1", "depth": "m", "class": "1", "normal": "1", "road": "m", "flow": "px", "marks": "1",
+        "rgb": "1", "depth": "m", "class": "1", "instance": "1", "normal": "1", "road": "m", "flow": "px", "marks": "1",
     }  # fmt: skip
     for name, array in EVERY_ARRAY.items():
         assert group[name].attrs["long_name"] == group[name].attrs["description"] == array.channel.description
