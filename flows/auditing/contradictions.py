@@ -19,7 +19,7 @@ from flows.making.plan import Plan
 from flows.making.seal import SHEET
 from flows.making.summaries import SUMMARIES, summarise_clips
 from flows.store.arrays import arrays_of
-from flows.store.layout import STAGED_TABLES, Layout, encode_json
+from flows.store.layout import OBJECTS, STAGED_TABLES, Layout, encode_json
 from flows.store.links import require_file
 from flows.store.parquet_files import refuse_footer
 from flows.store.sealed import read_plan_record
@@ -168,6 +168,8 @@ def _compare_files(layout: Layout, manifest: Manifest, plan: Plan) -> Iterator[s
     )
     for made in plan.clips:
         planned |= {layout.relative(layout.frame_shard(name, made.index)): made.clip_id for name in arrays}
+        if plan.settings.has_objects:
+            planned[layout.relative(layout.object_table(made.index))] = made.clip_id
     recorded = {path: clip_id for path, (_, clip_id) in recorded_files(manifest).items()}
     for path in sorted(recorded.keys() ^ planned.keys()):
         is_recorded = path in recorded
@@ -181,7 +183,7 @@ def _compare_files(layout: Layout, manifest: Manifest, plan: Plan) -> Iterator[s
                 f"manifest.json: {path} must be a file of {_name_owner(planned[path])}; it is recorded as one of"
                 f" {_name_owner(recorded[path])}"
             )
-    contents = {*STAGED_TABLES, *arrays}
+    contents = {*STAGED_TABLES, *arrays, *([OBJECTS] if plan.settings.has_objects else [])}
     for clip in manifest["clips"]:
         passed, reasons = clip["verdict"]["passed"], clip["verdict"]["reasons"]
         if (passed is True) == bool(reasons):

@@ -69,17 +69,10 @@ def render_frames(
         catalogue.marking,
         catalogue.weather_parameters.sky.asphalt_albedo,
     )
-    sizes, time = catalogue.road_user_sizes, frames["tick"] / TICK_RATE_HZ
-    motions = move_road_users(scenario, sizes, catalogue.scene, state.friction, time)
     buffers = render_clip(
         replace(catalogue.scene, gaussians=gaussians),
         catalogue.camera,
-        RigMotion(
-            T_world_rig=frames["T_world_rig"].reshape(-1, 4, 4),
-            frame_rate_hz=plan.settings.frame_rate_hz,
-            rig_at=rig_at,
-            bodies=build_moving_bodies(scenario, sizes, motions),
-        ),
+        gather_motion(scenario, state, frames, plan, catalogue, rig_at),
         ClipConditions(
             state=state,
             pavement=catalogue.surface,
@@ -96,6 +89,25 @@ def render_frames(
     if plan.settings.has_objects and not scenario.objects:
         buffers["instance"] = np.zeros(buffers["class"].shape, np.uint16)
     return buffers
+
+
+def gather_motion(
+    scenario: Scenario,
+    state: SurfaceState,
+    frames: Mapping[str, NDArray[Any]],
+    plan: Plan,
+    catalogue: Catalogue,
+    rig_at: RigAt,
+) -> RigMotion:
+    """Return the motion of rig and road users at a clip's frames."""
+    sizes, time = catalogue.road_user_sizes, frames["tick"] / TICK_RATE_HZ
+    motions = move_road_users(scenario, sizes, catalogue.scene, state.friction, time)
+    return RigMotion(
+        T_world_rig=frames["T_world_rig"].reshape(-1, 4, 4),
+        frame_rate_hz=plan.settings.frame_rate_hz,
+        rig_at=rig_at,
+        bodies=build_moving_bodies(scenario, sizes, motions),
+    )
 
 
 def edit_scene(

@@ -80,6 +80,7 @@ def build_moving_bodies(scenario: Scenario, sizes: Sizes, motions: list[Motion])
             number=number,
             body=build_body(user.kind, np.array(sizes[user.kind])),
             T_world_body=motion.T_world_body,
+            velocity=motion.velocity,
             braking=motion.acceleration < 0,
         )
         for number, (user, motion) in enumerate(zip(scenario.objects, motions, strict=True), start=1)

@@ -15,6 +15,8 @@ from catalogs.documents import read_json_document
 from flows.store.arrays import EVERY_ARRAY
 
 STAGED_TABLES = ("ticks", "frames")
+OBJECTS = "objects"
+"""Name of the table of road users, and of its hash in a clip's record."""
 STAGING = ".staging"
 PARTIAL = ".musync-partial"
 """End of the name of a file that is being written."""
@@ -80,6 +82,10 @@ class Layout:
         """The one file that holds a clip's frames of one array (Zarr v3 default chunk keys)."""
         further = EVERY_ARRAY[array].dimensions
         return self.frames.joinpath(array, "c", str(index), "0", "0", "0", *("0" for _ in further))
+
+    def object_table(self, index: int) -> Path:
+        """The file with a clip's road users, of a dataset that has any."""
+        return self.telemetry / "objects" / f"clip-{index:05d}.parquet"
 
     def relative(self, path: Path) -> str:
         return path.relative_to(self.root).as_posix()

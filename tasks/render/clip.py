@@ -92,7 +92,7 @@ def render_clip(
     moving = BodiesInClip(motion.bodies, scene, weathered, weather, backend)
     field = sensor_field(camera)
     T_world_camera = motion.T_world_rig @ camera.T_rig_camera
-    T_world_rows = _row_poses(camera, T_world_camera, motion.rig_at)
+    T_world_rows = pose_rows(camera, T_world_camera, motion.rig_at)
     velocity = np.gradient(T_world_camera[:, :3, 3], 1 / motion.frame_rate_hz, axis=0)
     clip: dict[str, NDArray[Any]] = {}
     for frame, pose in enumerate(T_world_camera):
@@ -177,7 +177,7 @@ def _label_flow(
     return compute_clip_flow(depth, flow_from)
 
 
-def _row_poses(
+def pose_rows(
     camera: Camera, T_world_camera: NDArray[np.float64], rig_at: RigAt | None
 ) -> list[NDArray[np.float64]] | None:
     """Return camera poses [3, H, 4, 4] of each frame at its rows' times; None where one pose serves all rows."""

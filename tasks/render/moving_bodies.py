@@ -43,12 +43,14 @@ class MovingBody:
     number : in the array of instances, from 1 on [1]
     body : in its own axes
     T_world_body : float64 [F, 4, 4] where it stands in each frame [m]
+    velocity : float64 [F, 3] of its origin, world frame [m/s]
     braking : bool [F] its stop lamps are lit
     """
 
     number: int
     body: Body
     T_world_body: Floats
+    velocity: Floats
     braking: NDArray[np.bool_]
 
 

@@ -47,7 +47,8 @@ def car(ways, heading=0.0, kind="car", lateral=0.0):
     poses[:, :2, :2] = (np.cos(heading), -np.sin(heading)), (np.sin(heading), np.cos(heading))
     poses[:, 0, 3], poses[:, 1, 3] = ways, lateral
     body = build_body(kind, np.array(load("road user sizes")[kind]))
-    return MovingBody(number=1, body=body, T_world_body=poses, braking=np.zeros(len(ways), np.bool_))
+    still = {"velocity": np.zeros((len(ways), 3)), "braking": np.zeros(len(ways), np.bool_)}
+    return MovingBody(number=1, body=body, T_world_body=poses, **still)
 
 
 def film(street, parameters, bodies, camera=CAMERA, state="dry", labels=False):
