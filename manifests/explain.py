@@ -27,6 +27,7 @@ REACHES = {
     "study.yaml": (JUDGING,),
     "weather": (RENDER,),
     "traces": (VEHICLE, RENDER),
+    "driven": (VEHICLE, RENDER),
     "scene": (RENDER,),
     "backend": (RENDER,),
     "parameters": (VEHICLE, RENDER),
@@ -196,7 +197,7 @@ def kind_of_input(name: str) -> str:
         return "tyre"
     if path.parts[0] == "road_grade":
         return "road_grade.yaml"
-    return path.parts[0] if path.parts[0] in ("weather", "traces") else name
+    return path.parts[0] if path.parts[0] in ("weather", "traces", "driven") else name
 
 
 def parse_input(name: str, content: bytes | None) -> Any:
@@ -216,6 +217,6 @@ def parse_input(name: str, content: bytes | None) -> Any:
         return ABSENT
     if kind_of_input(name) == "tyre":
         return tyre_entries(content)
-    if PurePosixPath(name).suffix == ".parquet":
+    if PurePosixPath(name).suffix in (".parquet", ".py"):
         return {"sha256": sha256_of([content])}
     return parse_yaml_value(content, name, "catalogue entry")

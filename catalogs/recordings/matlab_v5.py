@@ -112,18 +112,18 @@ def check_elements(content: bytes, most: int) -> None:
     order = {b"IM": "<", b"MI": ">"}.get(content[HEADER - 2 : HEADER])
     if order is None:
         return
-    place, total = HEADER, 0
-    while place < len(content):
-        if place + 8 > len(content):
+    offset, total = HEADER, 0
+    while offset < len(content):
+        if offset + 8 > len(content):
             raise _refuse("ends within an element")
-        kind, size = struct.unpack_from(f"{order}II", content, place)
-        element = memoryview(content)[place : place + 8 + size]
+        kind, size = struct.unpack_from(f"{order}II", content, offset)
+        element = memoryview(content)[offset : offset + 8 + size]
         if kind == COMPRESSED:
             unpacked = _unpack(bytes(element[8:]), most - total)
             total += len(unpacked)
             element = memoryview(unpacked)
         _check_array(element, order, 0)
-        place += 8 + size
+        offset += 8 + size
 
 
 def _unpack(packed: bytes, most: int) -> bytes:
@@ -152,10 +152,10 @@ def _check_array(element: memoryview, order: str, depth: int) -> None:
     if not CELL <= array_class <= OPAQUE:
         raise _refuse("has an array of an unknown class")
     holds_arrays = array_class in (CELL, STRUCTURE, OBJECT, FUNCTION, OPAQUE)
-    for place, (kind, content) in enumerate(parts[1:], start=1):
+    for index, (kind, content) in enumerate(parts[1:], start=1):
         if kind == MATRIX and holds_arrays:
             _check_array(content, order, depth + 1)
-        elif kind not in NUMBERS and not (kind in TEXT and (array_class == CHARACTERS or place == NAME)):
+        elif kind not in NUMBERS and not (kind in TEXT and (array_class == CHARACTERS or index == NAME)):
             raise _refuse("has an element of a type that cannot stand in its array")
     if not holds_arrays and len(parts) != 3 + (3 if array_class == SPARSE else 1) + is_complex:
         raise _refuse("has an array with too many or too few elements")
@@ -171,23 +171,23 @@ def _check_field_names(parts: list[tuple[int, memoryview]], order: str) -> None:
 
 def _split(content: memoryview, order: str) -> Iterator[tuple[int, memoryview]]:
     """Yield the type and the content of each element; an array's content keeps its tag."""
-    place = 0
-    while place < len(content):
-        if place + 8 > len(content):
+    offset = 0
+    while offset < len(content):
+        if offset + 8 > len(content):
             raise _refuse("ends within an element")
-        kind, size = struct.unpack_from(f"{order}II", content, place)
+        kind, size = struct.unpack_from(f"{order}II", content, offset)
         small = kind >> 16
         if small:  # up to 4 bytes stand in the tag itself
             if small > 4:
                 raise _refuse("has an element with a wrong tag")
-            yield kind & 0xFFFF, content[place + 4 : place + 4 + small]
-            place += 8
+            yield kind & 0xFFFF, content[offset + 4 : offset + 4 + small]
+            offset += 8
             continue
-        end = place + 8 + size
+        end = offset + 8 + size
         if end > len(content):
             raise _refuse("ends within an element")
-        yield kind, content[place:end] if kind == MATRIX else content[place + 8 : end]
-        place = end + -size % 8
+        yield kind, content[offset:end] if kind == MATRIX else content[offset + 8 : end]
+        offset = end + -size % 8
 
 
 def _refuse(fault: str) -> InputError:

@@ -12,6 +12,7 @@ from catalogs.scenes import load_scene
 from catalogs.studies.ablation import cut_coupling
 from catalogs.variants import warn_of_variant
 from flows.making.catalogue import Catalogue
+from flows.making.driven import refuse_driven
 from flows.making.driving import collect_surface_depths, controls_of, hazard_of, surface_of, weather_of
 from flows.making.input_changes import refuse_changed_records
 from flows.making.places import find_scene
@@ -58,6 +59,7 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
     manifest, plan = read_manifest(layout), read_plan(layout.root)
     refuse_changed_records(layout, manifest)
     refuse_traced(plan.inputs, dataset, "explain")
+    refuse_driven(plan.inputs, dataset, "explain")
     problems: list[str] = []
     planned = None
     try:

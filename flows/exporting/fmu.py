@@ -245,7 +245,7 @@ def _add_variable(
 ) -> None:
     fixed = {"parameter": {"causality": "parameter", "variability": "fixed"}, "input": {"causality": "input"}}
     roles = fixed.get(row.role, {"causality": "output", "initial": "calculated"})
-    if row.kind != "real":
+    if row.kind != "real" and row.role != "parameter":
         roles |= {"variability": "discrete"}
     said = {"name": row.name, "valueReference": str(place), "description": description}
     variable = ElementTree.SubElement(parent, "ScalarVariable", said | roles)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from catalogs.clip_prompts import load_prompts
+from catalogs.entries import load
 from catalogs.learned_judges import LoadedJudge
 from flows.judging.evaluation_rows import figure_row, find_control, group_weather_families
 from flows.judging.judged_clip import JudgedClip, Row, View
@@ -139,7 +139,7 @@ def score_pictures(
         scores["temporal_lpips"] = FlowAlignedDistance(network=lpips).score(frames)
     clip = judges["clip"]
     if clip.network is not None and clip.text_features is not None:
-        features = dict(zip(load_prompts(), clip.text_features, strict=True))
+        features = dict(zip(load("list of prompts"), clip.text_features, strict=True))
         scores |= {
             f"clip_{kind}": weather_judge(clip.network, features, kind).score(frames)
             for kind in kinds

@@ -63,6 +63,7 @@ def read_grid_inputs(grid: Grid, tick_rate_hz: int) -> tuple[GridEntries, Scenes
         problems += cap_problems(find_road_user_problems(grid, entries))
     if sound and grid.poses is None:
         problems += cap_problems(find_bend_problems(grid, entries))
+    entries.contents.update(grid.driven)
     if grid.poses is not None:
         traces, found = read_trace_inputs(grid, grid.poses, entries.values.get("surface.yaml"))
         entries.contents.update(traces)

@@ -15,6 +15,7 @@ from flows.making.plan import Plan, frame_ticks
 from flows.making.road_users import build_moving_bodies, move_road_users
 from tasks.render.camera import RigAt, body_poses, continuous_rig
 from tasks.render.clip import RigMotion, render_clip
+from tasks.render.feature_sign import add_sign
 from tasks.render.kerb_face import extend_kerbs
 from tasks.render.rasterise.backend import select_backend
 from tasks.render.road_edit import RoadRelief, apply_road_profile
@@ -23,6 +24,7 @@ from tasks.render.road_refinement import refine_road
 from tasks.render.weather.layers import ClipConditions
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.scene import Scene
+from tasks.scene.street.cars.near import detail_cars
 from tasks.surface.anchors import adjacent_anchors
 from tasks.surface.road_profile import RoadHazard, road_elevation, road_slope
 from tasks.surface.state import SurfaceState
@@ -63,14 +65,26 @@ def render_frames(
     rig_at: RigAt,
 ) -> dict[str, NDArray[Any]]:
     """Render the clip's finished frames, depth and class."""
+    T_world_rig = frames["T_world_rig"].reshape(-1, 4, 4)
+    scene = catalogue.scene
+    if (street := catalogue.street) is not None:
+        scene = replace(
+            scene,
+            gaussians=detail_cars(
+                scene.gaussians,
+                *street,
+                T_world_rig @ catalogue.camera.T_rig_camera,
+                float(catalogue.camera.K[0, 0]),
+            ),
+        )
     gaussians, relief = edit_scene(
-        catalogue.scene,
+        scene,
         hazard_of(scenario),
         catalogue.marking,
         catalogue.weather_parameters.sky.asphalt_albedo,
     )
     buffers = render_clip(
-        replace(catalogue.scene, gaussians=gaussians),
+        replace(scene, gaussians=gaussians),
         catalogue.camera,
         gather_motion(scenario, state, frames, plan, catalogue, rig_at),
         ClipConditions(
@@ -102,11 +116,13 @@ def gather_motion(
     """Return the motion of rig and road users at a clip's frames."""
     sizes, time = catalogue.road_user_sizes, frames["tick"] / TICK_RATE_HZ
     motions = move_road_users(scenario, sizes, catalogue.scene, state.friction, time)
+    T_world_rig, camera = frames["T_world_rig"].reshape(-1, 4, 4), catalogue.camera
+    seen_from = T_world_rig @ camera.T_rig_camera, float(camera.K[0, 0])
     return RigMotion(
-        T_world_rig=frames["T_world_rig"].reshape(-1, 4, 4),
+        T_world_rig=T_world_rig,
         frame_rate_hz=plan.settings.frame_rate_hz,
         rig_at=rig_at,
-        bodies=build_moving_bodies(scenario, sizes, motions),
+        bodies=build_moving_bodies(scenario, sizes, motions, *seen_from),
     )
 
 
@@ -119,7 +135,7 @@ def edit_scene(
     ----------
     scene : without the feature
     hazard : road feature; height 0 leaves the scene as it is
-    marking : painted on a hump; None leaves it plain
+    marking : finish of the feature; None leaves it plain
     asphalt_albedo : share of the light that the pavement sends back [1]
     """
     if hazard.height_m == 0:
@@ -135,6 +151,8 @@ def edit_scene(
     gaussians = refine_road(scene.gaussians, relief)
     if marking is not None:
         gaussians = paint_feature(gaussians, relief, marking, *carriageway, asphalt_albedo)
+        if marking.sign is not None:
+            gaussians = add_sign(gaussians, relief, marking.sign, scene.carriageway_right, asphalt_albedo)
     return extend_kerbs(apply_road_profile(gaussians, relief, *carriageway)[0], relief), relief
 
 

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from catalogs.campaign_checks import load_campaign_checks
 from catalogs.channel_maps import ChannelMap
+from catalogs.entries import load
 from catalogs.recordings import read_signals, recording_files
 from catalogs.sentences import shorten
 from flows.measured.run_plan import PlannedRun
@@ -142,7 +142,7 @@ def _find_recording_problems(signals: dict[str, Signal], channel_map: ChannelMap
     clock = channel_map.time
     taken = clock.unit if clock is not None and clock.unit in UNITS else "s"
     recording = Recordings(signals=[signals], rules=channel_map.rules, clock_unit=taken)
-    violations = apply_checks(load_campaign_checks().recording, recording)
+    violations = apply_checks(load("table of checks").recording, recording)
     return [*find_unit_problems(channel_map.rules, signals), *(one.sentence for one in violations)]
 
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from catalogs.campaign_checks import load_campaign_checks
 from catalogs.campaign_files import MOST_SAMPLES
 from catalogs.channel_maps import ChannelMap, SegmentEntry
 from catalogs.channel_maps.conditions import Conditions
+from catalogs.entries import load
 from catalogs.names import find_name_problem
 from catalogs.sentences import cap_problems, shorten
 from tasks.campaign.channels import BRAKE_SIGNALS
@@ -140,7 +140,7 @@ def _cut_recordings(
     left_out: list[str] = []
     faulty = 0
     for file, signals in recordings.items():
-        parts = cut_segments(signals, channel_map.rules, rule, cut, load_campaign_checks())
+        parts = cut_segments(signals, channel_map.rules, rule, cut, load("table of checks"))
         if not parts:
             left_out.append(
                 f"{shorten(file.relative_to(root))}: no run, for the brake is never applied above"

@@ -89,10 +89,10 @@ def render_clip(
     )
     weathered, weather = weather_scene(clear_scene, conditions, float(camera.K[0, 0]))
     prepared = backend.prepare_gaussians(weathered)
-    moving = BodiesInClip(motion.bodies, scene, weathered, weather, backend)
     field = sensor_field(camera)
     T_world_camera = motion.T_world_rig @ camera.T_rig_camera
     T_world_rows = pose_rows(camera, T_world_camera, motion.rig_at)
+    moving = BodiesInClip(motion.bodies, scene, weathered, weather, backend, T_world_camera)
     velocity = np.gradient(T_world_camera[:, :3, 3], 1 / motion.frame_rate_hz, axis=0)
     clip: dict[str, NDArray[Any]] = {}
     for frame, pose in enumerate(T_world_camera):
@@ -102,7 +102,7 @@ def render_clip(
             normals=labels or weather.reads_normals,
             bodies=moving.place(frame), shade=moving.shade(frame),
         )  # fmt: skip
-        if scene.gaussians.surroundings is not None:
+        if scene.daylight is not None:
             gbuffer = add_grain(gbuffer, pose, field.K)
         sky = environment_view(scene.environment, view, field.K, field.width, field.height)
         shutter = Shutter(

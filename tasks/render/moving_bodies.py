@@ -21,10 +21,10 @@ from tasks.render.weather.snow.layer import whiten_gaussians
 from tasks.render.weather.wet.puddles import compute_wetness
 from tasks.render.weather.wet.wet_road import wet_albedo_ratio
 from tasks.scene.gaussians import Gaussians
-from tasks.scene.road_users.bodies import Body
+from tasks.scene.road_users.bodies import RoadUserBody
 from tasks.scene.scene import Scene
 from tasks.scene.spherical_harmonics import C0
-from tasks.scene.street.surfels import THICKNESS
+from tasks.scene.street.cars.parked import mirror_surroundings
 from tasks.scene.surroundings import add_surroundings
 
 Floats = NDArray[np.float64]
@@ -48,7 +48,7 @@ class MovingBody:
     """
 
     number: int
-    body: Body
+    body: RoadUserBody
     T_world_body: Floats
     velocity: Floats
     braking: NDArray[np.bool_]
@@ -64,6 +64,7 @@ class BodiesInClip:
     weathered : its Gaussians in the weather of the clip
     weather : of the clip
     backend : the rasteriser
+    T_world_camera : float64 [F, 4, 4] camera poses [m]
     """
 
     def __init__(
@@ -73,12 +74,14 @@ class BodiesInClip:
         weathered: Gaussians,
         weather: ClipWeather,
         backend: Backend,
+        T_world_camera: Floats,
     ) -> None:
         self._bodies, self._scene, self._weather, self._backend = tuple(bodies), scene, weather, backend
         if not bodies:
             return
         self._light: BodyLight = find_body_light(scene, weathered, weather)
         self._clouds = [self._wrap(moving.body) for moving in bodies]
+        self._mirrored = [_mirror_from(moving, T_world_camera) for moving in bodies]
         self._ground = np.flatnonzero(np.isin(weathered.class_id, GROUND_CLASSES))
         self._places = weathered.means[self._ground].astype(np.float64)
         self._tree = cKDTree(self._places[:, :2])
@@ -116,30 +119,30 @@ class BodiesInClip:
         place : of the body among those of the clip
         frame : number in the clip
         """
-        moving = self._bodies[place]
-        radiance = self._colour(moving, frame, bool(moving.braking[frame]))
+        radiance = self._colour(place, frame)
         return _colour_cloud(self._clouds[place], radiance, self._scene.gaussians.display_encoded)
 
     def _prepare(self, place: int, frame: int) -> Any:
         """Return a body's cloud in the light of a frame; under cloud that is the same wherever it stands."""
         braking = bool(self._bodies[place].braking[frame])
-        if self._light.sun_share:
-            return self._backend.prepare_gaussians(self.wrap(place, frame))
         if (place, braking) not in self._kept:
             self._kept[place, braking] = self._backend.prepare_gaussians(self.wrap(place, frame))
+        elif self._light.sun_share:
+            return self._backend.recolour(self._kept[place, braking], self.wrap(place, frame).sh)
         return self._kept[place, braking]
 
-    def _colour(self, moving: MovingBody, frame: int, braking: bool) -> Floats:
+    def _colour(self, place: int, frame: int) -> Floats:
         """Return the radiance of each Gaussian [N, 3], in clear light, with water, snow and lamps [1]."""
-        weather, body = self._weather, moving.body
-        radiance = light_body(body, self._light, moving.T_world_body[frame])
+        moving, weather = self._bodies[place], self._weather
+        body, braking = moving.body, bool(moving.braking[frame])
+        radiance = light_body(body.body, self._mirrored[place], self._light, moving.T_world_body[frame])
         falls = False
         if (outside := weather.outside) is not None:
             falls = outside.population is not None
             film, cover = outside.look.film, outside.look.snow_cover
             if film is not None and body.porous:
                 soaked = compute_wetness(weather.state.film_depth_mm, film.water)
-                albedo = body.surfels.albedo.mean(axis=1)
+                albedo = body.body.albedo.mean(axis=1)
                 ratio = wet_albedo_ratio(albedo, film.refractive_index, film.diffuse_reflectance)
                 radiance *= (1 - soaked * (1 - ratio))[:, None]
             if cover is not None and outside.snow is not None:
@@ -149,7 +152,7 @@ class BodiesInClip:
                     full_cover_mm=weather.pavement.full_cover_depth_mm,
                 )
                 # snow lies on a body as it did where the body stood first
-                standing = _stand(_colour_cloud(self._wrap(body), radiance, False), moving.T_world_body[0])
+                standing = _stand(_colour_cloud(self._clouds[place], radiance, False), moving.T_world_body[0])
                 standing = replace(standing, display_encoded=False)
                 radiance = mean_colours(
                     whiten_gaussians(standing, outside.snow, self._light.white, amount, cover)
@@ -160,28 +163,25 @@ class BodiesInClip:
             radiance[body.stop_lamps] += white * (STOP_LAMP if braking else POSITION_LAMP)
         return radiance
 
-    def _wrap(self, body: Body) -> Gaussians:
-        """Return a body's surfels as Gaussians of the scene's kind, without colour."""
-        surfels, like = body.surfels, self._scene.gaussians
-        thickness = np.minimum(THICKNESS, 0.5 * surfels.scale.min(axis=1, keepdims=True))
-        quats = Rotation.from_matrix(np.swapaxes(surfels.axes, 1, 2)).as_quat(scalar_first=True)
-        cloud = Gaussians(
-            means=surfels.centre.astype(np.float32),
-            quats_wxyz=quats.astype(np.float32),
-            scales=np.concatenate([surfels.scale, thickness], axis=1).astype(np.float32),
-            opacities=surfels.opacity.astype(np.float32),
-            sh=np.zeros((len(surfels), 1, 3), np.float32),
-            normals=surfels.axes[:, 2].astype(np.float32),
-            class_id=surfels.class_id,
-            antialiased=like.antialiased,
-            display_encoded=like.display_encoded,
-        )
+    def _wrap(self, body: RoadUserBody) -> Gaussians:
+        """Return a body's Gaussians as the scene has its own, without colour."""
+        own, like = body.body.gaussians, self._scene.gaussians
+        cloud = replace(own, antialiased=like.antialiased, display_encoded=like.display_encoded)
         return cloud if like.surroundings is None else add_surroundings(cloud)
 
 
 def _colour_cloud(cloud: Gaussians, radiance: Floats, display_encoded: bool) -> Gaussians:
     colour = to_display_unclipped(radiance) if display_encoded else radiance
     return replace(cloud, sh=((colour - 0.5) / C0).astype(np.float32)[:, None])
+
+
+def _mirror_from(moving: MovingBody, T_world_camera: Floats) -> Floats:
+    """Return what a body's lacquer and glass mirror [N, 3], as the camera sees it in the middle of the clip [1]."""
+    middle = len(T_world_camera) // 2
+    pose, own = moving.T_world_body[middle], moving.body.body
+    eye = (T_world_camera[middle, :3, 3] - pose[:3, 3]) @ pose[:3, :3]
+    place, normal = own.gaussians.means.astype(np.float64), own.gaussians.normals.astype(np.float64)
+    return mirror_surroundings(place, normal, own.gloss, eye)
 
 
 def _stand(cloud: Gaussians, T_world_body: Floats) -> Gaussians:

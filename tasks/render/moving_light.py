@@ -16,8 +16,9 @@ from tasks.render.weather.layers import ClipWeather
 from tasks.render.weather.relief import clear_light
 from tasks.render.weather.scene_light import GroundLight, ground_light
 from tasks.render.weather.sky import light_from
+from tasks.scene.bodies import Body
 from tasks.scene.gaussians import Gaussians
-from tasks.scene.road_users.bodies import Body
+from tasks.scene.road_users.bodies import RoadUserBody
 from tasks.scene.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -101,27 +102,27 @@ def find_body_light(scene: Scene, weathered: Gaussians, weather: ClipWeather) ->
     )
 
 
-def light_body(body: Body, light: BodyLight, T_world_body: Floats) -> Floats:
-    """Return the radiance [N, 3] of a body's surfels where it stands [1].
+def light_body(body: Body, mirrored: Floats, light: BodyLight, T_world_body: Floats) -> Floats:
+    """Return the radiance [N, 3] of a body's discs where it stands [1].
 
     Parameters
     ----------
     body : with reflectances
+    mirrored : float64 [N, 3] what its lacquer and glass mirror in the light of open ground [1]
     light : of the clip
     T_world_body : float64 [4, 4] [m]
     """
-    surfels = body.surfels
-    normal = surfels.axes[:, 2] @ T_world_body[:3, :3].T
+    normal = body.gaussians.normals @ T_world_body[:3, :3].T
     up = (1 + normal[:, 2]) / 2
     facing = np.maximum(normal @ light.to_sun, 0) / max(float(light.to_sun[2]), 1e-3)
     sun = light.sun_share * float(light.sun_at(T_world_body[None, :2, 3])[0])
     around = (1 - light.sun_share) * up + light.ground * (1 - up)
-    received = sun * facing + surfels.openness * around
+    received = sun * facing + body.openness * around
     brightness = float(LUMINANCE @ light.white) * (sun + (1 - light.sun_share))
-    return surfels.albedo * received[:, None] * light.white + surfels.glow * brightness
+    return body.albedo * received[:, None] * light.white + mirrored * brightness
 
 
-def shade_ground(points: Floats, body: Body, T_world_body: Floats, light: BodyLight) -> Floats:
+def shade_ground(points: Floats, body: RoadUserBody, T_world_body: Floats, light: BodyLight) -> Floats:
     """Return the share of its light that a body leaves to the ground: under and beside it, and where it hides the sun.
 
     Parameters
@@ -144,7 +145,7 @@ def shade_ground(points: Floats, body: Body, T_world_body: Floats, light: BodyLi
     return (left + (1 - light.sun_share) * ambient) / (direct + (1 - light.sun_share))
 
 
-def reach_of_shade(body: Body, light: BodyLight) -> float:
+def reach_of_shade(body: RoadUserBody, light: BodyLight) -> float:
     """Return the distance from a body's middle within which it shades the ground [m]."""
     reach = float(np.hypot(*body.size[:2])) / 2 + FARTHEST_M
     if not light.sun_share:

@@ -106,22 +106,22 @@ def _measure_visibility(
     at: Floats,
 ) -> dict[str, float]:
     """Return visibility and truncation by the surface that faces the camera, each part as large as it is seen."""
-    pose, surfels = body.T_world_body[frame], body.body.surfels
-    points = surfels.centre @ pose[:3, :3].T + pose[:3, 3]
+    pose, own = body.T_world_body[frame], body.body.body.gaussians
+    points = own.means @ pose[:3, :3].T + pose[:3, 3]
     middle = at if at.ndim == 2 else at[len(at) // 2]
     towards = middle[:3, 3] - points
     distance = np.linalg.norm(towards, axis=1)
-    cosine = np.einsum("nk,nk->n", towards, surfels.axes[:, 2] @ pose[:3, :3].T) / distance
+    cosine = np.einsum("nk,nk->n", towards, own.normals @ pose[:3, :3].T) / distance
     facing = cosine > 0
-    area = (surfels.scale.prod(axis=1) * cosine / distance**2)[facing]
+    area = (own.scales[:, :2].prod(axis=1) * cosine / distance**2)[facing]
     u, v, z = _project(points[facing], camera, at).T
     with np.errstate(invalid="ignore"):
         inside = (z > NEAREST_M) & (u >= 0) & (u < camera.width) & (v >= 0) & (v < camera.height)
     row, column = (np.where(inside, np.floor(place), 0).astype(np.int64) for place in (v, u))
-    own = shown[row, column]
+    on_own = shown[row, column]
     behind = inside & (depth[row, column] < z - NEAR_M - NEAR_SHARE * z)
     # where the nearer surface is its own, its far side is not counted
-    seen, hidden = area[inside & own & ~behind].sum(), area[behind & ~own].sum()
+    seen, hidden = area[inside & on_own & ~behind].sum(), area[behind & ~on_own].sum()
     return {
         "visibility": float(seen / (seen + hidden)) if seen + hidden > 0 else np.nan,
         "truncation": float(1 - area[inside].sum() / area.sum()) if len(area) else np.nan,

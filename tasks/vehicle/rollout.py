@@ -19,7 +19,7 @@ from tasks.vehicle.model.chassis import Conditions
 from tasks.vehicle.model.simulation import COLUMNS, Recording, Simulation, simulate
 from tasks.vehicle.paper.low_speed import SteadyStop
 from tasks.vehicle.paper.paper_mode import StepGrid, run_paper_mode, sample_history
-from tasks.vehicle.parameters import Vehicle, compute_surface_response
+from tasks.vehicle.parameters import SurfaceResponse, Vehicle, compute_surface_response
 
 Mode = Literal["paper", "coupled"]
 MODES: tuple[Mode, ...] = ("paper", "coupled")
@@ -137,6 +137,24 @@ def simulate_scenario(
                 initial_speed=controls.initial_speed,
             )
         )  # fmt: skip
+    return describe_rollout(
+        history, vehicle, response, surface_friction, mode=mode, duration_s=duration_s, grade=grade
+    )
+
+
+def describe_rollout(
+    history: History, vehicle: Vehicle, response: SurfaceResponse, surface_friction: float, *, mode: Mode,
+    duration_s: float, grade: RoadGrade,
+) -> Rollout:  # fmt: skip
+    """Return the telemetry of a drive.
+
+    Parameters
+    ----------
+    history : motion at the ticks, and its events
+    vehicle, response : the vehicle, and its tyres on the surface
+    surface_friction : mu_c [1]
+    mode, duration_s, grade : as of `simulate_scenario`
+    """
     columns: dict[str, NDArray[Any]] = dict(history.columns)
     columns["t_ns"] = np.arange(len(columns["speed"]), dtype=np.int64) * TICK_NS
     columns["road_grade"] = grade.at(columns["station"])

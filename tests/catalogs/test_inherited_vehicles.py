@@ -85,7 +85,7 @@ def test_a_number_is_inherited_with_its_tolerance_or_given_whole(write):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("extends: tractor", "a file beside this one; tractor: no such vehicle; give a YAML file or one of: bmw-m8"),
+        ("extends: tractor", "a file beside this one; tractor: no such vehicle; give a YAML file or one of: bmw-320i"),
         ("extends: tractor.yaml", "tractor.yaml: no such vehicle"),
         ("extends: ../car.yaml", "the name of the vehicle that it extends must be no path; it is '../car.yaml'"),
         ("extends: ''", "must have 1 to 100 characters"),

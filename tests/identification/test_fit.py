@@ -302,7 +302,7 @@ def test_scatter_of_the_runs_is_what_they_differ_beyond_noise_by_the_t_of_so_few
     """Scores of 2, -2, 2, -2 standard errors: a mean square of 16/3 over three degrees of freedom, t 3.18 over 1.96."""
     slopes = [(np.array([[1.0]]), np.zeros((1, 1)))] * 4
     scores = np.array([[2.0], [-2.0], [2.0], [-2.0]])
-    widened = np.sqrt(16.0 / 3.0 - 1.0) * 3.182446 / 1.959964
+    widened = 2.0 * np.sqrt(16.0 / 3.0 - 1.0) * 3.182446 / 1.959964
     assert _measure_scatter(scores, slopes, np.eye(1)) == pytest.approx([widened], rel=1e-6)
     assert _measure_scatter(scores / 4.0, slopes, np.eye(1)) == [0.0]
     assert _measure_scatter(scores[:2], slopes[:2], np.eye(1)) == [0.0], (

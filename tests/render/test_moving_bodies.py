@@ -17,7 +17,7 @@ from tasks.render.rasterise.placed_body import PlacedBody
 from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tasks.render.weather.layers import ClearScene, ClipConditions, weather_scene
 from tasks.render.weather.scene_light import append_gaussians
-from tasks.scene.road_users.bodies import build_body
+from tasks.scene.road_users.bodies import build_road_user
 from tasks.scene.transform import transform_gaussians
 from tasks.surface.state import SurfaceState
 from tests.render.rolling_cameras import ALL, CAMERA
@@ -46,7 +46,7 @@ def car(ways, heading=0.0, kind="car", lateral=0.0):
     poses = np.tile(np.eye(4), (len(ways), 1, 1))
     poses[:, :2, :2] = (np.cos(heading), -np.sin(heading)), (np.sin(heading), np.cos(heading))
     poses[:, 0, 3], poses[:, 1, 3] = ways, lateral
-    body = build_body(kind, np.array(load("road user sizes")[kind]))
+    body = build_road_user(kind, np.array(load("road user sizes")[kind]), cell=0.12)
     still = {"velocity": np.zeros((len(ways), 3)), "braking": np.zeros(len(ways), np.bool_)}
     return MovingBody(number=1, body=body, T_world_body=poses, **still)
 
@@ -66,7 +66,7 @@ def test_a_placed_body_is_drawn_as_its_gaussians_in_the_world_are(street, parame
         ClearScene(gaussians=street.gaussians, environment=street.environment),
         ClipConditions(state=STATES["dry"], pavement=PAVEMENT, parameters=parameters, seed=1), 100.0,
     )  # fmt: skip
-    bodies = BodiesInClip([moving], street, weathered, weather, CpuBackend())
+    bodies = BodiesInClip([moving], street, weathered, weather, CpuBackend(), rig()(0, np.zeros(1)))
     local = bodies.wrap(0, 0)
     view = world_to_camera(rig()(0, np.zeros(1))[0] @ CAMERA.T_rig_camera)
     size = (view, CAMERA.K, CAMERA.width, CAMERA.height)
@@ -88,7 +88,7 @@ def test_a_placed_body_is_drawn_as_its_gaussians_in_the_world_are(street, parame
 def test_the_flow_on_a_moving_car_is_its_projected_rigid_motion(street, parameters, camera):
     moving = car(np.array([11.0, 12.1, 13.0]))
     made, T_world_camera = film(street, parameters, [moving], camera, labels=True)
-    K, points = camera.K, moving.body.surfels.centre
+    K, points = camera.K, moving.body.body.gaussians.means
     places = []
     for k in range(2):
         world = points @ moving.T_world_body[k, :3, :3].T + moving.T_world_body[k, :3, 3]

@@ -5,7 +5,7 @@ import pytest
 
 from catalogs.entries import load
 from tasks.errors import InputError
-from tasks.scene.road_users.bodies import build_body, measure_extent
+from tasks.scene.road_users.bodies import build_road_user, measure_extent
 from tasks.scene.road_users.ground import find_meeting, find_obstacle
 from tasks.scene.road_users.track import GRAVITY, Track, drive_track, move_on_track
 from tasks.scene.route import route_from_positions
@@ -64,13 +64,13 @@ def test_a_track_beyond_the_route_is_refused(track):
 
 
 @pytest.mark.parametrize("kind", ("car", "van", "truck", "adult", "child", "bicycle"))
-def test_each_body_fills_the_box_of_its_kind_and_faces_outward(kind):
+def test_each_body_fills_the_box_of_its_kind_and_vehicles_have_stop_lamps(kind):
     size = np.array(load("road user sizes")[kind])
-    body = build_body(kind, size)
-    low, high = measure_extent(body.surfels)
-    np.testing.assert_allclose(high - low, size, atol=0.03)
-    np.testing.assert_allclose(low[2], 0, atol=0.01)
-    assert np.isfinite(body.surfels.centre).all()
+    body = build_road_user(kind, size, cell=0.06)
+    low, high = measure_extent(body.body)
+    np.testing.assert_allclose((high - low)[[0, 2]], size[[0, 2]], atol=0.15)
+    assert 0.98 < (high - low)[1] / size[1] < 1.2, "mirrors stand out of a vehicle's width"
+    np.testing.assert_allclose(low[2], 0, atol=0.06)
     assert body.stop_lamps.any() == (kind in ("car", "van", "truck"))
 
 

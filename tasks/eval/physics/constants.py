@@ -57,6 +57,7 @@ class Constants:
         the tyre
     effects : numbers that the car adds to the plain laws, by name [units of the table of effects]
     forms : port and variable of each form outside that table
+    policy : whether a policy braked, and no scenario
     """
 
     car: Mapping[str, float]
@@ -70,6 +71,7 @@ class Constants:
     tyre: Mapping[str, str] | None = None
     effects: Mapping[str, float] = field(default_factory=dict)
     forms: tuple[tuple[str, str], ...] = ()
+    policy: bool = False
 
     @property
     def mass(self) -> float:

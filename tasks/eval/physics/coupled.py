@@ -244,7 +244,9 @@ def _doubt_line(line: Floats, facts: Mapping[str, Any], constants: Constants) ->
     """Error of the pressure at the pads: none where it is recorded, else an inner step's where the onset is a place."""
     if not (constants.effects.get("dead_time") or constants.effects.get("lag")):
         return np.zeros(len(line))
-    by_place = facts["brake_onset_m"] is not None and np.isfinite(facts["brake_onset_m"])
+    by_place = constants.policy or (
+        facts["brake_onset_m"] is not None and np.isfinite(facts["brake_onset_m"])
+    )
     change = spread(np.abs(np.diff(line, prepend=line[:1])), 1)
     return np.asarray((0.5 if by_place else 1e-6) * change + 1e-9)
 
@@ -255,6 +257,10 @@ def _act_on_pads(ticks: Mapping[str, Floats], facts: Mapping[str, Any], constant
     if dead == 0.0 and constants.effects.get("lag", 0.0) <= 0.0:
         return ticks["brake_pressure_mpa"]
     time = INNER_STEP * np.arange(2 * len(ticks["speed"]) - 1, dtype=np.float64)
+    if constants.policy:
+        told = ticks["brake_pressure_mpa"]
+        commanded = np.interp(time - dead, DT * np.arange(len(told)), told)
+        return delay_pressure(commanded, INNER_STEP, constants.effects)[::2]
     commanded = pressure_at(time - find_brake_onset(ticks, facts) - dead, *pressure_shape(facts))
     return delay_pressure(commanded, INNER_STEP, constants.effects)[::2]
 

@@ -15,6 +15,7 @@ from tasks.identification.decision.candidates import Candidate
 from tasks.identification.decision.comparison import compare_explanations, temper_odds
 from tasks.identification.decision.forms import KNOTS, find_scanned_ranges, make_form_hypotheses
 from tasks.identification.decision.odds import (
+    LEVELS,
     Explanation,
     RunGrams,
     can_stand_for,
@@ -109,7 +110,7 @@ def settle_told(
             break
         first = replace(first, told=tuple(large))
     others = [other for other in others if not other.numbers >= first.numbers]
-    varying = _find_varying(finding, first, rules)
+    varying = _find_varying(finding, first)
     if varying is not None:
         anew = refine_fit(finding, fit_told(finding, varying))
         odds = _compare_fits((anew, varying), (fitted, first), finding, rules)
@@ -120,26 +121,22 @@ def settle_told(
     return [first, *others, *_list_strained(finding, first, fitted, rules)], fitted
 
 
-def _find_varying(finding: Finding, first: OpenExplanation, rules: DecisionRules) -> OpenExplanation | None:
-    """Return what is told with the best form in place of a constant, where that is better by the odds; else None.
+def _find_varying(finding: Finding, first: OpenExplanation) -> OpenExplanation | None:
+    """Return what is told with the best form in place of a level; None where no level is told.
 
-    A number of the file is told as a constant at its port. Derivatives about its fit undervalue what varies there: a
-    run's own friction decides when its tyres let go.
+    Derivatives about the fit of one value undervalue what varies at its port: a run's own friction decides when its
+    tyres let go.
     """
     grams = finding.grams
     varying = [
-        weigh_explanation(grams, [*(m for m in first.told if m is not constant), form], spread=False)
-        for constant in first.told
-        if constant.effect is not None and constant.effect.variable == "constant"
+        weigh_explanation(grams, [*(m for m in first.told if m is not level), form], spread=False)
+        for level in first.told
+        if level.name in LEVELS
         for form in grams.columns.candidates
-        if form.effect is None and can_stand_for(form, constant)
+        if form.effect is None and can_stand_for(form, level)
     ]
-    whole = weigh_explanation(grams, first.told, spread=False)
     found = max((e for e in varying if e), key=lambda e: compute_likelihood(grams, e), default=None)
-    if found is None or whole is None:
-        return None
-    better = compute_likelihood(grams, found) - compute_likelihood(grams, whole) > log(rules.named_odds)
-    return OpenExplanation(explanation=found, told=found.members, log_odds=0.0) if better else None
+    return None if found is None else OpenExplanation(explanation=found, told=found.members, log_odds=0.0)
 
 
 def _compare_fits(

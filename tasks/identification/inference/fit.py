@@ -25,7 +25,7 @@ HELD = 1e18
 MISSED = 0.3
 """Relative error of the predicted fall of the misfit from which derivatives are taken anew."""
 
-INFORMED = 1e-3
+INFORMED = 0.01
 """Share of the best informed run's information from which a run informs a direction [1]."""
 SETTLED = 1.0
 """Fall of the misfit that a fit no longer seeks: half a unit of log likelihood [1]."""
@@ -163,12 +163,11 @@ def fit_hypotheses(
     inverse = np.asarray(
         np.linalg.pinv(normal / np.outer(size, size)) / np.outer(size, size), dtype=np.float64
     )
-    error = np.sqrt(np.diag(inverse))
     scatter = _measure_scatter(_score_runs(evidence, here.points, slopes) @ inverse, slopes, inverse)
     return Fit(
         parts=parts, values=here.values, session=here.session, session_sigma=session_sigma, objective=here.misfit,
         by_run=collect_misfits(here.points), covariance=inverse[:k, :k],
-        session_error=error[k:], scatter=error * scatter,
+        session_error=np.sqrt(np.diag(inverse)[k:]), scatter=scatter,
         residuals=tuple(
             run.add_offsets(point.residual, point.offsets)
             for run, point in zip(evidence, here.points, strict=True)
@@ -193,10 +192,10 @@ def _score_runs(
 def _measure_scatter(
     scores: NDArray[np.float64], slopes: list[Slopes], inverse: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return what the runs' scatter adds to each standard error of noise, over that error, float64 [K + 8].
+    """Return the standard deviations that the runs' scatter adds to those of noise, float64 [K + 8].
 
-    Its square is Cochran's mean square less 1, for the t quantile of so few runs over the normal one (Hartung and Knapp
-    2001, doi:10.1002/sim.791). Fewer than three runs say nothing of their scatter.
+    The variance that noise of the runs makes counts as often as Cochran's mean square is above 1, by the t quantile of
+    so few runs over the normal one (Hartung and Knapp 2001, doi:10.1002/sim.791). Fewer than three runs say nothing.
 
     Parameters
     ----------
@@ -212,7 +211,7 @@ def _measure_scatter(
     freedom = informed.sum(axis=0) - 1
     few = np.maximum(freedom, 2)
     excess = np.where(freedom < 2, 0.0, np.maximum(square / few - 1.0, 0.0))
-    return np.asarray(np.sqrt(excess) * stdtrit(few, 1.0 - OUTSIDE) / NORMAL_QUANTILE)
+    return np.asarray(np.sqrt(size.sum(axis=0) * excess) * stdtrit(few, 1.0 - OUTSIDE) / NORMAL_QUANTILE)
 
 
 def _step_along(

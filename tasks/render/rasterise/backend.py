@@ -13,6 +13,7 @@ from tasks.errors import InputError
 from tasks.render.rasterise import rasteriser
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.rasterise.placed_body import PlacedBody, Shade
+from tasks.render.rasterise.preparation import recolour_prepared
 from tasks.scene.gaussians import Gaussians
 
 BackendName = Literal["auto", "cpu", "gsplat"]
@@ -35,6 +36,9 @@ class Backend(Protocol):
     def prepare_gaussians(self, gaussians: Gaussians) -> Any:
         """Pack a cloud the way this backend draws it; see `tasks.render.rasterise.rasteriser.prepare_gaussians`."""
 
+    def recolour(self, prepared: Any, sh: NDArray[np.float32]) -> Any:
+        """Return a prepared cloud with other colours, float32 [N, K, 3] in the order of the cloud."""
+
     def rasterise_view(
         self,
         prepared: Any,
@@ -54,6 +58,7 @@ class CpuBackend:
 
     name = "cpu"
     prepare_gaussians = staticmethod(rasteriser.prepare_gaussians)
+    recolour = staticmethod(recolour_prepared)
     rasterise_view = staticmethod(rasteriser.rasterise_view)
 
 

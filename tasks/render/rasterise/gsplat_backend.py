@@ -88,6 +88,10 @@ class GsplatBackend:
             antialiased=gaussians.antialiased,
         )
 
+    def recolour(self, prepared: DeviceGaussians, sh: NDArray[np.float32]) -> DeviceGaussians:
+        """Return a prepared cloud with other colours; see `Backend.recolour`."""
+        return replace(prepared, sh=self._to_tensor(sh[np.argsort(prepared.places.cpu().numpy())]))
+
     @torch.no_grad()
     def rasterise_view(
         self,

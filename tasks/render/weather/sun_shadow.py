@@ -40,7 +40,6 @@ def cast_sun(gaussians: Gaussians, to_sun: NDArray[np.floating]) -> NDArray[np.f
     float64 [N] in 0..1 [1]
     """
     towards = np.asarray(to_sun, dtype=np.float64)
-    facing = gaussians.normals.astype(np.float64) @ towards
     helper = np.array((1.0, 0.0, 0.0)) if abs(towards[2]) > 0.9 else np.array((0.0, 0.0, 1.0))
     across = np.cross(helper, towards)
     across /= np.linalg.norm(across)
@@ -62,9 +61,9 @@ def cast_sun(gaussians: Gaussians, to_sun: NDArray[np.floating]) -> NDArray[np.f
         nearest,
     )
     lit = np.zeros(len(gaussians))
-    lifted = place + LIFT_M * (gaussians.normals.astype(np.float64) @ frame.T)
-    _look_to_sun(lifted, facing, low, cell, nearest, lit)
-    return np.clip(facing, 0, 1) * lit
+    turned = gaussians.normals.astype(np.float64) @ frame.T
+    _look_to_sun(place + LIFT_M * turned, turned, low, cell, nearest, lit)
+    return np.clip(turned[:, 2], 0, 1) * lit
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
@@ -114,15 +113,21 @@ def _draw_discs(place, quats, scales, normals, opacities, frame, low, cell, near
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _look_to_sun(place, facing, low, cell, nearest, lit):  # type: ignore[no-untyped-def]
-    """Share of the cells about each disc, three by three, in which nothing lies between it and the sun."""
+def _look_to_sun(place, normals, low, cell, nearest, lit):  # type: ignore[no-untyped-def]
+    """Share of the cells about each disc, three by three, in which nothing lies between its plane and the sun."""
     rows, columns = nearest.shape
     for i in range(len(place)):
-        if facing[i] <= 0:
+        facing = normals[i, 2]
+        if facing <= 0:
             continue
+        slope_u, slope_v = 0.0, 0.0
+        if facing > LEAST_FACING:
+            slope_u, slope_v = -normals[i, 0] / facing, -normals[i, 1] / facing
         a, b = int((place[i, 0] - low[0]) / cell + 0.5), int((place[i, 1] - low[1]) / cell + 0.5)
         free = 0
         for p in range(max(a - 1, 0), min(a + 1, rows - 1) + 1):
+            rise = slope_u * (low[0] + p * cell - place[i, 0])
             for q in range(max(b - 1, 0), min(b + 1, columns - 1) + 1):
-                free += nearest[p, q] <= place[i, 2] + BIAS_M
+                plane = place[i, 2] + rise + slope_v * (low[1] + q * cell - place[i, 1])
+                free += nearest[p, q] <= plane + BIAS_M
         lit[i] = free / 9

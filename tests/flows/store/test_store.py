@@ -151,7 +151,17 @@ def test_channel_names_are_unique_and_described():
         "check_method",
         "check_passed",
     }
-    texts |= {"clip_id_a", "clip_id_b", "label_a", "label_b", "control", "differs", "variant", "scene", "kind"}
+    texts |= {
+        "clip_id_a",
+        "clip_id_b",
+        "label_a",
+        "label_b",
+        "control",
+        "differs",
+        "variant",
+        "scene",
+        "kind",
+    }
     assert {c.name for c in CHANNELS_BY_NAME.values() if not c.unit} == texts, "every number has a unit"
 
 
