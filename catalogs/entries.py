@@ -53,6 +53,7 @@ KINDS = {
     "list of conditions": Kind("studies/appendix-c.yaml", "studies:ConditionList"),
     "list of prompts": Kind("clip_prompts.yaml", "clip_prompts:PromptFile"),
     "low-speed rule": Kind("low_speed.yaml", "low_speed:LowSpeedEntry"),
+    "road user sizes": Kind("road_users.yaml", "road_users:RoadUserSizes"),
     "sensitivity study": Kind("studies/surface-sensitivity.yaml", "studies:SensitivityEntry"),
     "set of assumed tolerances": Kind("assumed_tolerances.yaml", "channel_maps.tolerances:AssumedTolerances"),
     "surface": Kind("surfaces", "surfaces:SurfaceEntry"),

@@ -14,7 +14,7 @@ from flows.reading.answer_files import format_csv, format_parquet, make_plain, o
 from flows.reading.connection import connect_views
 from flows.reading.suggestions import suggest_names
 from flows.reading.views import VIEWS
-from flows.store.arrays import arrays_of
+from flows.store.arrays import EVERY_ARRAY
 from tasks.conventions import SCENE_CHANNEL, VARIANT_CHANNEL, Channel
 from tasks.errors import InputError
 
@@ -229,7 +229,7 @@ def list_columns(*, grid: bool = False) -> dict[str, Any]:
         "arrays": [
             _describe_channel(array.channel)
             | {"dtype": array.dtype, "dimensions": ["clip", "frame", "y", "x", *array.dimensions]}
-            for array in arrays_of(labels=True).values()
+            for array in EVERY_ARRAY.values()
         ]
     }
 
