@@ -14,6 +14,7 @@ from flows.making.driving import hazard_of, weather_of
 from flows.making.plan import Plan, frame_ticks
 from tasks.render.camera import RigAt, body_poses, continuous_rig
 from tasks.render.clip import RigMotion, render_clip
+from tasks.render.feature_sign import add_sign
 from tasks.render.kerb_face import extend_kerbs
 from tasks.render.rasterise.backend import select_backend
 from tasks.render.road_edit import RoadRelief, apply_road_profile
@@ -113,7 +114,7 @@ def edit_scene(
     ----------
     scene : without the feature
     hazard : road feature; height 0 leaves the scene as it is
-    marking : painted on a hump; None leaves it plain
+    marking : finish of the feature; None leaves it plain
     asphalt_albedo : share of the light that the pavement sends back [1]
     """
     if hazard.height_m == 0:
@@ -129,6 +130,8 @@ def edit_scene(
     gaussians = refine_road(scene.gaussians, relief)
     if marking is not None:
         gaussians = paint_feature(gaussians, relief, marking, *carriageway, asphalt_albedo)
+        if marking.sign is not None:
+            gaussians = add_sign(gaussians, relief, marking.sign, scene.carriageway_right, asphalt_albedo)
     return extend_kerbs(apply_road_profile(gaussians, relief, *carriageway)[0], relief), relief
 
 
