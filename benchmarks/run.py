@@ -21,7 +21,7 @@ def run_benchmarks(name: str | None = None, *, out: str | None = None) -> dict[s
     """
     if name is not None and name not in BENCHMARKS:
         raise InputError(f"bench {name}: no such benchmark; there are: {', '.join(BENCHMARKS)}")
-    results = Outputs(out, "bench", "bench.json")
+    results = Outputs(out, "lab bench", "bench.json")
     rows = [
         row
         for chosen in ([name] if name else BENCHMARKS)

@@ -14,7 +14,7 @@ import numpy as np
 
 from benchmarks.side_by_side import make_row, print_rows
 from catalogs.entries import load
-from catalogs.studies import Condition, load_conditions
+from catalogs.studies import Condition
 from studies.paper.vehicle_modes import simulate_condition
 from tasks.campaign.campaign import CHANNELS, Run
 from tasks.identification.inference.forward import prepare_run, simulate_run
@@ -54,7 +54,7 @@ def measure_rows() -> list[dict[str, Any]]:
     """
     vehicle, surface = load("vehicle", "paper-reference"), load("surface", "dense-asphalt")
     result = _stop_rows(vehicle)
-    conditions = {condition.name: condition for condition in load_conditions()}
+    conditions = {condition.name: condition for condition in load("list of conditions")}
     for name in ("flat-dry", "hump-dry"):
         result += _rollout_rows(conditions[name])
     result.append(_inference_row(vehicle, surface))

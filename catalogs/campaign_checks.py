@@ -1,16 +1,13 @@
 """The table of checks of measured data."""
 
-from functools import cache
 from math import inf
-from pathlib import Path
 
 from pydantic import Field
 
-from catalogs.quantities import CatalogueEntry, Number, Scalar, Text, read_entry
+from catalogs.quantities import CatalogueEntry, Number, Scalar, Text
 from tasks.campaign import run_checks, session_checks, signal_checks
 from tasks.campaign.checks import Check, CheckTable, Fault
 
-CAMPAIGN_CHECKS = Path(__file__).with_name("campaign_checks.yaml")
 MEASURES = signal_checks.MEASURES | run_checks.MEASURES | session_checks.MEASURES
 """Functions by the name of their check."""
 
@@ -74,19 +71,10 @@ class CheckTableEntry(CatalogueEntry):
         """The rows by what they look at, in the order of the file."""
         return {name: rows for name, rows in self if name != "spans"}
 
-
-@cache
-def load_campaign_checks() -> CheckTable:
-    """Return the checks of the catalogue.
-
-    Raises
-    ------
-    InputError
-        Listing every rule the file breaks.
-    """
-    entry = read_entry(CheckTableEntry, CAMPAIGN_CHECKS, "table of checks")
-    groups = {
-        group: tuple(row.row(name) for name, row in rows.items()) for group, rows in entry.groups.items()
-    }
-    spans = {name: (span.lowest, span.highest) for name, span in entry.spans.items()}
-    return CheckTable(spans=spans, **groups)
+    def build(self) -> CheckTable:
+        """Return the checks for the science floor."""
+        groups = {
+            group: tuple(row.row(name) for name, row in rows.items()) for group, rows in self.groups.items()
+        }
+        spans = {name: (span.lowest, span.highest) for name, span in self.spans.items()}
+        return CheckTable(spans=spans, **groups)

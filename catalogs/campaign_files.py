@@ -113,15 +113,13 @@ def parse_rows(content: bytes, needed: Collection[str], numbers: Collection[str]
     return rows
 
 
-def _find_row_problems(
-    row: dict[str, str], numbers: Collection[str], place: str, seen: set[str]
-) -> list[str]:
+def _find_row_problems(row: dict[str, str], numbers: Collection[str], line: str, seen: set[str]) -> list[str]:
     if None in row or None in row.values():
-        return [f"{place}: must have as many fields as there are columns"]
+        return [f"{line}: must have as many fields as there are columns"]
     problems = []
     name = row["run"]
     if problem := find_name_problem(name):
-        return [f"{place}: a run's name must {problem}"]
+        return [f"{line}: a run's name must {problem}"]
     if name in seen:
         problems.append(f"{name}: stands twice in runs.csv: give each run its own name")
     seen.add(name)

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 from pydantic import BaseModel, ConfigDict, field_validator
 
-from catalogs.campaign_checks import load_campaign_checks
 from catalogs.campaign_files import (
     LARGEST_RUN,
     CampaignHeader,
@@ -17,6 +16,7 @@ from catalogs.campaign_files import (
 )
 from catalogs.channel_maps.tolerances import Tolerances as TolerancesEntry
 from catalogs.documents import read_content
+from catalogs.entries import load
 from catalogs.quantities import Text, parse_entry
 from catalogs.sentences import cap_problems, shorten, shorten_value
 from tasks.campaign.assembly import judge_columns
@@ -116,7 +116,7 @@ def read_campaign(folder: str | Path) -> Campaign:
     needed = list(dict.fromkeys(needed))
     digest = hashlib.sha256(header_bytes + table_bytes)
     interval, judged = 1.0 / header.sample_rate_hz, set(held_out)
-    runs, first_of, table = [], dict[bytes, str](), load_campaign_checks()
+    runs, first_of, table = [], dict[bytes, str](), load("table of checks")
     readable: list[MeasuredRun] = []
     for row in rows:
         path = folder / "runs" / f"{row['run']}.parquet"
@@ -153,8 +153,8 @@ def read_campaign(folder: str | Path) -> Campaign:
             )
             first, _ = find_motion(run.speed)
             runs.append(run.begin_at(first) if first else run)
-    told = apply_checks(table.session, Session(runs=readable))
-    problems += [one.sentence for one in told if one.check.fault != "warning"]
+    violations = apply_checks(table.session, Session(runs=readable))
+    problems += [one.sentence for one in violations if one.check.fault != "warning"]
     if problems:
         raise InputError(cap_problems([f"{shorten(folder.name)}: {problem}" for problem in problems]))
     zero = 0.0

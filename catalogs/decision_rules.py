@@ -1,7 +1,7 @@
 """The rules by which a verdict is reached."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from catalogs.quantities import CatalogueEntry, Scalar, read_entry, require_quantity
 from tasks.identification.rules import DecisionRules
@@ -45,6 +45,13 @@ class DecisionRulesEntry(CatalogueEntry):
     saturation_ratio: Level
     limited_time: Annotated[Scalar, require_quantity("s", above=0)]
 
+    def build(self) -> DecisionRules:
+        """Return the rules; counts are integers."""
+        counts = {name for name, kind in DecisionRules.__annotations__.items() if kind is int}
+        return DecisionRules(
+            **{name: int(value) if name in counts else value for name, value in self.numbers().items()}
+        )
+
 
 def load_decision_rules(path: str | Path = DECISION_RULES) -> DecisionRules:
     """Read decision rules; by default those of the catalogue.
@@ -58,15 +65,4 @@ def load_decision_rules(path: str | Path = DECISION_RULES) -> DecisionRules:
     InputError
         Listing every rule the file breaks.
     """
-    entry = read_entry(DecisionRulesEntry, Path(path), "set of decision rules")
-    return DecisionRules(**_plain_values(entry))
-
-
-def _plain_values(entry: CatalogueEntry) -> dict[str, Any]:
-    """Return the numbers of an entry by name, counts as integers."""
-    counts = {name for name, kind in DecisionRules.__annotations__.items() if kind is int}
-    return {
-        name: int(number.value) if name in counts else number.value
-        for name, number in entry
-        if isinstance(number, Scalar)
-    }
+    return read_entry(DecisionRulesEntry, Path(path), "set of decision rules").build()

@@ -81,13 +81,13 @@ def read_yaml(path: Path, kind: str, *, finite: bool = True) -> dict[str, Any]:
     return parse_yaml(read_content(path, kind, LARGEST_YAML), path, kind, finite=finite)
 
 
-def parse_yaml(content: bytes, place: object, kind: str, *, finite: bool = True) -> dict[str, Any]:
+def parse_yaml(content: bytes, origin: object, kind: str, *, finite: bool = True) -> dict[str, Any]:
     """The table that YAML text holds.
 
     Parameters
     ----------
     content : UTF-8
-    place : where it comes from, for the sentences
+    origin : where it comes from, for the sentences
     kind : what it is called in them
     finite : refuse infinite numbers and NaN here; False for a reader that does so beside its other rules
 
@@ -97,21 +97,21 @@ def parse_yaml(content: bytes, place: object, kind: str, *, finite: bool = True)
         One sentence for each fault: no UTF-8, no YAML, no table, too large, too deep, a key that stands twice or is
         no text, a number that is not finite or too large, a tag beyond plain values.
     """
-    value = parse_yaml_value(content, place, kind, finite=finite)
+    value = parse_yaml_value(content, origin, kind, finite=finite)
     if not isinstance(value, dict):
         raise InputError(
-            f"{shorten(place)}: a {kind} must be a table of keys and values; it is {shorten_value(value)}"
+            f"{shorten(origin)}: a {kind} must be a table of keys and values; it is {shorten_value(value)}"
         )
     return value
 
 
-def parse_yaml_value(content: bytes, place: object, kind: str, *, finite: bool = True) -> Any:
+def parse_yaml_value(content: bytes, origin: object, kind: str, *, finite: bool = True) -> Any:
     """The value that YAML text holds, be it a table, a list or a single value; the rules are those of `parse_yaml`.
 
     Parameters
     ----------
     content : UTF-8
-    place : where it comes from, for the sentences
+    origin : where it comes from, for the sentences
     kind : what it is called in them
     finite : refuse infinite numbers and NaN here; False for a reader that does so beside its other rules
 
@@ -120,7 +120,7 @@ def parse_yaml_value(content: bytes, place: object, kind: str, *, finite: bool =
     InputError
         One sentence for each fault.
     """
-    start = f"{shorten(place)}: a {kind} must"
+    start = f"{shorten(origin)}: a {kind} must"
     text = _decode_text(content, start, LARGEST_YAML)
     return load_yaml(text, start, finite=finite)
 
@@ -143,13 +143,13 @@ def read_json_document(path: Path, kind: str, *, large_integers: bool = False) -
     return parse_json(content, path, kind, large_integers=large_integers)
 
 
-def parse_json(content: bytes, place: object, kind: str, *, large_integers: bool = False) -> Any:
+def parse_json(content: bytes, origin: object, kind: str, *, large_integers: bool = False) -> Any:
     """The value that JSON text holds.
 
     Parameters
     ----------
     content : UTF-8
-    place : where it comes from, for the sentences
+    origin : where it comes from, for the sentences
     kind : what it is called in them
     large_integers : let integers beyond 2^53 pass, for numbers that become floats, such as a logger's time in ns
 
@@ -159,7 +159,7 @@ def parse_json(content: bytes, place: object, kind: str, *, large_integers: bool
         One sentence for each fault: no UTF-8, no JSON, too large, too deep, a key that stands twice, a number that
         is not finite or too large, half of a surrogate pair.
     """
-    start = f"{shorten(place)}: a {kind} must"
+    start = f"{shorten(origin)}: a {kind} must"
     text = _decode_text(content, start, LARGEST_JSON)
     if (depth := _measure_depth(content)) > DEEPEST:
         raise InputError(f"{start} have at most {DEEPEST} tables and lists inside each other; it has {depth}")

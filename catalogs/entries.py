@@ -27,13 +27,13 @@ class Kind:
 
     Parameters
     ----------
-    place : folder of the entries, or the file of a kind that has one entry alone, which may be of datasets only
+    location : folder of the entries, or the file of a kind that has one entry alone, which may be of datasets only
     form : module and name of the schema of a file, whose ``build`` makes the value, or of a function that makes it of a
         file's content and path
     suffixes : of the files; the first is that of the catalogue
     """
 
-    place: str
+    location: str
     form: str
     suffixes: tuple[str, ...] = YAML
 
@@ -50,13 +50,20 @@ KINDS = {
     "grade of the road": Kind("road_grade.yaml", "road_grade:RoadGradeEntry"),
     "grid": Kind("grids", "grids:build_grid"),
     "hazard marking": Kind("hazard_markings", "hazard_markings:MarkingEntry"),
+    "list of conditions": Kind("studies/appendix-c.yaml", "studies:ConditionList"),
+    "list of prompts": Kind("clip_prompts.yaml", "clip_prompts:PromptFile"),
     "low-speed rule": Kind("low_speed.yaml", "low_speed:LowSpeedEntry"),
     "sensitivity study": Kind("studies/surface-sensitivity.yaml", "studies:SensitivityEntry"),
+    "set of assumed tolerances": Kind("assumed_tolerances.yaml", "channel_maps.tolerances:AssumedTolerances"),
     "surface": Kind("surfaces", "surfaces:SurfaceEntry"),
+    "table of checks": Kind("campaign_checks.yaml", "campaign_checks:CheckTableEntry"),
     "table of physical limits": Kind("physical_limits.yaml", "physical_limits:PhysicalLimits"),
     "table of plausible figures": Kind("plausible_vehicle.yaml", "plausible_vehicle:PlausibleVehicle"),
+    "table of printed agreement": Kind("studies/agreement.yaml", "studies.agreement:AgreementFile"),
+    "table of printed figures": Kind("paper_metrics.yaml", "paper_metrics:MetricFile"),
     "tyre": Kind("tyres", "tyres:parse_tyre", (".tir",)),
     "vehicle": Kind("vehicles", "vehicles:build_vehicle"),
+    "wet friction": Kind("wet_friction.yaml", "wet_friction:WetFrictionEntry"),
 }
 """Every kind of entry that has a name of its own; the name stands in the sentences about its files."""
 
@@ -92,8 +99,8 @@ def open_entry(kind: str, name_or_path: Reference = None, *given: Any) -> tuple[
     """
     if name_or_path is None:
         return _open_only(kind)
-    content, place = read_file(kind, name_or_path)
-    return content, place, parse(kind, content, place, *given)
+    content, origin = read_file(kind, name_or_path)
+    return content, origin, parse(kind, content, origin, *given)
 
 
 def read_file(kind: str, name_or_path: Reference = None) -> tuple[bytes, Path]:
@@ -112,13 +119,13 @@ def read_file(kind: str, name_or_path: Reference = None) -> tuple[bytes, Path]:
     return read_content(path, kind, LARGEST_YAML), path
 
 
-def parse(kind: str, content: bytes, place: Path, *given: Any) -> Any:
+def parse(kind: str, content: bytes, origin: Path, *given: Any) -> Any:
     """Make the value of an entry of its file's content.
 
     Parameters
     ----------
     kind, given : as of `load`
-    content, place : of the file
+    content, origin : of the file
 
     Raises
     ------
@@ -127,19 +134,19 @@ def parse(kind: str, content: bytes, place: Path, *given: Any) -> Any:
     """
     form = pkgutil.resolve_name(f"catalogs.{KINDS[kind].form}")
     if not isinstance(form, type):
-        return form(content, place, *given)
-    return parse_entry(form, content, place, kind).build(*given)
+        return form(content, origin, *given)
+    return parse_entry(form, content, origin, kind).build(*given)
 
 
 @cache
 def _open_only(kind: str) -> tuple[bytes, Path, Any]:
-    content, place = read_file(kind)
-    return content, place, parse(kind, content, place)
+    content, origin = read_file(kind)
+    return content, origin, parse(kind, content, origin)
 
 
 def entry_folder(kind: str) -> Path:
     """Return the catalogue's folder of a kind of entry."""
-    return CATALOGUE / KINDS[kind].place
+    return CATALOGUE / KINDS[kind].location
 
 
 def entry_names(kind: str) -> tuple[str, ...]:
@@ -160,13 +167,13 @@ def find_entry(kind: str, name_or_path: Reference = None) -> Path:
     InputError
         If there is no such entry; the sentence lists those that exist.
     """
-    place, suffixes = entry_folder(kind), KINDS[kind].suffixes
-    if name_or_path is None or place.suffix:
-        return place if name_or_path is None else Path(name_or_path)
+    location, suffixes = entry_folder(kind), KINDS[kind].suffixes
+    if name_or_path is None or location.suffix:
+        return location if name_or_path is None else Path(name_or_path)
     path = Path(name_or_path)
     is_name = path.suffix not in suffixes
     if is_name:
-        path = place / f"{name_or_path}{suffixes[0]}"
+        path = location / f"{name_or_path}{suffixes[0]}"
     if (is_name and not NAME.fullmatch(str(name_or_path))) or not os.path.isfile(path):
         form = "YAML" if suffixes == YAML else suffixes[0]
         raise InputError(

@@ -17,7 +17,7 @@ class LowSpeedEntry(CatalogueEntry):
 
     def build(self) -> SteadyStop:
         """The numbers themselves."""
-        return SteadyStop(held_share=self.held_share.value, explicit_limit=self.explicit_limit.value)
+        return SteadyStop(**self.numbers())
 
 
 class LowSpeedCutEntry(CatalogueEntry):

@@ -5,7 +5,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, RootModel, ValidationError
 
 from catalogs.documents import LARGEST_YAML, parse_yaml, parse_yaml_value, read_content
 from catalogs.sentences import cap_problems, describe_rules
@@ -13,6 +13,8 @@ from tasks.errors import InputError
 
 Number = Annotated[float, Field(strict=True)]
 Text = Annotated[str, Field(strict=True, min_length=1)]
+Entry = TypeVar("Entry", bound=BaseModel)
+Content = TypeVar("Content")
 
 
 class CatalogueEntry(BaseModel):
@@ -23,6 +25,20 @@ class CatalogueEntry(BaseModel):
     def build(self) -> Any:
         """Return what the entry is for those who ask for it: itself, where a kind has no other value."""
         return self
+
+    def numbers(self) -> dict[str, Any]:
+        """Return the numbers of its quantities, by their names [their own units]."""
+        return {name: one.value for name, one in self if isinstance(one, Scalar | Table)}
+
+
+class CatalogueList(RootModel[Content]):
+    """Base of a file that is a list of entries, or a table of names that it chooses itself."""
+
+    model_config = ConfigDict(frozen=True)
+
+    def build(self) -> Any:
+        """Return the entries."""
+        return self.root
 
 
 class Scalar(CatalogueEntry):
@@ -47,8 +63,6 @@ class Table(CatalogueEntry):
     source: Text
 
 
-Entry = TypeVar("Entry", bound=BaseModel)
-Form = TypeVar("Form")
 Value = TypeVar("Value", Scalar, Bounded, Table)
 
 
@@ -109,43 +123,22 @@ def read_entry(model: type[Entry], path: Path, kind: str) -> Entry:
 
 
 @lru_cache(maxsize=64)
-def parse_entry(model: type[Entry], content: bytes, place: Hashable, kind: str) -> Entry:
-    """Check the content of one YAML file; the same content of the same place is checked once.
+def parse_entry(model: type[Entry], content: bytes, origin: Hashable, kind: str) -> Entry:
+    """Check the content of one YAML file; the same content of the same origin is checked once.
 
     Parameters
     ----------
     model : what it must hold
     content : of the file
-    place, kind : where it comes from and what it is called in the sentences
+    origin, kind : where it comes from and what it is called in the sentences
 
     Raises
     ------
     InputError
         One sentence per problem, all of them at once.
     """
-    return _check_form(model.model_validate, parse_yaml(content, place, kind, finite=False), place)
-
-
-def read_entries(form: TypeAdapter[Form], path: Path, kind: str) -> Form:
-    """Read and check one YAML file that is a list, or a table of names that it chooses itself.
-
-    Parameters
-    ----------
-    form : what the file must hold
-    path : the file
-    kind : what it is called in the sentences
-
-    Raises
-    ------
-    InputError
-        One sentence per problem, all of them at once.
-    """
-    content = read_content(path, kind, LARGEST_YAML)
-    return _check_form(form.validate_python, parse_yaml_value(content, path, kind, finite=False), path)
-
-
-def _check_form(check: Callable[[Any], Form], content: object, place: object) -> Form:
+    parse = parse_yaml_value if issubclass(model, RootModel) else parse_yaml
     try:
-        return check(content)
+        return model.model_validate(parse(content, origin, kind, finite=False))
     except ValidationError as error:
-        raise InputError(cap_problems(describe_rules(error, place))) from None
+        raise InputError(cap_problems(describe_rules(error, origin))) from None

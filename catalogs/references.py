@@ -231,7 +231,7 @@ def _find_quantity_problems(case: ReferenceCase, columns: Traces) -> list[str]:
     """Sentences on columns that contradict the case or each other by more than a factor: units that were mixed up."""
     time, station, speed = columns["time"], columns["station"], columns["speed"]
     begun, announced = float(speed[0]), case.initial_speed_km_h / 3.6
-    driven, told = float(np.trapezoid(speed, time)), float(station[-1] - station[0])
+    driven, stated = float(np.trapezoid(speed, time)), float(station[-1] - station[0])
     loads = [values for name, values in columns.items() if name.startswith("wheel_load_")]
     weight, (lightest, heaviest) = float(np.mean(np.sum(loads, axis=0))), LOADS
     problems = []
@@ -240,10 +240,10 @@ def _find_quantity_problems(case: ReferenceCase, columns: Traces) -> list[str]:
             f"column speed must begin at initial_speed_km_h, {announced:.4g} m/s; it begins at {begun:.4g}: correct its"
             " unit or the case"
         )
-    if driven > LEAST_WAY and not driven / UNITS_APART < told < driven * UNITS_APART:
+    if driven > LEAST_WAY and not driven / UNITS_APART < stated < driven * UNITS_APART:
         problems.append(
-            f"column station must grow by speed times time, {driven:.4g} m; it grows by {told:.4g}: correct the unit of"
-            " time, speed or station"
+            f"column station must grow by speed times time, {driven:.4g} m; it grows by {stated:.4g}: correct the unit"
+            " of time, speed or station"
         )
     if not lightest < weight < heaviest:
         problems.append(

@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-Place = tuple[int | str, ...]
+KeyPath = tuple[int | str, ...]
 """Keys and numbers that lead to a value of a document."""
 MOST_PROBLEMS = 20
 """Problems reported of one document [1]: more do not fit on a screen, and the first ones often cause the rest."""
@@ -83,39 +83,39 @@ def is_encodable(text: str) -> bool:
 
 
 def describe_rules(
-    error: ValidationError, place: object, known: Callable[[Place], Iterable[str]] = lambda _: ()
+    error: ValidationError, origin: object, known: Callable[[KeyPath], Iterable[str]] = lambda _: ()
 ) -> list[str]:
     """Every rule that a document breaks, one sentence each.
 
     Parameters
     ----------
     error : of the model that the document was held against
-    place : the document
-    known : keys that exist in the table at a place; told where a key is unknown
+    origin : of the document
+    known : keys that exist in the table at a key path; listed where a key is unknown
     """
-    where = shorten(place)
+    where = shorten(origin)
     return [f"{where}: {_describe_rule(problem, known)}" for problem in error.errors(include_url=False)]
 
 
-def _describe_rule(problem: Any, known: Callable[[Place], Iterable[str]]) -> str:
+def _describe_rule(problem: Any, known: Callable[[KeyPath], Iterable[str]]) -> str:
     parts = [str(part) for part in problem["loc"] if part != "[key]"]
-    place = shorten(".".join(parts) or "the whole document", 120)
+    key_path = shorten(".".join(parts) or "the whole document", 120)
     match problem["type"]:
         case "missing":
-            return f"{place} is missing: add it"
+            return f"{key_path} is missing: add it"
         case "extra_forbidden":
             there = ", ".join(known(problem["loc"][:-1]))
             names = f" (known here are {there})" if there else ""
-            return f"{place}: unknown key{names}: remove it or correct its name"
+            return f"{key_path}: unknown key{names}: remove it or correct its name"
         case "value_error":
             rule = shorten(problem["msg"].removeprefix("Value error, "), 1000)
-            return f"{place}: {rule}" if parts else rule
+            return f"{key_path}: {rule}" if parts else rule
         case "dict_type" | "model_type" | "model_attributes_type":
-            return f"{place}: must be a table of keys and values; it is {shorten_value(problem['input'])}"
+            return f"{key_path}: must be a table of keys and values; it is {shorten_value(problem['input'])}"
         case _:
             rule = problem["msg"].replace("Input should be", "must be")
             remedy = _suggest_form(problem["type"], problem["input"])
-            return f"{place}: {rule}; it is {shorten_value(problem['input'])}{remedy}"
+            return f"{key_path}: {rule}; it is {shorten_value(problem['input'])}{remedy}"
 
 
 def _suggest_form(rule: str, value: object) -> str:

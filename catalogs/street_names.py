@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -29,6 +30,11 @@ class StreetName:
 
     def __str__(self) -> str:
         return f"{self.kind}-{self.seed}"
+
+    @property
+    def random_seed(self) -> int:
+        """Seed of all that is drawn, so that one seed of two kinds draws different numbers [1]."""
+        return int.from_bytes(sha256(str(self).encode()).digest()[:6], "big")
 
 
 def parse_street_name(name: object) -> StreetName | None:

@@ -46,5 +46,5 @@ class FamilyEntry(CatalogueEntry):
     @property
     def family(self) -> TyreFamily:
         """The family's numbers."""
-        values = {name: getattr(self, name).value for name in FamilyEntry.model_fields}
+        values = self.numbers()
         return TyreFamily(**{**values, "burckhardt": BurckhardtCurve(*values["burckhardt"])})

@@ -34,13 +34,13 @@ _KEY = re.compile(r"[A-Z][A-Z0-9_]*")
 _COMMENT = re.compile(r"""^((?:[^'"$!]|'[^']*'|"[^"]*")*)[$!].*$""")
 
 
-def parse_tyre(content: bytes, place: object) -> MagicFormula:
+def parse_tyre(content: bytes, origin: object) -> MagicFormula:
     """The tyre that a property file holds.
 
     Parameters
     ----------
     content : of the file; characters beyond ASCII stand in comments only
-    place : where it comes from, for the sentences
+    origin : where it comes from, for the sentences
 
     Raises
     ------
@@ -75,7 +75,7 @@ def parse_tyre(content: bytes, place: object) -> MagicFormula:
         if not problems:
             problems = _find_shape_problems(values, version)
     if problems or version is None:
-        raise InputError(cap_problems([f"{shorten(place)}: {problem}" for problem in problems]))
+        raise InputError(cap_problems([f"{shorten(origin)}: {problem}" for problem in problems]))
     return fold_scaling(values, version)
 
 

@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from inspect import Parameter, Signature
 from typing import Annotated, Any
@@ -22,10 +22,6 @@ SUBCOMMANDS = {
     "lab": "Judges, audits and studies beyond daily work: one heading each.",
 }
 """Help of the words that stand before the names of several commands."""
-PURPOSE = (
-    "Make driving video whose weather, grip, motion and camera agree; audit it, judge it, and learn from"
-    " measured drives."
-)
 GROUPS = "Groups"
 """Heading of `musync --help` below which these words stand."""
 AS_JSON = Option(name="json", kind=bool, help="Print the whole result as JSON.", default=False)
@@ -34,22 +30,17 @@ AS_FLOW = Option(
 )
 
 
-def build_parser(commands: Sequence[Command] = COMMANDS, purpose: str = PURPOSE) -> typer.Typer:
-    """Return a Typer application with commands below the headings of their groups.
-
-    Parameters
-    ----------
-    commands : by default those of the registry
-    purpose : first sentence of its help
-    """
+def build_parser() -> typer.Typer:
+    """Return the Typer application with every command of the registry, below the heading of its group."""
     app = typer.Typer(
         no_args_is_help=True,
         pretty_exceptions_enable=False,
-        help=purpose,
+        help="Make driving video whose weather, grip, motion and camera agree; audit it, judge it, and learn from"
+        " measured drives.",
     )
     app.callback()(_accept_version)
     words: dict[str, typer.Typer] = {}
-    for command in commands:
+    for command in COMMANDS:
         word, _, name = command.name.rpartition(" ")
         if word and word not in words:
             words[word] = typer.Typer(no_args_is_help=True, help=SUBCOMMANDS[word])

@@ -19,6 +19,7 @@ REACHES = {
     "camera.yaml": (RENDER,),
     "hazard_marking.yaml": (RENDER,),
     "low_speed.yaml": (VEHICLE, RENDER),
+    "wet_friction.yaml": (VEHICLE, RENDER),
     "road_grade.yaml": (VEHICLE, RENDER),
     "ablation.yaml": (VEHICLE, RENDER),
     "no_low_speed_rule.yaml": (VEHICLE, RENDER),
@@ -26,6 +27,7 @@ REACHES = {
     "study.yaml": (JUDGING,),
     "weather": (RENDER,),
     "traces": (VEHICLE, RENDER),
+    "driven": (VEHICLE, RENDER),
     "scene": (RENDER,),
     "backend": (RENDER,),
     "parameters": (VEHICLE, RENDER),
@@ -34,6 +36,7 @@ REACHES = {
     "frames": (VEHICLE, RENDER),
     "duration_s": (VEHICLE,),
     "low_speed": (VEHICLE, RENDER),
+    "wet_friction": (VEHICLE, RENDER),
     "variant": (VEHICLE, RENDER),
     "frame_rate_hz": (VEHICLE, RENDER),
     "labels": (RENDER,),
@@ -84,8 +87,8 @@ def find_input_differences(
     rows += _list_rows("scenes", "scene", *several)
     rows += _list_rows("backend", "backend", a["backend"], b["backend"])
     for name in (
-        "vehicle_mode", "low_speed", "variant", "composition", "labels", "pictures", "frames", "frame_rate_hz",
-        "duration_s", "seed",
+        "vehicle_mode", "low_speed", "wet_friction", "variant", "composition", "labels", "pictures", "frames",
+        "frame_rate_hz", "duration_s", "seed",
     ):  # fmt: skip
         before = BEFORE.get(name)
         rows += _list_rows(name, name, a["grid"].get(name, before), b["grid"].get(name, before))
@@ -194,7 +197,7 @@ def kind_of_input(name: str) -> str:
         return "tyre"
     if path.parts[0] == "road_grade":
         return "road_grade.yaml"
-    return path.parts[0] if path.parts[0] in ("weather", "traces") else name
+    return path.parts[0] if path.parts[0] in ("weather", "traces", "driven") else name
 
 
 def parse_input(name: str, content: bytes | None) -> Any:
@@ -214,6 +217,6 @@ def parse_input(name: str, content: bytes | None) -> Any:
         return ABSENT
     if kind_of_input(name) == "tyre":
         return tyre_entries(content)
-    if PurePosixPath(name).suffix == ".parquet":
+    if PurePosixPath(name).suffix in (".parquet", ".py"):
         return {"sha256": sha256_of([content])}
     return parse_yaml_value(content, name, "catalogue entry")

@@ -106,6 +106,16 @@ def is_traced(inputs: Iterable[str]) -> bool:
     return any(name.startswith(f"{TRACES}/") for name in inputs)
 
 
+def is_driven(inputs: Iterable[str]) -> bool:
+    """Whether a policy braked the clips of a dataset, and not their scenarios.
+
+    Parameters
+    ----------
+    inputs : names of its frozen inputs
+    """
+    return any(name.startswith("driven/") for name in inputs)
+
+
 def seal_of(manifest: Mapping[str, Any]) -> str:
     """Return the SHA-256 of the canonical form without the seal, by which a changed manifest is recognised."""
     return sha256_of([canonical_bytes({key: value for key, value in manifest.items() if key != "seal"})])

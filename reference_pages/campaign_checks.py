@@ -3,10 +3,12 @@
 import re
 from collections.abc import Iterator
 
-from catalogs.campaign_checks import CAMPAIGN_CHECKS, CheckEntry, CheckTableEntry
+from catalogs.campaign_checks import CheckEntry, CheckTableEntry
+from catalogs.entries import find_entry
 from catalogs.quantities import read_entry
 from reference_pages.markdown import format_table, format_value
 
+KIND = "table of checks"
 SEEN = {
     "clock": "clock of a recording",
     "recording": "recording",
@@ -52,14 +54,18 @@ def write_condition_table() -> str:
 
 def write_span_table() -> str:
     """Return the table of what the channels of a road car read, as Markdown."""
-    spans = read_entry(CheckTableEntry, CAMPAIGN_CHECKS, "table of checks").spans
+    spans = _read_entry().spans
     rows = [(f"`{name}`", span.lowest, span.highest, span.unit, span.source) for name, span in spans.items()]
     return format_table(("channel", "lowest", "highest", "unit", "source"), rows)
 
 
+def _read_entry() -> CheckTableEntry:
+    return read_entry(CheckTableEntry, find_entry(KIND), KIND)
+
+
 def _list_checks() -> Iterator[tuple[str, str, CheckEntry]]:
-    """Yield group, name and row of each check, in the order in which they are told."""
-    for group, checks in read_entry(CheckTableEntry, CAMPAIGN_CHECKS, "table of checks").groups.items():
+    """Yield group, name and row of each check, in the order in which they are reported."""
+    for group, checks in _read_entry().groups.items():
         yield from ((group, name, check) for name, check in checks.items())
 
 

@@ -37,7 +37,7 @@ def write_number_table() -> str:
             row.unit,
             f"{row.lower:g} to {row.upper:g}",
             row.port.replace("_", " "),
-            _say_change(row),
+            _describe_change(row),
             row.source,
         )
         for row in EFFECT_TABLE
@@ -45,7 +45,7 @@ def write_number_table() -> str:
     return format_table(("number", "effect", "unit", "bounds", "port", "in a vehicle file", "source"), rows)
 
 
-def _say_change(row: EffectParameter) -> str:
+def _describe_change(row: EffectParameter) -> str:
     if row.name in EFFECT_UNITS:
         return "under `effects`"
     return CHANGES[row.kind].format(", ".join(f"`{field}`" for field in row.fields))

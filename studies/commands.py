@@ -88,7 +88,6 @@ COMMANDS = (
     Command(
         name="lab brake-protocol",
         group=MEASURED,
-        is_flow=False,
         sentence="Select braking events by the paper's rules and predict each drive from the others (Appendix C.5).",
         function="studies.measured_drives.brake_protocol:brake_protocol",
         options=(
@@ -108,7 +107,6 @@ COMMANDS = (
     Command(
         name="lab stop-study",
         group=MEASURED,
-        is_flow=False,
         sentence="Calibrate on one stop of a car, predict another, and add what the model lacks step by step.",
         function="studies.measured_drives.stop_study:stop_study",
         options=(
@@ -127,7 +125,6 @@ COMMANDS = (
     Command(
         name="lab bump-study",
         group=MEASURED,
-        is_flow=False,
         sentence="Find the road features in a recording's pitch rate, and fit the car that drove over them.",
         function="studies.measured_drives.bump_study:bump_study",
         options=(
@@ -146,7 +143,6 @@ COMMANDS = (
     Command(
         name="lab synthetic-drives",
         group=MEASURED,
-        is_flow=False,
         sentence="Write drives as a car's bus logs them, with known truth, to try the brake protocol on.",
         function="studies.measured_drives.synthetic_drives:synthetic_drives",
         options=(
@@ -159,7 +155,6 @@ COMMANDS = (
     Command(
         name="lab close-loop-benchmark",
         group=KNOWN,
-        is_flow=False,
         sentence="Count how often close-loop is right on campaigns whose truth is known.",
         function="studies.closing_benchmark.benchmark:close_loop_benchmark",
         options=(
@@ -188,7 +183,6 @@ COMMANDS = (
     Command(
         name="lab controls",
         group=KNOWN,
-        is_flow=False,
         sentence="Falsify a dataset's claims and motions in fourteen ways, and say which metric detects which fault.",
         function="studies.negative_controls.study:run_controls",
         options=(DATASET, OUT),
@@ -198,7 +192,6 @@ COMMANDS = (
     Command(
         name="lab sensitivity",
         group=PAPER,
-        is_flow=False,
         sentence="Reproduce the paper's bounded surface-parameter study (Appendix E) beside its printed figures.",
         function="studies.paper.sensitivity:run_sensitivity",
         options=(OUT,),
@@ -208,7 +201,6 @@ COMMANDS = (
     Command(
         name="lab ablation",
         group=PAPER,
-        is_flow=False,
         sentence="Cut one coupling at a time (the paper's Section 4.4): stops over the weather, pitch at a hump.",
         function="studies.paper.ablation:run_ablation",
         options=(
@@ -235,7 +227,6 @@ COMMANDS = (
     Command(
         name="lab judge-set",
         group=PAPER,
-        is_flow=False,
         sentence="Judge the clips of video editors by a protocol: a table of models, the paper's figures beside them.",
         function="studies.video_sets.judge_set:judge_video_set",
         options=(
@@ -269,7 +260,6 @@ COMMANDS = (
     Command(
         name="lab lineage",
         group=ORIGINS,
-        is_flow=False,
         sentence="List the catalogue lines, works and measured runs that the numbers of a clip rest on, by column.",
         function="studies.lineage.trace:trace_lineage",
         options=(

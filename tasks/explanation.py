@@ -17,6 +17,7 @@ from tasks.scene.route import Route
 from tasks.surface.road_profile import RoadHazard, road_slope
 from tasks.surface.state import SurfaceParameters
 from tasks.surface.weather import Weather, find_weather, surface_state
+from tasks.surface.wet_friction import ANY_SPEED, WetGrip, compute_wet_share
 from tasks.vehicle.model.axle_ports import compute_signed_slip
 from tasks.vehicle.paper.low_speed import SteadyStop, find_rule_span
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle, compute_surface_response
@@ -26,7 +27,7 @@ from tasks.vehicle.tyres.contract import compute_braking_slip, compute_tyre_fric
 TOLERANCE = 1e-9
 """Largest difference from the stored number, relative to it, that rounding explains [1]."""
 ROAD_POINT_M = 10.0
-"""The road point whose shift is told lies this far ahead of the front axle [m]."""
+"""The road point whose shift is given lies this far ahead of the front axle [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,8 +94,9 @@ def surface_steps(
 
 
 def force_steps(
-    vehicle: Vehicle, response: SurfaceResponse, hazard: RoadHazard, mode: str, row: Mapping[str, Any]
-) -> list[Step]:
+    vehicle: Vehicle, response: SurfaceResponse, hazard: RoadHazard, mode: str, row: Mapping[str, Any],
+    grip: WetGrip = ANY_SPEED,
+) -> list[Step]:  # fmt: skip
     """Slip, tyre forces, road force and dv/dt at the stored tick (paper, Eqs. 8, 9, S7 and S11).
 
     Parameters
@@ -103,16 +105,20 @@ def force_steps(
     hazard : road feature
     mode : paper or coupled, which lets a wheel slip the other way too
     row : the stored frame
+    grip : how friction depends on speed
     """
     slip_of, lowest = (compute_signed_slip, -1) if mode == "coupled" else (compute_braking_slip, 0)
     steps, forces = [], []
     speed, radius = float(row["speed"]), vehicle.wheel_radius
     standing = speed <= 0
     formula = find_law(type(response.tyre)).formula
+    by_speed = 1.0 if grip == ANY_SPEED else compute_wet_share(speed, grip) / grip.reference
+    if by_speed != 1.0:
+        formula += f" * {by_speed:.4g}"
     for axle, name in (("f", "front"), ("r", "rear")):
         omega, load = float(row[f"wheel_speed_{axle}"]), float(row[f"tyre_load_{axle}"])
         kappa = slip_of(speed, radius * omega, vehicle.slip_speed_floor)
-        mu = copysign(compute_tyre_friction(abs(kappa), load, response.tyre), kappa)
+        mu = copysign(compute_tyre_friction(abs(kappa), load, response.tyre) * by_speed, kappa)
         law = formula.format(kappa=kappa, load=load, stiffness=response.slip_stiffness)
         forces.append(mu * load)
         steps += [
@@ -157,7 +163,7 @@ def pitch_steps(
     ----------
     vehicle, response, hazard : as above
     row : the stored frame
-    ride : the clip driven again from its scenario; the moment is told in paper mode only
+    ride : the clip driven again from its scenario; the moment is given in paper mode only
     steady : how the end of its stop is kept steady; None takes the published rule literally
     """
     tick = int(row["tick"])
@@ -167,7 +173,7 @@ def pitch_steps(
         climb = vehicle.gravity * grade if np.isfinite(grade := float(row["road_grade"])) else 0.0
         d = max(-float(row["longitudinal_acceleration"]) - climb, min(-climb, 0.0))
         steps.append(Step(
-            quantity=f"brake-pitch moment{_tell_rule(response, ride, steady, tick)}",
+            quantity=f"brake-pitch moment{_describe_rule(response, ride, steady, tick)}",
             symbol="M_b", equation="S16", unit="N m",
             formula=f"{scale:.5g} * {vehicle.sprung_mass:g} * {vehicle.cg_height:g} * {d:.5g}",
             recomputed=scale * vehicle.sprung_mass * vehicle.cg_height * d,
@@ -181,7 +187,7 @@ def pitch_steps(
     ]  # fmt: skip
 
 
-def _tell_rule(response: SurfaceResponse, ride: Rollout, steady: SteadyStop | None, tick: int) -> str:
+def _describe_rule(response: SurfaceResponse, ride: Rollout, steady: SteadyStop | None, tick: int) -> str:
     """Say when the low-speed rule acts, at a tick at which it may put another moment in the place of Eq. S16's."""
     if steady is not None and not steady.pitch_rule:
         return ""

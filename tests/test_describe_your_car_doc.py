@@ -27,7 +27,7 @@ def test_the_commands_run_on_the_car_of_the_page(tmp_path, monkeypatch):
     car, effects = blocks("yaml")
     (tmp_path / "my-car.yaml").write_text(car)
     checked = run(app, check)
-    assert checked.exit_code == 0 and "my-car.yaml: every figure is plausible" in checked.output
+    assert checked.exit_code == 1 and "my-car.yaml: road_load must lie within" in checked.output
     assert run(app, use).exit_code == 0
     kept, own = (
         load("vehicle", tmp_path / p) for p in ("datasets/my-car/inputs/vehicle.yaml", "my-car.yaml")

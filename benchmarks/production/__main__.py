@@ -8,9 +8,14 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from benchmarks.production.plan import ClipCosts, plan_production
-from benchmarks.production.requests import count_requests
-from benchmarks.production.scheduling import CALLS, WORKERS, measure_scheduling
+from benchmarks.production.plan import (
+    CALLS,
+    WORKERS,
+    ClipCosts,
+    count_requests,
+    measure_scheduling,
+    plan_production,
+)
 from catalogs.grids.form import MOST_CLIPS
 from flows.cli import run_to_end
 from flows.store.layout import Layout

@@ -215,8 +215,8 @@ class ChannelMap(CatalogueEntry):
         if (common := info.data.get("conditions")) is not None:
             laid = {f"run {run.name}": _lay_over(common, run) for run in runs} or {"conditions": common}
             problems += [
-                f"{place}: {problem}"
-                for place, conditions in laid.items()
+                f"{key_path}: {problem}"
+                for key_path, conditions in laid.items()
                 for problem in find_condition_problems(conditions.model_dump())
             ]
         return _raise_problems(runs, problems)
@@ -262,12 +262,12 @@ def _raise_problems(value: Kept, problems: list[str]) -> Kept:
     return value
 
 
-def build_channel_map(content: bytes, place: Path) -> tuple[ChannelMap, Path]:
+def build_channel_map(content: bytes, origin: Path) -> tuple[ChannelMap, Path]:
     """Return the map that a YAML file holds; also the file.
 
     Parameters
     ----------
-    content, place : of the file
+    content, origin : of the file
 
     Raises
     ------
@@ -276,11 +276,11 @@ def build_channel_map(content: bytes, place: Path) -> tuple[ChannelMap, Path]:
     FaultyMap
         Listing every problem of the file.
     """
-    table = parse_yaml(content, place, "channel map", finite=False)
+    table = parse_yaml(content, origin, "channel map", finite=False)
     try:
-        return ChannelMap.model_validate(table), place
+        return ChannelMap.model_validate(table), origin
     except ValidationError as error:
-        raise FaultyMap(cap_problems(describe_rules(error, place)), _readable_part(table)) from None
+        raise FaultyMap(cap_problems(describe_rules(error, origin)), _readable_part(table)) from None
 
 
 def _readable_part(content: dict[str, Any]) -> ChannelMap | None:

@@ -1,15 +1,12 @@
 """How well the numbers of a measured session are known: one sigma each, assumed where a map says nothing."""
 
-from functools import cache
-from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field
 
-from catalogs.documents import read_yaml
-from catalogs.quantities import CatalogueEntry, Scalar
+from catalogs.entries import load
+from catalogs.quantities import CatalogueEntry, CatalogueList, Scalar
 
-ASSUMED = Path(__file__).parents[1] / "assumed_tolerances.yaml"
 Sigma = Annotated[float, Field(strict=True, gt=0)]
 LARGEST_SHARE = 1.0
 """One sigma of a number over the number [1]: who gives 5 for 5 % would otherwise say that nothing is known of it."""
@@ -24,15 +21,16 @@ def _check_share(sigma: float) -> float:
 Share = Annotated[Sigma, AfterValidator(_check_share)]
 
 
-@cache
-def load_assumed_tolerances() -> dict[str, float]:
-    """Return what is assumed of a number that a map says nothing of, by name [the unit of the number]."""
-    content = read_yaml(ASSUMED, "set of assumed tolerances")
-    return {name: Scalar.model_validate(entry).value for name, entry in content.items()}
+class AssumedTolerances(CatalogueList[dict[str, Scalar]]):
+    """Content of the file of what is assumed of a number that a map says nothing of."""
+
+    def build(self) -> dict[str, float]:
+        """Return one sigma of each number, by name [the unit of the number]."""
+        return {name: entry.value for name, entry in self.root.items()}
 
 
 def _assume(name: str) -> Any:
-    return Field(default_factory=lambda: load_assumed_tolerances()[name])
+    return Field(default_factory=lambda: load("set of assumed tolerances")[name])
 
 
 class RunTolerances(CatalogueEntry):

@@ -4,9 +4,9 @@ from pathlib import Path
 from string import Formatter
 from typing import Annotated, Self
 
-from pydantic import AfterValidator, Field, TypeAdapter, field_validator, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from catalogs.quantities import CatalogueEntry, Text, read_entries
+from catalogs.quantities import CatalogueEntry, CatalogueList, Text, read_entry
 from tasks.vehicle.effects.library import Effect, EffectClass
 from tasks.vehicle.effects.table import PARAMETERS
 
@@ -51,8 +51,12 @@ def _check_names(entries: list[EffectEntry]) -> list[EffectEntry]:
     return entries
 
 
-LIBRARY = TypeAdapter(Annotated[list[EffectEntry], AfterValidator(_check_names)])
-"""Content of the file."""
+class EffectLibrary(CatalogueList[Annotated[list[EffectEntry], AfterValidator(_check_names)]]):
+    """Content of the file."""
+
+    def build(self) -> tuple[Effect, ...]:
+        """Return the effects, in the order of the file."""
+        return tuple(_make_effect(entry) for entry in self.root)
 
 
 def load_effects(path: str | Path = LIBRARY_FILE) -> tuple[Effect, ...]:
@@ -67,7 +71,7 @@ def load_effects(path: str | Path = LIBRARY_FILE) -> tuple[Effect, ...]:
     InputError
         With every rule the file breaks.
     """
-    return tuple(_make_effect(entry) for entry in read_entries(LIBRARY, Path(path), "library of effects"))
+    return read_entry(EffectLibrary, Path(path), "library of effects").build()
 
 
 def _make_effect(entry: EffectEntry) -> Effect:

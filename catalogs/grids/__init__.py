@@ -1,7 +1,7 @@
 """Scenario grids: a YAML file of blocks whose product is a list of scenarios."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,7 @@ class Grid:
     left_out : combinations that ``exclude`` took out [1]
     idle : places of the conditions of ``exclude`` that took out none
     poses : folder of reference traces whose motion the clips show in place of the vehicle's; None for the vehicle
+    driven : files of a policy's drive by their name under ``inputs/``; none where the scenarios brake
     """
 
     settings: GridFile
@@ -41,6 +42,7 @@ class Grid:
     left_out: int = 0
     idle: tuple[int, ...] = ()
     poses: Path | None = None
+    driven: Mapping[str, bytes] = field(default_factory=dict)
 
 
 class FaultyGrid(InputError):
@@ -88,7 +90,7 @@ def build_grid(content: bytes, path: Path) -> Grid:
     return grid
 
 
-def expand_grid(settings: GridFile, place: str) -> Grid:
+def expand_grid(settings: GridFile, origin: str) -> Grid:
     """The product of the blocks, later ones over earlier ones over ``base``, less what is excluded, each checked."""
     base = fields_set_by(settings.base)
     # a value that every level overrides is checked too: it is in the file
@@ -138,23 +140,25 @@ def expand_grid(settings: GridFile, place: str) -> Grid:
         idle=tuple(sorted(idle)),
     )
     if problems:
-        told = [f"{shorten(place)}: scenario {name_some(named)}: {rule}" for rule, named in problems.items()]
-        raise FaultyGrid(cap_problems(told), grid)
+        sentences = [
+            f"{shorten(origin)}: scenario {name_some(named)}: {rule}" for rule, named in problems.items()
+        ]
+        raise FaultyGrid(cap_problems(sentences), grid)
     return grid
 
 
-def _find_impossible_conditions(settings: GridFile, place: Path) -> list[str]:
+def _find_impossible_conditions(settings: GridFile, origin: Path) -> list[str]:
     """Return a sentence for each value of a condition that its field never has."""
     exclude = {f"exclude.{number}": condition for number, condition in enumerate(settings.exclude)}
     splits = {f"splits.{name}": condition for name, condition in settings.splits.items()}
     return [
-        f"{shorten(place)}: {name}.{problem}"
+        f"{shorten(origin)}: {name}.{problem}"
         for name, condition in (exclude | splits).items()
         for problem in condition.list_impossible()
     ]
 
 
-def _find_idle_conditions(grid: Grid, place: Path) -> list[str]:
+def _find_idle_conditions(grid: Grid, origin: Path) -> list[str]:
     """Return a sentence for each split without a clip, and each condition of ``exclude`` that nothing meets.
 
     Such a number is mistyped. Where values are drawn, the draw may leave a condition without a clip. The grid of a
@@ -162,13 +166,13 @@ def _find_idle_conditions(grid: Grid, place: Path) -> list[str]:
     """
     filled = {split for split, _ in grid.tags}
     problems = [
-        f"{shorten(place)}: splits.{split}: gets no clip; correct its condition or those before it, or remove it"
+        f"{shorten(origin)}: splits.{split}: gets no clip; correct its condition or those before it, or remove it"
         for split in grid.settings.splits
         if split not in filled
     ]
     if grid.settings.latin_hypercube is None:
         problems += [
-            f"{shorten(place)}: exclude.{number}: leaves nothing out; correct its condition or remove it"
+            f"{shorten(origin)}: exclude.{number}: leaves nothing out; correct its condition or remove it"
             for number in grid.idle
         ]
     return problems

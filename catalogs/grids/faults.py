@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from catalogs.grids.blocks import Levels, PartialScenario
 from catalogs.grids.form import GridFile
 from catalogs.scenario import NUMBERS, UNKNOWN_WEATHER
-from catalogs.sentences import Place, describe_rules
+from catalogs.sentences import KeyPath, describe_rules
 
 BLOCKS = ("axes", "zip", "scenarios", "latin_hypercube")
 UNKNOWN: dict[str, Any] = {"weather": UNKNOWN_WEATHER, **dict.fromkeys(NUMBERS, nan)}
@@ -45,7 +45,7 @@ def read_form(content: dict[str, Any], path: Path) -> GridForm:
     """
     kept = deepcopy(content)
     form = GridForm(settings=None)
-    unknown: dict[Place, set[str]] = {}
+    unknown: dict[KeyPath, set[str]] = {}
     for _ in range(4):  # without a fault, a rule about the whole grid can fail, and then another
         try:
             settings = GridFile.model_validate(kept)
@@ -63,20 +63,20 @@ def read_form(content: dict[str, Any], path: Path) -> GridForm:
     return form
 
 
-def _known_keys(place: Place) -> Iterable[str]:
-    return GridFile.model_fields if not place else PartialScenario.model_fields
+def _known_keys(key_path: KeyPath) -> Iterable[str]:
+    return GridFile.model_fields if not key_path else PartialScenario.model_fields
 
 
-def _leave_out(kept: dict[str, Any], place: Place, unknown: dict[Place, set[str]]) -> bool:
+def _leave_out(kept: dict[str, Any], key_path: KeyPath, unknown: dict[KeyPath, set[str]]) -> bool:
     """Remove the faulty parts; return False where the scenarios are then undetermined.
 
     A field of a level, or all of the level, is noted as unknown.
     """
-    if not place:
+    if not key_path:
         return False
-    block = place[0]
+    block = key_path[0]
     depth = {"axes": 3, "zip": 3, "scenarios": 2, "base": 1}.get(str(block), 0)
-    if not depth or len(place) < depth:
+    if not depth or len(key_path) < depth:
         kept.pop(str(block), None)
         if block == "name":
             kept["name"] = "unnamed"
@@ -87,29 +87,29 @@ def _leave_out(kept: dict[str, Any], place: Place, unknown: dict[Place, set[str]
         if block == "frame_rate_hz":
             kept.pop("frames", None)
         return block not in (*BLOCKS, "exclude")
-    if place[-1] == "[key]":
+    if key_path[-1] == "[key]":
         return False
     table: Any = kept
-    for key in place[: depth - 1]:
+    for key in key_path[: depth - 1]:
         table = table.get(key, {})
-    if place[depth - 1] not in table:  # left out with what was around it
+    if key_path[depth - 1] not in table:  # left out with what was around it
         return True
-    level = place[depth - 1]
-    if len(place) == depth:
+    level = key_path[depth - 1]
+    if len(key_path) == depth:
         table[level] = {}
-        unknown.setdefault(place, set()).update(UNKNOWN)
+        unknown.setdefault(key_path, set()).update(UNKNOWN)
         return block != "base"
-    name = str(place[depth])
+    name = str(key_path[depth])
     table[level].pop(name, None)
-    unknown.setdefault(place[:depth], set()).add(name)
+    unknown.setdefault(key_path[:depth], set()).add(name)
     return True
 
 
-def _mark_unknown(settings: GridFile, unknown: dict[Place, set[str]]) -> GridFile:
+def _mark_unknown(settings: GridFile, unknown: dict[KeyPath, set[str]]) -> GridFile:
     """The settings with every field that could not be read as NaN, or as the unknown weather."""
 
-    def mark(partial: PartialScenario, place: Place) -> PartialScenario:
-        names = unknown.get(place, set()) & UNKNOWN.keys()
+    def mark(partial: PartialScenario, key_path: KeyPath) -> PartialScenario:
+        names = unknown.get(key_path, set()) & UNKNOWN.keys()
         return partial.model_copy(update={name: UNKNOWN[name] for name in names})
 
     def mark_axes(block: str, axes: dict[str, Levels]) -> dict[str, Levels]:

@@ -22,10 +22,15 @@ Reference = Annotated[str, Field(min_length=1, max_length=4096)]
 """Name or file of an entry; 4096 characters are the longest path."""
 
 BEFORE = {
-    "composition": "linear", "low_speed": "literal", "duration_s": None, "variant": "full", "hazard_marking": None,
-}  # fmt: skip
+    "composition": "linear",
+    "low_speed": "literal",
+    "duration_s": None,
+    "variant": "full",
+    "hazard_marking": None,
+    "wet_friction": "paper",
+}
 """Value of a setting that a record lacks, and that an id leaves out, so that older clips keep theirs; for ``low_speed``
-grid files mean another default."""
+and ``wet_friction`` grid files mean another default."""
 
 
 def _read_plain(value: object) -> object:
@@ -73,6 +78,12 @@ class GridFile(Blocks):
     low_speed: Literal["steady", "literal"] = Field(
         default="steady",
         description="End of a stop in paper mode: steady rests on no one sample; literal is Appendix B word by word.",
+    )
+    wet_friction: Literal["by-speed", "paper"] = Field(
+        default="by-speed",
+        exclude_if=lambda law: law == "paper",
+        description="Friction of wet roads in coupled mode: by-speed knows film and speed, paper the film alone"
+        " (Eq. 5). Paper mode takes the paper's.",
     )
     variant: Variant = Field(
         default="full",
@@ -158,6 +169,11 @@ class GridFile(Blocks):
     def marked_features(self) -> bool:
         """Whether clips may show a road feature with a finish."""
         return self.hazard_marking is not None and bool(self.has_features or self.base.hazard_height_m)
+
+    @property
+    def grips_by_speed(self) -> bool:
+        """Whether the numbers of ``catalogs/wet_friction.yaml`` reach the motion; paper mode keeps the paper's law."""
+        return self.vehicle_mode == "coupled" and self.wet_friction == "by-speed"
 
     @model_validator(mode="after")
     def _clips_are_few_enough(self) -> "GridFile":

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from catalogs.campaign_checks import load_campaign_checks
 from catalogs.channel_maps import ChannelMap
+from catalogs.entries import load
 from catalogs.recordings.bags import BAG, is_bag_folder, list_storage_files
 from catalogs.recordings.bus_json import BUS_JSON
 from catalogs.recordings.columns import replace_numbers
@@ -100,10 +100,12 @@ def read_signals(path: Path, channel_map: ChannelMap) -> dict[str, Signal]:
     restarts = {
         one.sentence: name
         for name, signal in signals.items()
-        for one in apply_checks(load_campaign_checks().clock, Clock(time=signal.time))
+        for one in apply_checks(load("table of checks").clock, Clock(time=signal.time))
     }
     if restarts:
-        raise InputError([f"{path.name}: the clock of {name} {told}" for told, name in restarts.items()])
+        raise InputError(
+            [f"{path.name}: the clock of {name} {sentence}" for sentence, name in restarts.items()]
+        )
     return {name: _replace_values(signal, channel_map.meanings_of(name)) for name, signal in signals.items()}
 
 

@@ -68,11 +68,11 @@ def convert_values(column: pd.Series, spelling: Spelling) -> tuple[NDArray[np.fl
     plain = plain if spelling.decimal == "." else plain.str.replace(spelling.decimal, ".")
     values = np.array(pd.to_numeric(plain, errors="coerce"), dtype=np.float64)
     low = text.str.lower()
-    told = low.isin(NO_VALUE).to_numpy()
+    known = low.isin(NO_VALUE).to_numpy()
     for word, number in spelling.meanings.items():
         same = (text == word).to_numpy()
-        values[same], told = np.nan if number is None else number, told | same
-    wrong = np.isnan(values) & ~told
+        values[same], known = np.nan if number is None else number, known | same
+    wrong = np.isnan(values) & ~known
     if not wrong.any():
         return values, ""
     numbers = values[~np.isnan(values)]
@@ -80,8 +80,8 @@ def convert_values(column: pd.Series, spelling: Spelling) -> tuple[NDArray[np.fl
         values[wrong] = low[wrong].map(SWITCH).to_numpy(np.float64)
         return values, ""
     row = int(np.argmax(wrong))
-    place = f"row {text.index[row]} below the names"
-    return values, f"{place} has {shorten_value(text.iloc[row])}: {_advise(text[wrong], wrong, spelling)}"
+    cell = f"row {text.index[row]} below the names"
+    return values, f"{cell} has {shorten_value(text.iloc[row])}: {_advise(text[wrong], wrong, spelling)}"
 
 
 def replace_numbers(values: NDArray[np.float64], meanings: Mapping[str, float | None]) -> NDArray[np.float64]:
@@ -131,14 +131,16 @@ def _advise(wrong: pd.Series, where: NDArray[np.bool_], spelling: Spelling) -> s
     )
 
 
-def read_clock(place: str, clock: TimeEntry, column: pd.Series, spelling: Spelling) -> NDArray[np.float64]:
+def read_clock(
+    recording: str, clock: TimeEntry, column: pd.Series, spelling: Spelling
+) -> NDArray[np.float64]:
     """Return the times of a clock's column, NaN where a row holds none, float64 [N] [s].
 
     Dates count from midnight (UTC where they name a zone) before the first of them, exact to the nanosecond.
 
     Parameters
     ----------
-    place : name of the recording, for the sentence
+    recording : name of the recording, for the sentence
     clock : from the channel map
     column : of numbers in the clock's unit, of dates, of durations, or of text
     spelling : how text is written
@@ -153,7 +155,7 @@ def read_clock(place: str, clock: TimeEntry, column: pd.Series, spelling: Spelli
         return convert_to_seconds(values, clock.unit)
     if clock.unit not in ("s", TIME_OF_DAY):
         raise InputError(
-            f"{place}: clock {clock.source} is of dates or times, which have no unit; {note}: leave unit:"
+            f"{recording}: clock {clock.source} is of dates or times, which have no unit; {note}: leave unit:"
             f" {clock.unit} away"
         )
     if pd.api.types.is_timedelta64_dtype(column.dtype):
@@ -162,18 +164,18 @@ def read_clock(place: str, clock: TimeEntry, column: pd.Series, spelling: Spelli
         return _count_from_midnight(column)
     text = _strip_text(column)
     text = text.mask(text.str.lower().isin(NO_VALUE), "")
-    told = text[text != ""]
-    if told.str.fullmatch(_TIME).all():
+    given = text[text != ""]
+    if given.str.fullmatch(_TIME).all():
         return _read_times_of_day(text)
     try:
-        if told.str.contains(_DATE).all():
+        if given.str.contains(_DATE).all():
             return _count_from_midnight(_parse_dates(text.mask(text == "")))
     except (ValueError, OverflowError):
         pass
-    odd = told[~(told.str.contains(_DATE) | told.str.fullmatch(_TIME))]
-    row = (odd if len(odd) else told).index[0]
+    odd = given[~(given.str.contains(_DATE) | given.str.fullmatch(_TIME))]
+    row = (odd if len(odd) else given).index[0]
     raise InputError(
-        f"{place}: signal {clock.source} must be of numbers, dates or times of day; row {row} below the names has"
+        f"{recording}: signal {clock.source} must be of numbers, dates or times of day; row {row} below the names has"
         f" {shorten_value(text[row])}: write times as a number of seconds, 2026-08-04 13:16:03.05 or 13:16:03.05"
     )
 

@@ -24,7 +24,7 @@ from tasks.campaign.signals import Signal
 from tasks.errors import InputError
 
 Result = TypeVar("Result")
-Place = tuple[int, int]
+Position = tuple[int, int]
 """Group and index of a channel."""
 LISTS = "it is of lists or records"
 """Why a channel is no signal, and is not listed."""
@@ -67,8 +67,8 @@ def _take_signals(path: Path, recording: Any, channel_map: ChannelMap) -> dict[s
     choices = _name_channels(recording)
     problems, signals = [], {}
     for name in signal_names(channel_map):
-        place = choices.get(name) or _find_by_group(recording, name)
-        if place is None:
+        position = choices.get(name) or _find_by_group(recording, name)
+        if position is None:
             twice = {
                 choice: ""
                 for choice in choices
@@ -78,7 +78,7 @@ def _take_signals(path: Path, recording: Any, channel_map: ChannelMap) -> dict[s
                 [describe_twice(path, name, twice)] if twice else describe_missing(path, (name,), (), choices)
             )
             continue
-        signals[name], note = _take_channel(recording, place, channel_map.meanings_of(name))
+        signals[name], note = _take_channel(recording, position, channel_map.meanings_of(name))
         if note:
             problems.append(f"{path.name}: signal {name} must be of numbers, one a sample; {note}")
     if problems:
@@ -86,13 +86,13 @@ def _take_signals(path: Path, recording: Any, channel_map: ChannelMap) -> dict[s
     return signals
 
 
-def _name_channels(recording: Any) -> dict[str, Place]:
-    """Return the place of each channel by the name for a map: GROUP.NAME where a name stands in several groups."""
+def _name_channels(recording: Any) -> dict[str, Position]:
+    """Return the position of each channel by the name for a map: GROUP.NAME where a name stands in several groups."""
     clocks = set(recording.masters_db.items())
-    named: dict[str, Place] = {}
+    named: dict[str, Position] = {}
     for name, places in recording.channels_db.items():
-        own = [place for place in places if place not in clocks]
-        labels = [_label_group(recording, place[0], [other for other, _ in own]) for place in own]
+        own = [position for position in places if position not in clocks]
+        labels = [_label_group(recording, position[0], [other for other, _ in own]) for position in own]
         names = [name] if len(own) == 1 else number_names([f"{label}.{name}" for label in labels])
         named |= zip(names, own, strict=True)
     return named
@@ -111,21 +111,23 @@ def _label_group(recording: Any, group: int, groups: list[int]) -> str:
     return next(label for label in _list_labels(recording, group) if label not in others)
 
 
-def _find_by_group(recording: Any, wanted: str) -> Place | None:
+def _find_by_group(recording: Any, wanted: str) -> Position | None:
     """Return the one channel that a name of the form GROUP.NAME means, by any label of its group; else None."""
     found = [
-        place
+        position
         for name, places in recording.channels_db.items()
         if wanted.endswith(f".{name}")
-        for place in places
-        if wanted.removesuffix(f".{name}") in _list_labels(recording, place[0])
+        for position in places
+        if wanted.removesuffix(f".{name}") in _list_labels(recording, position[0])
     ]
     return found[0] if len(found) == 1 else None
 
 
-def _take_channel(recording: Any, place: Place, meanings: Mapping[str, float | None]) -> tuple[Signal, str]:
+def _take_channel(
+    recording: Any, position: Position, meanings: Mapping[str, float | None]
+) -> tuple[Signal, str]:
     """Return a channel, and why it is none of numbers; a table of values may give text for some of them."""
-    channel = recording.get(group=place[0], index=place[1])
+    channel = recording.get(group=position[0], index=position[1])
     values, note = np.full(len(channel.timestamps), np.nan), LISTS
     if channel.samples.ndim == 1 and channel.samples.dtype.kind in "biufSU":
         samples = channel.samples
@@ -139,7 +141,9 @@ def _take_channel(recording: Any, place: Place, meanings: Mapping[str, float | N
 
 
 def _summarise_channels(recording: Any) -> list[SignalSummary]:
-    read = {name: _take_channel(recording, place, {}) for name, place in _name_channels(recording).items()}
+    read = {
+        name: _take_channel(recording, position, {}) for name, position in _name_channels(recording).items()
+    }
     return [summarise_signal(name, signal, note) for name, (signal, note) in read.items() if note != LISTS]
 
 

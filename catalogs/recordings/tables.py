@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from catalogs.campaign_checks import load_campaign_checks
 from catalogs.campaign_files import open_parquet, read_unit
 from catalogs.channel_maps import ChannelMap, CsvEntry, TimeEntry
 from catalogs.documents import read_content
+from catalogs.entries import load
 from catalogs.recordings.columns import Spelling, convert_values, make_series, read_clock, replace_numbers
 from catalogs.recordings.forms import (
     LARGEST_FILE,
@@ -91,11 +91,11 @@ def _read_with(open_table: Open) -> Callable[[Path, ChannelMap], dict[str, Signa
         except InputError as error:
             time, problems = np.full(0, np.nan), [*error.problems, *problems]
         if problems:
-            told = _describe_rows_of_text(table, series, [time, *columns.values()])
-            raise InputError(told or problems)
+            of_text = _describe_rows_of_text(table, series, [time, *columns.values()])
+            raise InputError(of_text or problems)
         first = 1 + len(channel_map.csv.rows_below) * bool(table.csv)
         rows = Clock(time=time, kind="row", where=" below the names", first=first)
-        if restarts := apply_checks(load_campaign_checks().clock, rows):
+        if restarts := apply_checks(load("table of checks").clock, rows):
             raise InputError(f"{path.name}: clock {clock.source} {restarts[0].sentence}")
         return {
             name: sample_column(time, values, clock, table.units.get(name, ""))

@@ -98,9 +98,9 @@ def _load_columns(path: Path) -> tuple[dict[str, pd.Series], dict[str, str]]:
         raise InputError(f"{path}: must be a table of text; {shorten(error)}") from None
     frame.index += 1
     names = number_names(words)
-    told = [_read_unit(line) for line in sections.get("header", [])][: len(names)]
+    in_header = [_read_unit(line) for line in sections.get("header", [])][: len(names)]
     extra = sections.get("channel units", [])[: len(names)]
-    stated = told + [""] * (len(names) - len(told))
+    stated = in_header + [""] * (len(names) - len(in_header))
     stated[len(names) - len(extra) :] = [unit.strip("[]()") or stated[k] for k, unit in enumerate(extra)]
     return {name: frame[k] for k, name in enumerate(names)}, dict(zip(names, stated, strict=True))
 

@@ -5,12 +5,13 @@ from functools import lru_cache
 from pathlib import Path
 
 from catalogs.scenes.folder import read_scene, scene_hash, write_scene
-from catalogs.scenes.street import CHANGES
+from catalogs.scenes.street import CHANGES, STREET_FILE, load_street_layout
 from catalogs.scenes.street_cache import BUILT_IN_SEED, cached_street
 from catalogs.sentences import shorten
 from catalogs.street_names import KIND_FILES, KINDS, parse_street_name
 from tasks.errors import InputError
 from tasks.scene.scene import Scene
+from tasks.scene.street.layout import StreetLayout
 
 BUILT_IN = tuple(CHANGES)
 """Streets that have a name of their own; those of a kind and a seed are named ``KIND-SEED``."""
@@ -36,7 +37,7 @@ def find_recipe(name: str) -> tuple[tuple[Path, ...], int] | None:
     if name in BUILT_IN:
         return CHANGES[name], BUILT_IN_SEED
     street = parse_street_name(name)
-    return None if street is None else ((KIND_FILES[street.kind],), street.seed)
+    return None if street is None else ((KIND_FILES[street.kind],), street.random_seed)
 
 
 def scene_folder(name_or_folder: str | Path) -> Path:
@@ -57,6 +58,19 @@ def scene_folder(name_or_folder: str | Path) -> Path:
             f" street of a kind and a seed, such as town-7; kinds are {', '.join(KINDS)}"
         )
     return folder
+
+
+def load_recipe(name_or_folder: str) -> tuple[StreetLayout, int] | None:
+    """Return the layout and the seed that a built-in street is made of; None of any other scene.
+
+    Parameters
+    ----------
+    name_or_folder : of the scene
+    """
+    if (recipe := find_recipe(name_or_folder)) is None:
+        return None
+    changes, seed = recipe
+    return load_street_layout(STREET_FILE, *changes, seed=seed), seed
 
 
 @lru_cache(maxsize=2)

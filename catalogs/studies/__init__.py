@@ -1,25 +1,22 @@
 """The paper's studies: the conditions it drives, its sampling, and the figures it prints."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field, TypeAdapter
+from pydantic import Field
 
 from catalogs.grids.blocks import PartialScenario
 from catalogs.quantities import (
     CatalogueEntry,
+    CatalogueList,
     Number,
     Scalar,
     Table,
     Text,
-    read_entries,
     require_quantity,
 )
 from catalogs.scenario import Scenario
 from tasks.studies.sensitivity import PrintedFigure, StudyProtocol, WeatherStudy
-
-FOLDER = Path(__file__).parent
 
 Count = Annotated[Scalar, require_quantity("1", minimum=0)]
 
@@ -66,7 +63,7 @@ class SensitivityEntry(CatalogueEntry):
 
     def build(self) -> tuple[StudyProtocol, tuple[PrintedFigure, ...]]:
         """Protocol and printed figures of the paper's Appendix E."""
-        values: dict[str, Any] = {name: quantity.value for name, quantity in self.protocol}
+        values = self.protocol.numbers()
         values["initial_speed"] /= 3.6
         values["samples"] = int(values["samples"])
         protocol = StudyProtocol(
@@ -102,17 +99,19 @@ class Condition:
     scenario: Scenario
 
 
-def load_conditions() -> tuple[Condition, ...]:
-    """The 19 development and 12 held-out conditions of the paper's Appendix C, in its order."""
-    rows = read_entries(TypeAdapter(list[ConditionEntry]), FOLDER / "appendix-c.yaml", "list of conditions")
-    return tuple(
-        Condition(
-            name=row.name,
-            split=row.split,
-            scenario=Scenario(**row.model_dump(exclude={"name", "split"}, exclude_none=True)),
+class ConditionList(CatalogueList[list[ConditionEntry]]):
+    """Content of the file."""
+
+    def build(self) -> tuple[Condition, ...]:
+        """The 19 development and 12 held-out conditions of the paper's Appendix C, in its order."""
+        return tuple(
+            Condition(
+                name=row.name,
+                split=row.split,
+                scenario=Scenario(**row.model_dump(exclude={"name", "split"}, exclude_none=True)),
+            )
+            for row in self.root
         )
-        for row in rows
-    )
 
 
 def _make_study(entry: WeatherStudyEntry) -> dict[str, Any]:

@@ -1,17 +1,15 @@
 """The paper's printed agreement of its vehicle model with CarSim, by split and group of cases."""
 
 from dataclasses import replace
-from functools import cache
-from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field, TypeAdapter
+from pydantic import Field
 
+from catalogs.entries import load
 from catalogs.names import Name
-from catalogs.quantities import CatalogueEntry, Number, Text, read_entries
+from catalogs.quantities import CatalogueEntry, CatalogueList, Number, Text
 from catalogs.reference_match import list_differences
 from catalogs.references import ReferenceCase
-from catalogs.studies import load_conditions
 
 SPLITS = {
     "development": "development",
@@ -31,17 +29,15 @@ class PrintedGroup(CatalogueEntry):
     maximum: dict[Name, Number] = Field(default_factory=dict)
 
 
-FILE = TypeAdapter(dict[Name, dict[Name, PrintedGroup | Text]])
+class AgreementFile(CatalogueList[dict[Name, dict[Name, PrintedGroup | Text]]]):
+    """Content of the file: the printed figures by split and group, and notes on a split."""
 
-
-@cache
-def printed_agreement() -> dict[str, dict[str, PrintedGroup]]:
-    """Return the printed figures by split and group."""
-    file = read_entries(FILE, Path(__file__).with_name("agreement.yaml"), "table of printed figures")
-    return {
-        split: {name: group for name, group in groups.items() if isinstance(group, PrintedGroup)}
-        for split, groups in file.items()
-    }
+    def build(self) -> dict[str, dict[str, PrintedGroup]]:
+        """Return the printed figures by split and group."""
+        return {
+            split: {name: group for name, group in groups.items() if isinstance(group, PrintedGroup)}
+            for split, groups in self.root.items()
+        }
 
 
 def find_printed_name(case: ReferenceCase) -> str:
@@ -53,7 +49,7 @@ def find_printed_name(case: ReferenceCase) -> str:
     """
     same = [
         condition.name
-        for condition in load_conditions()
+        for condition in load("list of conditions")
         if condition.scenario.precipitation_mm_h == (case.precipitation_mm_h or 0.0)
         and not list_differences(
             case, replace(condition.scenario, hold_speed=case.braked), case.surface_coefficient
@@ -73,7 +69,7 @@ def put_beside_print(groups: list[dict[str, Any]]) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
     for group in groups:
         name = group.get("paper_group", group["group"])
-        printed = printed_agreement().get(SPLITS.get(group["split"], ""), {}).get(name)
+        printed = load("table of printed agreement").get(SPLITS.get(group["split"], ""), {}).get(name)
         if printed is None:
             continue
         rows += [

@@ -187,7 +187,7 @@ def vehicle_units() -> dict[str, str]:
 
 def _open_content(content: bytes, source: Path) -> VehicleFile:
     line = read_generations(content, source)
-    # what another file brings is checked first, so that a problem is told of its file
+    # what another file brings is checked first, so that a problem is reported of its file
     for oldest in range(len(line) - 1, -1, -1):
         whole = join_generations(line[oldest:])
         entry = parse_entry(VehicleEntry, whole, line[oldest].source, "vehicle")

@@ -77,13 +77,13 @@ def plain_text(entry: Mapping[str, Any], title: str) -> str:
     return f"# {title}\n" + yaml.safe_dump(dict(entry), sort_keys=False, width=110, default_flow_style=None)
 
 
-def check_seal(content: bytes, place: object) -> None:
+def check_seal(content: bytes, origin: object) -> None:
     """Make sure that a frozen file still is what was frozen; a file without provenance has no seal to check.
 
     Parameters
     ----------
     content : of a vehicle file
-    place : where it comes from, for the sentence
+    origin : where it comes from, for the sentence
 
     Raises
     ------
@@ -98,7 +98,7 @@ def check_seal(content: bytes, place: object) -> None:
     stated = seal.decode("utf-8", "replace").strip() if found else ""
     if stated != digest:
         raise InputError(
-            f"{shorten(place)}: a frozen vehicle must be as it was frozen; its content has the hash {digest}, its"
+            f"{shorten(origin)}: a frozen vehicle must be as it was frozen; its content has the hash {digest}, its"
             f" last line says {shorten(stated, 64) or 'none'}: restore the file, or remove its provenance to make it"
             " a vehicle of your own"
         )

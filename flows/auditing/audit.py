@@ -5,8 +5,8 @@ import secrets
 from collections.abc import Sequence
 from typing import Any
 
-from flows.auditing.audit_facts import collect_facts, list_unchecked, name_other_writers, tell_time
-from flows.auditing.audit_report import format_text, tell_unchecked, tell_verdict, write_audit_page
+from flows.auditing.audit_facts import collect_facts, format_present_time, list_unchecked, name_other_writers
+from flows.auditing.audit_report import describe_unchecked, describe_verdict, format_text, write_audit_page
 from flows.auditing.contradictions import find_contradictions
 from flows.auditing.remaking import remake_and_compare
 from flows.auditing.signing import signature_findings
@@ -76,7 +76,7 @@ def audit_dataset(
         raise InputError(f"--share must lie in 0 to 1; it is {share:g}")
     check_runner(runner, scheduler)
     results = Outputs(out, "audit", "audit.html", "audit.json", "audit.txt")
-    started = tell_time()
+    started = format_present_time()
     changes: list[dict[str, Any]] = []
     mismatches: list[dict[str, Any]] = []
     not_remade: list[str] = []
@@ -130,9 +130,9 @@ def audit_dataset(
         "differences": as_sentences(changes),
         "not_remade": not_remade,
         "started_utc": started,
-        "ended_utc": tell_time(),
+        "ended_utc": format_present_time(),
     }
-    result = {"not_checked": tell_unchecked(unchecked), "verdict": tell_verdict(result), **result}
+    result = {"not_checked": describe_unchecked(unchecked), "verdict": describe_verdict(result), **result}
     results.write_json("audit.json", result)
     results.write("audit.txt", format_text(result))
     results.write("audit.html", write_audit_page(result))

@@ -111,6 +111,6 @@ def _count_unchecked(what: str, count: int, of: int, unit: str, why: str) -> dic
     return {"what": what, "count": count, "of": of, "unit": unit, "why": why}
 
 
-def tell_time() -> str:
+def format_present_time() -> str:
     """Return the date and time in UTC, to the second (ISO 8601)."""
     return datetime.now(UTC).isoformat(timespec="seconds").replace("+00:00", "Z")

@@ -8,7 +8,7 @@ from flows.pages.writer import Cell, Command, Part, Section, Table, write_page
 from manifests.explain import ABSENT
 
 
-def tell_verdict(result: Mapping[str, Any]) -> str:
+def describe_verdict(result: Mapping[str, Any]) -> str:
     """Return the verdict of an audit in one sentence.
 
     Parameters
@@ -33,15 +33,15 @@ def tell_verdict(result: Mapping[str, Any]) -> str:
     return f"{word}: {'; '.join(clauses)}."
 
 
-def tell_unchecked(rows: Sequence[Mapping[str, Any]]) -> str:
+def describe_unchecked(rows: Sequence[Mapping[str, Any]]) -> str:
     """Return in one sentence what an audit did not check, each with its count.
 
     Parameters
     ----------
     rows : of `flows.auditing.audit_facts.list_unchecked`
     """
-    told = (f"{row['what']} of {row['count']} of {row['of']} {row['unit']} ({row['why']})" for row in rows)
-    return f"Not checked: {'; '.join(told) or 'nothing'}."
+    listed = (f"{row['what']} of {row['count']} of {row['of']} {row['unit']} ({row['why']})" for row in rows)
+    return f"Not checked: {'; '.join(listed) or 'nothing'}."
 
 
 def list_remedies(result: Mapping[str, Any]) -> list[str]:
@@ -129,7 +129,8 @@ def write_audit_page(result: Mapping[str, Any]) -> str:
             {"file": row["path"], "damage": row["damage"], "clip": row["clip_id"]} for row in result["damaged"]
         ]),
         Table(title="Clips made again", rows=[
-            {"clip": clip["label"], "id": clip["clip_id"], "outcome": _tell_outcome(clip)} for clip in result["remade"]
+            {"clip": clip["label"], "id": clip["clip_id"], "outcome": _describe_outcome(clip)}
+            for clip in result["remade"]
         ]),
     ]  # fmt: skip
     mismatches = [
@@ -233,7 +234,7 @@ def _list_commands(result: Mapping[str, Any]) -> list[str | Command]:
     ]
 
 
-def _tell_outcome(clip: Mapping[str, Any]) -> Cell:
+def _describe_outcome(clip: Mapping[str, Any]) -> Cell:
     same = clip["as_recorded"]
     return Cell(value="as recorded" if same else "differs", tone="good" if same else "bad")
 

@@ -65,8 +65,8 @@ def find_contradictions(
         list(_compare_parts(layout, plan, damaged)),
         list(_compare_summaries(layout, manifest, plan, damaged)),
     ]
-    told = {sentence.partition(": ")[0] for kind in found for sentence in kind}
-    known = {*damaged, *told}
+    named = {sentence.partition(": ")[0] for kind in found for sentence in kind}
+    known = {*damaged, *named}
     others: list[str] = []
     for path, lies in chain(
         _compare_json(layout, manifest, plan, known),

@@ -12,6 +12,7 @@ from catalogs.scenes import load_scene
 from catalogs.studies.ablation import cut_coupling
 from catalogs.variants import warn_of_variant
 from flows.making.catalogue import Catalogue
+from flows.making.driven import refuse_driven
 from flows.making.driving import collect_surface_depths, controls_of, hazard_of, surface_of, weather_of
 from flows.making.input_changes import refuse_changed_records
 from flows.making.places import find_scene
@@ -58,6 +59,7 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
     manifest, plan = read_manifest(layout), read_plan(layout.root)
     refuse_changed_records(layout, manifest)
     refuse_traced(plan.inputs, dataset, "explain")
+    refuse_driven(plan.inputs, dataset, "explain")
     problems: list[str] = []
     planned = None
     try:
@@ -94,6 +96,7 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
         kind=driven.weather,
         friction=float(row["surface_friction"]),
         snow_depth_mm=float(row["snow_depth_mm"]),
+        grip=surface_of(driven, surface).grip,
     )
     ride = simulate_scenario(
         vehicle, state, controls_of(driven), hazard, mode=mode, duration_s=plan.duration_s, steady=steady,
@@ -102,7 +105,7 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
     response = compute_surface_response(vehicle, state.kind, state.friction)
     steps = [
         *surface_steps(weather_of(driven), surface, vehicle, row),
-        *force_steps(vehicle, response, hazard, mode, row),
+        *force_steps(vehicle, response, hazard, mode, row, state.grip),
         *pitch_steps(vehicle, response, hazard, row, ride, steady),
         *picture_steps(vehicle, catalogue.camera, row, first, find_route(plan.record_of(scenario.scene))),
     ]  # fmt: skip

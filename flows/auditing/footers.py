@@ -67,11 +67,11 @@ def find_footer_lies(file: pq.ParquetFile) -> Iterator[str]:
             if said is None:
                 continue
             for what, value in _measure_column(column).items():
-                told = getattr(said, what) if what == "null_count" or said.has_min_max else None
-                if told is not None and told != value:
+                stated = getattr(said, what) if what == "null_count" or said.has_min_max else None
+                if stated is not None and stated != value:
                     yield (
                         f"{what} of column {name.split('.')[0]} in row group {group} must be {format_value(value)}, as"
-                        f" its rows say; its footer says {format_value(told)}"
+                        f" its rows say; its footer says {format_value(stated)}"
                     )
 
 

@@ -79,13 +79,15 @@ def _compare_file(
     try:
         place = require_file(layout.root / path)
         with pq.ParquetFile(place, pre_buffer=False, page_checksum_verification=True) as file:
-            told = [name for name in file.schema_arrow.names if name in names]
+            present = [name for name in file.schema_arrow.names if name in names]
             if _holds_bytes(place, encode_tables(remake(file))) and not lies:
                 return
             lies.clear()
-            schemas, words = zip(*((table.schema, table.select(told)) for table in remake(file)), strict=True)
+            schemas, words = zip(
+                *((table.schema, table.select(present)) for table in remake(file)), strict=True
+            )
             found = [*find_label_lies(file, schemas[0], is_same_writer), *lies, *find_footer_lies(file)]
-            found += _find_word_lies(file.read(told), pa.concat_tables(words).unify_dictionaries())
+            found += _find_word_lies(file.read(present), pa.concat_tables(words).unify_dictionaries())
             if not found and is_same_writer:
                 found = find_writer_differences(file, b"".join(encode_tables(remake(file))))
     except InputError as error:

@@ -116,6 +116,34 @@ COMMANDS = (
         passed=lambda result: not result.get("telemetry_differs"),
     ),
     Command(
+        name="drive",
+        group=GROUP,
+        sentence="Make the dataset of a grid whose clips a policy brakes: a function that is asked step by step.",
+        function="flows.driving.drive:drive_grid",
+        options=(
+            GRID,
+            define_option(
+                "policy",
+                str,
+                "module:function of the observation that returns the pressure [MPa]; of a class each drive gets an"
+                " object. Its source and hash are kept.",
+            ),
+            define_option(
+                "out",
+                str,
+                "Dataset folder: new, empty, or an unfinished run of the same drive.",
+                in_store=True,
+            ),
+            define_option(
+                "rate_hz", float, "How often the policy is asked, whole milliseconds apart [Hz].", 20.0
+            ),
+            *GENERATING_RUNNER,
+            BACKEND,
+            PICTURES,
+        ),
+        brief=list_quarantined_clips,
+    ),
+    Command(
         name="lab freeze",
         group=GROUP,
         sentence="Freeze a run for generate --manifest: scenarios, seeds, parameters and the hash of each clip's"
@@ -153,14 +181,14 @@ COMMANDS = (
             define_option(
                 "notify",
                 str | None,
-                "Who is told of runs: a command, an http(s) address, an Apprise address (mailto://, slack://, ...), or"
-                " env:NAME of a variable that holds one.",
+                "Who is notified of runs: a command, an http(s) address, an Apprise address (mailto://, slack://, ...),"
+                " or env:NAME of a variable that holds one.",
                 None,
             ),
             define_option(
                 "notify_on",
                 str,
-                "Runs that are told of, with commas between: failed, late, done.",
+                "Ends of a run of which a notice is sent, with commas between: failed, late, done.",
                 "failed,late",
             ),
             define_option(

@@ -12,11 +12,11 @@ def shorten_evaluation(result: dict[str, Any]) -> dict[str, Any]:
     """Return an evaluation's means over all clips and over the paper's, and what lacks; or a single clip's rows."""
     rows = [row for row in result["rows"] if not row["window"]]
     means = [row for row in rows if row["condition"] == "all" or row["condition"].startswith("paper/")]
-    told = [
+    shown = [
         {key: row[key] for key in EVALUATION_COLUMNS} for row in means or rows if row["value"] is not None
     ]
     lacking = {row["metric"]: row["note"] for row in rows if row["condition"] == "-" and row["value"] is None}
-    return result | {"rows": told, "lacking": [f"{metric} ({note})" for metric, note in lacking.items()]}
+    return result | {"rows": shown, "lacking": [f"{metric} ({note})" for metric, note in lacking.items()]}
 
 
 COMMANDS = (

@@ -16,7 +16,7 @@ COMMANDS = (
         name="vehicle new",
         group=GROUP,
         sentence="Write a short file for the data sheet of a car, which inherits every other number.",
-        function="flows.measured.vehicle_template:make_vehicle_template",
+        function="flows.measured.vehicle_check:make_vehicle_template",
         options=(
             define_option("out", str, "File to write, NAME.yaml; it must not exist."),
             define_option(

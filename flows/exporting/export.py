@@ -7,8 +7,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from flows.exporting.card import CARD, describe_export
-from flows.exporting.dataset import ExportedDataset
+from catalogs.variants import warn_of_variant
+from flows.exporting.camera import describe_camera
+from flows.exporting.dataset import TICK_COLUMNS, ExportedDataset, describe_columns
 from flows.exporting.formats import FORMAT_NAMES, FORMATS, ExportFormat
 from flows.making.input_changes import refuse_changed_records
 from flows.reading.previews import select_clips
@@ -22,6 +23,7 @@ from manifests.manifest import is_quarantined
 from tasks.errors import InputError
 
 Writer = Callable[[ExportedDataset, Path], None]
+CARD = "musync-export.json"
 
 
 def export_dataset(
@@ -147,3 +149,32 @@ def _find_picture_problems(chosen: ExportFormat, manifest: Mapping[str, Any], da
     return [
         f"{dataset}: --to {chosen.name} needs frames; the dataset was made with --no-frames, which suits {without}"
     ]
+
+
+def describe_export(dataset: ExportedDataset, to: str) -> dict[str, Any]:
+    """Return the content of ``musync-export.json``: run, seal, camera, units, and each clip's scenario and figures.
+
+    Parameters
+    ----------
+    dataset : that is exported
+    to : name of the format
+    """
+    variant = dataset.plan.settings.variant
+    return {
+        "format": to,
+        "dataset": dataset.name,
+        "run_id": dataset.manifest["run_id"],
+        "seal": dataset.manifest["seal"],
+        "variant": variant,
+        **({"warning": warning} if (warning := warn_of_variant(variant)) else {}),
+        "frame_rate_hz": dataset.frame_rate_hz,
+        "camera": describe_camera(dataset.camera),
+        "columns": describe_columns(TICK_COLUMNS),
+        "clips": [
+            {
+                key: row[key]
+                for key in ("index", "clip_id", "label", "split", "scenario", "figures", "verdict")
+            }
+            for row in dataset.rows
+        ],
+    }

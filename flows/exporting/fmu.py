@@ -9,12 +9,13 @@ import platform
 import re
 import uuid
 import zipfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
+from xml.etree import ElementTree
 
 from catalogs.entries import load
 from catalogs.sentences import shorten
@@ -27,20 +28,35 @@ from flows.exporting.fmu_binary import (
     find_own_platform,
     format_header,
 )
-from flows.exporting.fmu_description import format_description
 from flows.reading.suggestions import suggest_names
 from flows.store.outputs import Outputs
 from manifests.provenance import code_version
 from tasks.errors import InputError
 from tasks.kernel_cache import sources_hash
-from tasks.surface.weather import Weather, find_weather, surface_state
+from tasks.surface.weather import WEATHERS, Weather, find_weather, surface_state
 from tasks.vehicle.model.embedded import STEP, compile_advance
-from tasks.vehicle.model.embedded_variables import INPUTS, OUTPUTS
+from tasks.vehicle.model.embedded_variables import INPUTS, OUTPUTS, EmbeddedVariable
 from tasks.vehicle.parameters import Vehicle
 
 SUFFIX = ".fmu"
 _LONG_AGO = (1980, 1, 1, 0, 0, 0)
 """Time of every file in the archive, so that the same vehicle gives the same bytes."""
+UNITS: Mapping[str, dict[str, str]] = {
+    "m": {"m": "1"},
+    "mm": {"m": "1", "factor": "0.001"},
+    "m s-1": {"m": "1", "s": "-1"},
+    "m s-2": {"m": "1", "s": "-2"},
+    "rad": {"rad": "1"},
+    "rad s-1": {"rad": "1", "s": "-1"},
+    "N": {"kg": "1", "m": "1", "s": "-2"},
+    "N m": {"kg": "1", "m": "2", "s": "-2"},
+    "MPa": {"kg": "1", "m": "-1", "s": "-2", "factor": "1000000"},
+    "K": {"K": "1"},
+    "1": {},
+}
+"""Units of the variables in the standard's base units."""
+_SLASHED = {"m s-1": "m/s", "m s-2": "m/s2", "rad s-1": "rad/s", "N m": "N.m"}
+"""How Modelica and Simulink write the units that muSync writes otherwise."""
 
 
 def write_fmu(
@@ -52,7 +68,7 @@ def write_fmu(
     ----------
     vehicle : catalogue name or file
     out : the file, NAME.fmu
-    surface : the pavement whose dry friction is the friction at the start
+    surface : the pavement whose dry friction is the friction at the start, and whose texture holds water
     platforms : where it will run; None takes this one
 
     Returns
@@ -106,11 +122,12 @@ def pack_fmu(car: Vehicle, content: bytes, surface: str, platforms: Sequence[str
     ----------
     car : the vehicle
     content : its file with everything that it inherits
-    surface : the pavement whose dry friction is the friction at the start
+    surface : the pavement, as of `write_fmu`
     platforms : where it will run, of `PLATFORMS`
     """
     weathers = car.find_weathers()
-    first = surface_state(Weather(kind=weathers[0]), load("surface", surface))
+    pavement = load("wet friction").apply(load("surface", surface))
+    first = surface_state(Weather(kind=weathers[0]), pavement)
     starts = {row.name: row.start for row in INPUTS} | {
         "weather": float(find_weather(weathers[0]).code),
         "road_friction": first.friction,
@@ -128,7 +145,7 @@ def pack_fmu(car: Vehicle, content: bytes, surface: str, platforms: Sequence[str
         ),
         "resources/vehicle.yaml": content,
     }
-    compiled, header = compile_advance(car), format_header(car, starts.values(), guid)
+    compiled, header = compile_advance(car, pavement), format_header(car, starts.values(), guid)
     for target in (PLATFORMS[name] for name in platforms):
         with TemporaryDirectory() as folder:
             place = f"binaries/{target.name}/{identifier}{target.suffix}"
@@ -162,3 +179,86 @@ def _refuse_paper_mode(vehicle: str) -> None:
             f"{shorten(vehicle)}: was fitted in {frozen.mode} mode, and an FMU drives the physical model, in which its"
             " numbers mean something else: take one of coupled mode, such as multibody-grown"
         )
+
+
+def format_description(
+    *, identifier: str, name: str, guid: str, tool: str, starts: Mapping[str, float], weathers: Sequence[str]
+) -> bytes:
+    """Return modelDescription.xml.
+
+    Parameters
+    ----------
+    identifier : name of the library's file
+    name : of the vehicle
+    guid : of the FMU
+    tool : name and version of what wrote it
+    starts : start value of each parameter and input [its unit]
+    weathers : kinds of weather in which the vehicle has a tyre
+    """
+    root = ElementTree.Element(
+        "fmiModelDescription", fmiVersion="2.0", modelName=name, guid=guid, generationTool=tool,
+        variableNamingConvention="flat", numberOfEventIndicators="0",
+        description=f"{name}: half-car with tyres, brakes and suspension, which brakes on a straight road",
+    )  # fmt: skip
+    ElementTree.SubElement(
+        root, "CoSimulation", modelIdentifier=identifier, canHandleVariableCommunicationStepSize="true",
+        canInterpolateInputs="false", canGetAndSetFMUstate="true", canSerializeFMUstate="true",
+        canNotUseMemoryManagementFunctions="true",
+    )  # fmt: skip
+    units = ElementTree.SubElement(root, "UnitDefinitions")
+    for unit, base in UNITS.items():
+        ElementTree.SubElement(ElementTree.SubElement(units, "Unit", name=write_unit(unit)), "BaseUnit", base)
+    ElementTree.SubElement(root, "DefaultExperiment", startTime="0", stopTime="5", stepSize=str(2 * STEP))
+    variables = ElementTree.SubElement(root, "ModelVariables")
+    for place, row in enumerate((*INPUTS, *OUTPUTS)):
+        said = f"{row.description}: {_number_weathers(weathers)}" if row.kind == "choice" else row.description
+        _add_variable(variables, row, said, place, starts.get(row.name))
+    structure = ElementTree.SubElement(root, "ModelStructure")
+    for group in ("Outputs", "InitialUnknowns"):
+        unknowns = ElementTree.SubElement(structure, group)
+        for index in range(len(INPUTS) + 1, len(INPUTS) + len(OUTPUTS) + 1):
+            unknown = ElementTree.SubElement(unknowns, "Unknown", index=str(index))
+            if group == "Outputs":  # it moves with the next step, and not with an input before it
+                unknown.set("dependencies", "")
+    ElementTree.indent(root)
+    text: bytes = ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True)
+    return text + b"\n"
+
+
+def write_unit(unit: str) -> str:
+    """Return a unit as other simulators write it.
+
+    Parameters
+    ----------
+    unit : as `tasks.conventions` writes it
+    """
+    return _SLASHED.get(unit, unit)
+
+
+def _number_weathers(weathers: Sequence[str]) -> str:
+    """The codes of the kinds of weather in which a vehicle has a tyre, in words."""
+    return ", ".join(f"{WEATHERS[kind].code} {kind}" for kind in weathers)
+
+
+def _add_variable(
+    parent: ElementTree.Element, row: EmbeddedVariable, description: str, place: int, start: float | None
+) -> None:
+    fixed = {"parameter": {"causality": "parameter", "variability": "fixed"}, "input": {"causality": "input"}}
+    roles = fixed.get(row.role, {"causality": "output", "initial": "calculated"})
+    if row.kind != "real" and row.role != "parameter":
+        roles |= {"variability": "discrete"}
+    said = {"name": row.name, "valueReference": str(place), "description": description}
+    variable = ElementTree.SubElement(parent, "ScalarVariable", said | roles)
+    if row.kind == "boolean":
+        ElementTree.SubElement(variable, "Boolean", start="true" if start else "false")
+        return
+    if row.kind == "choice":
+        # not an Enumeration: some importers (libcosim, Ecos) do not know that type, and could not choose
+        given = {"min": "1", "max": str(int(row.maximum)), "start": str(int(start or 1))}
+        ElementTree.SubElement(variable, "Integer", given)
+        return
+    bounds = {"min": row.minimum, "max": row.maximum, "start": start}
+    given = {
+        key: repr(value) for key, value in bounds.items() if value is not None and abs(value) != float("inf")
+    }
+    ElementTree.SubElement(variable, "Real", {"unit": write_unit(row.unit)} | given)

@@ -61,6 +61,7 @@ def describe_object(thing: StreetObject) -> dict[str, Any]:
         "centre": thing.centre.tolist(),
         "size": thing.size.tolist(),
         "heading": thing.heading,
+        "pitch": thing.pitch,
     }
 
 

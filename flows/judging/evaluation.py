@@ -88,10 +88,10 @@ def evaluate_dataset(
         refuse_changed_scene(scene)
     judges = load_judges(learned)
     facts = clip_facts(root)
-    told = trajectory_files(Path(trajectories), [row["clip_id"] for row in facts]) if trajectories else {}
+    outside = trajectory_files(Path(trajectories), [row["clip_id"] for row in facts]) if trajectories else {}
     cases = find_reference_cases(facts, Path(reference)) if reference is not None else None
     view = View(root=root, crf=crf)
-    clips = [run_as_stage(judge_clip)(view, row, told.get(row["clip_id"]), metric=metric) for row in facts]
+    clips = [run_as_stage(judge_clip)(view, row, outside.get(row["clip_id"]), metric=metric) for row in facts]
     standards = [own_telemetry(clips)]
     if cases is not None:
         standards.append(reference_traces(clips, cases))

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from catalogs.paper_metrics import ClipSet, paper_values
+from catalogs.entries import load
+from catalogs.paper_metrics import ClipSet
 from flows.judging.evaluation_rows import figure_row, group_weather_families, read_visual_seed
 from flows.judging.judged_clip import JudgedClip, Row
 
@@ -52,7 +53,7 @@ def mean_rows(rows: Sequence[Row], clips: list[JudgedClip]) -> Iterator[Row]:
     for row in rows:
         groups[row["metric"], row["method"], row["window"]].append(row)
     for (metric, _, _), figures in groups.items():
-        printed = paper_values().get(metric, {})
+        printed = load("table of printed figures").get(metric, {})
         placed = [row for row in figures if row["condition"] in places]
         if not placed:
             for over, value in printed.items():

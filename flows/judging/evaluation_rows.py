@@ -1,14 +1,19 @@
 """Rows of figures, and the clip with which a clip is compared."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
 from catalogs.scenario import SCENARIO_FIELDS
 from flows.judging.judged_clip import JudgedClip, Row
+from tasks.errors import InputError
+from tasks.eval.video_motion import WINDOWS
 from tasks.surface.weather import DRY, WEATHERS
+
+Scored = tuple[float | None, float]
+"""A figure and its floor."""
 
 
 class FigureDetails(TypedDict, total=False):
@@ -67,6 +72,26 @@ def figure_row(
         "averaged": details.get("averaged"),
         "seed_std": details.get("seed_std"),
     }
+
+
+def windowed_rows(
+    metric: str, method: str, condition: str, compute: Callable[[int | None], Scored], note: str = ""
+) -> Iterator[Row]:
+    """Return a figure [1] at every width of smoothing, beside what a perfect pose would score.
+
+    Parameters
+    ----------
+    metric, method, condition : as of `figure_row`
+    compute : value and floor at a width [frames]; the value is None where a pose is missing
+    note : why it is missing, or how to read it; what `compute` raises as `InputError` takes its place
+    """
+    for window in WINDOWS:
+        value, floor, said = None, None, note
+        try:
+            value, floor = compute(window)
+        except InputError as fault:
+            said = str(fault)
+        yield figure_row(metric, method, condition, value, "1", note=said, window=window, floor=floor)
 
 
 def read_visual_seed(label: str) -> str:

@@ -1,24 +1,33 @@
 """Scores of learned judges for a dataset's pictures; where weights are missing, a row that says so."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from catalogs.clip_prompts import load_prompts
+from catalogs.entries import load
 from catalogs.learned_judges import LoadedJudge
 from flows.judging.evaluation_rows import figure_row, find_control, group_weather_families
 from flows.judging.judged_clip import JudgedClip, Row, View
 from tasks.eval.learned_scores import (
     ClipWeather,
     FlowAlignedDistance,
-    VideoJudge,
     WholeVideo,
     dover_scores,
 )
 from tasks.eval.severity import severity_agreement
 from tasks.surface.weather import DRY
+
+METRICS = {
+    "dover_overall": "dover", "dover_technical": "dover", "dover_aesthetic": "dover", "fast_vqa": "fast_vqa",
+    "temporal_lpips": "lpips", "temporal_lpips_excess": "lpips",
+    "clip_severity_rho": "clip", "clip_adjacent_accuracy": "clip",
+}  # fmt: skip
+"""Judge of each metric."""
+EXCESS, ORDER = "temporal_lpips_excess", ("clip_severity_rho", "clip_adjacent_accuracy")
+"""The metric of a clip against its dry control, and those of a family of clips; any other is of one clip alone."""
+METHOD = "TorchScript"
 
 
 def learned_rows(view: View, clips: list[JudgedClip], judges: dict[str, LoadedJudge]) -> Iterator[Row]:
@@ -30,80 +39,56 @@ def learned_rows(view: View, clips: list[JudgedClip], judges: dict[str, LoadedJu
     clips : as the other judges saw them
     judges : from `catalogs.learned_judges.load_judges`
     """
-    yield from _score_with_dover(view, clips, judges["dover"])
-    yield from _fast_vqa(view, clips, judges["fast_vqa"])
-    yield from _temporal_lpips(view, clips, judges["lpips"])
-    yield from _score_severity(view, clips, judges["clip"])
-
-
-def _score_with_dover(view: View, clips: list[JudgedClip], loaded: LoadedJudge) -> Iterator[Row]:
-    names = ("dover_overall", "dover_technical", "dover_aesthetic")
-    if loaded.network is None:
-        yield from _list_missing(names, loaded.note)
-        return
-    judge = WholeVideo(network=loaded.network)
-    scores = {
-        clip.facts["label"]: dover_scores(judge.evaluate_network(_read_pictures(view, clip)))
-        for clip in clips
-    }
-    for name in names:
-        given = {label: found[name] for label, found in scores.items() if name in found}
-        if not given:
-            yield from _list_missing((name,), "not run: the checkpoint gives the overall score alone")
-        for label, value in given.items():
-            yield figure_row(name, "TorchScript", label, value, "1", note=loaded.note)
-
-
-def _fast_vqa(view: View, clips: list[JudgedClip], loaded: LoadedJudge) -> Iterator[Row]:
-    if loaded.network is None:
-        yield from _list_missing(("fast_vqa",), loaded.note)
-        return
-    judge = WholeVideo(network=loaded.network)
+    families = list(group_weather_families(clips))
+    scores: dict[str, dict[str, float]] = {}
+    if any(judge.network is not None for judge in judges.values()):
+        for clip in clips:
+            kinds = [kind for kind, _, levels in families if clip in levels]
+            scores[clip.facts["clip_id"]] = score_pictures(
+                view.arrays(clip.facts["index"], "rgb")[0], judges, dict.fromkeys(kinds)
+            )
     for clip in clips:
-        value = _score_clip(view, clip, judge)
-        yield figure_row("fast_vqa", "TorchScript", clip.facts["label"], value, "1", note=loaded.note)
+        mine, control = scores.get(clip.facts["clip_id"], {}), find_control(clip, clips, weather=True)
+        if control is not None and "temporal_lpips" in mine:
+            mine[EXCESS] = mine["temporal_lpips"] - scores[control.facts["clip_id"]]["temporal_lpips"]
+    for metric, judge in METRICS.items():
+        note = judges[judge].note
+        if judges[judge].network is None:
+            yield figure_row(metric, "-", "-", None, "1", note=note)
+        elif metric not in ORDER:
+            yield from _list_scores(metric, clips, scores, note)
+        else:
+            for kind, condition, levels in families:
+                yield _rank_family(metric, condition, levels, f"clip_{kind}", scores, note)
 
 
-def _temporal_lpips(view: View, clips: list[JudgedClip], loaded: LoadedJudge) -> Iterator[Row]:
-    """Yield the severity of each clip, and its difference to that of the dry control."""
-    names = ("temporal_lpips", "temporal_lpips_excess")
-    if loaded.network is None:
-        yield from _list_missing(names, loaded.note)
-        return
-    judge = FlowAlignedDistance(network=loaded.network)
-    scores = {clip.facts["clip_id"]: _score_clip(view, clip, judge) for clip in clips}
-    for clip in clips:
-        label, value = clip.facts["label"], scores[clip.facts["clip_id"]]
-        yield figure_row(names[0], "TorchScript", label, value, "1", note=loaded.note)
-        control = find_control(clip, clips, weather=True)
-        if control is not None:
-            excess = value - scores[control.facts["clip_id"]]
-            yield figure_row(names[1], "TorchScript", label, excess, "1", note=loaded.note)
+def _list_scores(
+    metric: str, clips: list[JudgedClip], scores: Mapping[str, Mapping[str, float]], note: str
+) -> Iterator[Row]:
+    scored = {clip.facts["label"]: scores[clip.facts["clip_id"]].get(metric) for clip in clips}
+    known = {label: value for label, value in scored.items() if value is not None}
+    if metric.startswith("dover") and not known:
+        yield figure_row(
+            metric, "-", "-", None, "1", note="not run: the checkpoint gives the overall score alone"
+        )
+    for label, value in known.items():
+        yield figure_row(metric, METHOD, label, value, "1", note=note)
 
 
-def _list_missing(names: tuple[str, ...], note: str) -> Iterator[Row]:
-    for name in names:
-        yield figure_row(name, "-", "-", None, "1", note=note)
-
-
-def _score_severity(view: View, clips: list[JudgedClip], clip_judge: LoadedJudge) -> Iterator[Row]:
-    names = ("clip_severity_rho", "clip_adjacent_accuracy")
-    if clip_judge.network is None or clip_judge.text_features is None:
-        yield from _list_missing(names, clip_judge.note)
-        return
-    network = clip_judge.network
-    features = dict(zip(load_prompts(), clip_judge.text_features, strict=True))
-    for kind, condition, levels in group_weather_families(clips):
-        if kind not in features:
-            for name in names:
-                note = f"not run: the catalogue has no CLIP prompts of {kind}"
-                yield figure_row(name, "TorchScript", condition, None, "1", note=note)
-            continue
-        judge = weather_judge(network, features, kind)
-        rates = {c.facts["clip_id"]: c.facts["precipitation_mm_h"] for c in levels}
-        scores = {c.facts["clip_id"]: _score_clip(view, c, judge) for c in levels}
-        for name, value in zip(names, rank_weathers(rates, scores), strict=True):
-            yield figure_row(name, "TorchScript", condition, value, "1", note=clip_judge.note)
+def _rank_family(
+    metric: str, condition: str, levels: Sequence[JudgedClip], name: str,
+    scores: Mapping[str, Mapping[str, float]], note: str,
+) -> Row:  # fmt: skip
+    found = {clip.facts["clip_id"]: scores[clip.facts["clip_id"]].get(name) for clip in levels}
+    known = {clip_id: value for clip_id, value in found.items() if value is not None}
+    if len(known) < len(levels):
+        kind = name.removeprefix("clip_")
+        return figure_row(
+            metric, METHOD, condition, None, "1", note=f"not run: the catalogue has no CLIP prompts of {kind}"
+        )
+    rates = {clip.facts["clip_id"]: clip.facts["precipitation_mm_h"] for clip in levels}
+    value = dict(zip(ORDER, rank_weathers(rates, known), strict=True))[metric]
+    return figure_row(metric, METHOD, condition, value, "1", note=note)
 
 
 def weather_judge(network: Any, features: Mapping[str, NDArray[np.floating]], kind: str) -> ClipWeather:
@@ -135,7 +120,7 @@ def rank_weathers(rates: Mapping[str, float], scores: Mapping[str, float]) -> tu
 
 
 def score_pictures(
-    frames: NDArray[np.uint8], judges: Mapping[str, LoadedJudge], kinds: Sequence[str]
+    frames: NDArray[np.uint8], judges: Mapping[str, LoadedJudge], kinds: Iterable[str]
 ) -> dict[str, float]:
     """Return the score of every learned judge that has weights, for the frames of one video.
 
@@ -154,18 +139,10 @@ def score_pictures(
         scores["temporal_lpips"] = FlowAlignedDistance(network=lpips).score(frames)
     clip = judges["clip"]
     if clip.network is not None and clip.text_features is not None:
-        features = dict(zip(load_prompts(), clip.text_features, strict=True))
+        features = dict(zip(load("list of prompts"), clip.text_features, strict=True))
         scores |= {
             f"clip_{kind}": weather_judge(clip.network, features, kind).score(frames)
             for kind in kinds
             if kind in features
         }
     return scores
-
-
-def _score_clip(view: View, clip: JudgedClip, judge: VideoJudge) -> float:
-    return judge.score(_read_pictures(view, clip))
-
-
-def _read_pictures(view: View, clip: JudgedClip) -> NDArray[np.uint8]:
-    return view.arrays(clip.facts["index"], "rgb")[0]

@@ -1,20 +1,19 @@
 """Figures of the motion recovered from a dataset's pictures, against a standard: own telemetry or reference traces."""
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Literal
 
 import numpy as np
 
 from catalogs.entries import load
-from flows.judging.evaluation_rows import figure_row, find_control
+from flows.judging.evaluation_rows import Scored, figure_row, find_control, windowed_rows
 from flows.judging.judged_clip import JudgedClip, Row
-from flows.judging.standards import MeantMotion, Standard, opening_of, require_whole_way
-from tasks.errors import InputError
+from flows.judging.standards import Floats, MeantMotion, Standard, opening_of, require_whole_way
 from tasks.eval.body_agreement import rms
 from tasks.eval.poses.motion import RecoveredMotion, motion_of_telemetry
 from tasks.eval.video_motion import (
     PAPER_OPENING,
-    WINDOWS,
     geometry_error,
     path_error,
     reference_progress,
@@ -94,30 +93,12 @@ def weather_rows(clips: Sequence[JudgedClip], standard: Standard) -> Iterator[Ro
             continue
         label = clip.facts["label"]
         failure = _describe_failure(motion) or _describe_failure(other)
-        station, control_station = meant.station, dry.station
         forward = motion.normalised_path, other.normalised_path
-        for window in WINDOWS:
-            try:
-                require_whole_way(meant)
-                require_whole_way(dry)
-                floor = weather_error(station, control_station, station, control_station, window)
-                error = None if failure else weather_error(
-                    forward[0][:, 0], forward[1][:, 0], station, control_station, window
-                )  # fmt: skip
-                note = failure or _describe_case(meant)
-            except InputError as fault:
-                floor, error, note = None, None, str(fault)
-            yield figure_row(
-                f"e_weather{standard.suffix}",
-                method,
-                label,
-                error,
-                "1",
-                note=note,
-                window=window,
-                floor=floor,
-            )
-        route = np.column_stack([forward[0][:, 0], np.zeros(len(station))])
+        seen = None if failure else (forward[0][:, 0], forward[1][:, 0])
+        change = partial(_score_change, meant, dry, seen)
+        note = failure or _describe_case(meant)
+        yield from windowed_rows(f"e_weather{standard.suffix}", method, label, change, note)
+        route = np.column_stack([forward[0][:, 0], np.zeros(len(meant.station))])
         against = route if standard.suffix else forward[1][:, :2]
         error = None if failure else path_error(forward[0][:, :2], against)
         note = failure or ("against the route: a trace holds no lateral motion" if standard.suffix else "")
@@ -135,20 +116,10 @@ def geometry_rows(
         opening = find_opening(clip, meant, event_window)
         name = f"e_geometry_{'hump' if height > 0 else 'depression'}{standard.suffix}"
         failure = _describe_failure(motion)
-        for window in WINDOWS:
-            try:
-                floor = geometry_error(clip.times, meant.pitch, meant.pitch, opening, window)
-                error = (
-                    None
-                    if failure
-                    else geometry_error(clip.times, motion.pitch, meant.pitch, opening, window)
-                )
-                note = failure or _describe_case(meant)
-            except InputError as fault:
-                floor, error, note = None, None, str(fault)
-            yield figure_row(
-                name, method, clip.facts["label"], error, "1", note=note, window=window, floor=floor
-            )
+        seen = None if failure else motion.pitch
+        error = partial(_score_pitch, clip.times, meant.pitch, seen, opening)
+        note = failure or _describe_case(meant)
+        yield from windowed_rows(name, method, clip.facts["label"], error, note)
 
 
 def find_opening(clip: JudgedClip, meant: MeantMotion, event_window: EventWindow) -> float:
@@ -183,8 +154,27 @@ def _list_judged(clips: Sequence[JudgedClip], standard: Standard) -> Iterator[Ju
             continue
         for method, motion in clip.motions.items():
             yield clip, method, motion, meant
-        if standard.suffix and (told := motion_of(clip, TELEMETRY)) is not None:
-            yield clip, TELEMETRY, told, meant
+        if standard.suffix and (own := motion_of(clip, TELEMETRY)) is not None:
+            yield clip, TELEMETRY, own, meant
+
+
+def _score_change(
+    meant: MeantMotion, dry: MeantMotion, seen: tuple[Floats, Floats] | None, window: int | None
+) -> Scored:
+    """E_weather of the progress of a clip and its dry control; no value where it was not recovered."""
+    require_whole_way(meant)
+    require_whole_way(dry)
+    stations = meant.station, dry.station
+    floor = weather_error(*stations, *stations, window)
+    return None if seen is None else weather_error(*seen, *stations, window), floor
+
+
+def _score_pitch(
+    times: Floats, meant: Floats, seen: Floats | None, opening: float, window: int | None
+) -> Scored:
+    """E_geometry of a clip's pitch; no value where it was not recovered."""
+    floor = geometry_error(times, meant, meant, opening, window)
+    return None if seen is None else geometry_error(times, seen, meant, opening, window), floor
 
 
 def _describe_case(meant: MeantMotion, *, ends: bool = False) -> str:

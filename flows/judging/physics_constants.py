@@ -12,6 +12,7 @@ from flows.making.catalogue import Catalogue
 from flows.making.plan import TICK_RATE_HZ
 from flows.store.layout import Layout
 from flows.store.sealed import read_plan_record, recorded_grid
+from manifests.manifest import is_driven
 from tasks.errors import InputError
 from tasks.eval.physics.constants import Constants, TyreTables
 from tasks.surface.state import SurfaceParameters
@@ -39,18 +40,19 @@ def read_constants(root: Path) -> Constants:
     catalogue = Catalogue(layout.inputs)
     vehicle, pavement = catalogue.vehicle, catalogue.surface  # of the form that they must have
     car = parse_yaml(catalogue.vehicle_file.content, files["vehicle"], "catalogue entry")
-    settings = recorded_grid(read_plan_record(layout)["grid"], layout.plan)
+    record = read_plan_record(layout)
+    settings = recorded_grid(record["grid"], layout.plan)
     tyre = catalogue.vehicle_file.tyre
     return make_constants(
         _convert_numbers(car), vehicle, pavement, mode=settings.vehicle_mode,
         ticks_per_frame=TICK_RATE_HZ / settings.frame_rate_hz, steady=catalogue.steady,
-        tyre=None if tyre is None else tyre_entries(tyre[1]),
+        tyre=None if tyre is None else tyre_entries(tyre[1]), policy=is_driven(record["inputs"]),
     )  # fmt: skip
 
 
 def make_constants(
     car: Mapping[str, float], vehicle: Vehicle, pavement: SurfaceParameters, *, mode: str, ticks_per_frame: float,
-    steady: SteadyStop | None, tyre: Mapping[str, str] | None = None,
+    steady: SteadyStop | None, tyre: Mapping[str, str] | None = None, policy: bool = False,
 ) -> Constants:  # fmt: skip
     """Return what the judge takes as given.
 
@@ -63,6 +65,7 @@ def make_constants(
     ticks_per_frame : ticks from one frame to the next [1]
     steady : how the end of a stop is kept steady; None takes the published rule literally
     tyre : entries of the tyre's property file; None for Burckhardt's curves
+    policy : whether a policy braked
     """
     grows = mode == "coupled"
     return Constants(
@@ -73,7 +76,7 @@ def make_constants(
         steady_limit=0.0 if steady is None else steady.explicit_limit,
         held_share=0.0 if steady is None else steady.held_share,
         low_speed_rule=steady is None or steady.pitch_rule,
-        tyre=tyre,
+        tyre=tyre, policy=policy,
         # the paper's mode knows no effect
         effects={name: value for name, value in vehicle.effects.items() if value and grows},
         forms=tuple((form.port, form.variable) for form in vehicle.forms if grows),

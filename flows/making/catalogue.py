@@ -5,15 +5,17 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
+from catalogs.driven import DrivenClips, read_driven
 from catalogs.entries import load
 from catalogs.low_speed import LOW_SPEED, LOW_SPEED_CUT
 from catalogs.references import read_reference
 from catalogs.road_grade import name_grade_file
-from catalogs.scenes import load_scene
+from catalogs.scenes import load_recipe, load_scene
 from catalogs.studies.ablation import ABLATION, FamilyWeather, find_families
 from catalogs.vehicles import VehicleFile, open_vehicle
 from catalogs.weather.grip import WeatherFolder
 from catalogs.weather.look import load_weather
+from catalogs.wet_friction import WET_FRICTION
 from flows.making.places import find_scene
 from flows.making.plan import read_plan
 from flows.making.traced import Reference
@@ -24,6 +26,7 @@ from tasks.render.camera import Camera
 from tasks.render.road_paint import HazardMarking
 from tasks.render.weather.parameters import WeatherParameters
 from tasks.scene.scene import Scene
+from tasks.scene.street.layout import StreetLayout
 from tasks.studies.sensitivity import StudyProtocol
 from tasks.surface.road_profile import LEVEL_ROAD, RoadGrade
 from tasks.surface.state import SurfaceParameters
@@ -69,7 +72,9 @@ class Catalogue:
     @cached_property
     def surface(self) -> SurfaceParameters:
         """The pavement."""
-        return load("surface", self._inputs / "surface.yaml", self.weather)
+        pavement: SurfaceParameters = load("surface", self._inputs / "surface.yaml", self.weather)
+        wet = self._load_kept("wet friction", WET_FRICTION)
+        return pavement if wet is None else wet.apply(pavement)
 
     @cached_property
     def camera(self) -> Camera:
@@ -124,10 +129,20 @@ class Catalogue:
         return load_scene(self._scene)
 
     @cached_property
+    def street(self) -> tuple[StreetLayout, int] | None:
+        """Layout and seed of a built-in street, whose objects can be drawn finer; None of another scene."""
+        return load_recipe(self._scene)
+
+    @cached_property
     def traces(self) -> Reference | None:
         """Reference traces whose motion the clips show; None where the vehicle drives."""
         folder = self._inputs / TRACES
         return read_reference(folder) if folder.is_dir() else None
+
+    @cached_property
+    def driven(self) -> DrivenClips | None:
+        """Pressures of a policy's drive; None where the scenarios brake."""
+        return read_driven(self._inputs)
 
     def _load_kept(self, kind: str, name: str) -> Any:
         """Load an entry that not every dataset keeps; None where this one does not."""

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from catalogs.studies.ablation import cut_coupling
 from flows.making.catalogue import Catalogue, catalogue_of
+from flows.making.driven import drive_by_pressures, driven_ranges_of
 from flows.making.driving import (
     collect_surface_figures,
     peak_lateral_demand,
@@ -130,6 +131,10 @@ def roll_out(work: ClipWork) -> tuple[Rollout, dict[str, float]]:
     catalogue, plan = work.catalogue, work.plan
     if catalogue.traces is not None:
         return _move_car(work), unknown_ranges()
+    if catalogue.driven is not None:
+        return _move_car(work), driven_ranges_of(
+            work.clip.scenario, work.clip.label, catalogue, plan.duration_s
+        )
     return _move_car(work), ranges_of(
         cut_coupling(work.clip.scenario, plan.settings.variant, catalogue.families), catalogue.vehicle,
         catalogue.surface, catalogue.study, plan.settings.vehicle_mode, plan.duration_s, catalogue.steady,
@@ -142,6 +147,8 @@ def _move_car(work: ClipWork) -> Rollout:
     scenario, catalogue, plan = work.clip.scenario, work.catalogue, work.plan
     if catalogue.traces is not None:
         return replay_drive(scenario, catalogue.surface, catalogue.traces, plan.duration_s)
+    if catalogue.driven is not None:
+        return drive_by_pressures(scenario, work.clip.label, catalogue, plan.duration_s)
     _, ride = simulate_drive(
         cut_coupling(scenario, plan.settings.variant, catalogue.families), catalogue.vehicle,
         catalogue.surface, plan.settings.vehicle_mode, plan.duration_s, catalogue.steady, catalogue.grade,

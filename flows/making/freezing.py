@@ -38,7 +38,7 @@ from manifests.records import FrozenRun
 from tasks.errors import InputError
 
 SHOWN_DIFFERENCES = 8
-RULES = ("low_speed", "duration_s", "hazard_marking")
+RULES = ("low_speed", "duration_s", "hazard_marking", "wet_friction")
 """Settings that grids gained after runs of them were frozen."""
 
 

@@ -266,8 +266,8 @@ def fan_out(layout: Layout, plan: Plan, indices: list[int], executor: Executor) 
                 receipt = future.result()
                 cost, committed = cost.with_clip(receipt["cost"]), committed + 1
                 advance(label, facts=list_step_times(receipt))
-            elif (told := disk_full_sentence(error)) is not None:
-                raise InputError(f"{layout}: {committed} of {len(indices)} clips are committed; {told}")
+            elif (full := disk_full_sentence(error)) is not None:
+                raise InputError(f"{layout}: {committed} of {len(indices)} clips are committed; {full}")
             else:
                 failures[label] = error
                 advance(label, failed=True)

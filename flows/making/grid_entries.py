@@ -7,10 +7,12 @@ from typing import Any
 
 from catalogs.entries import open_entry
 from catalogs.grids import GridFile
+from catalogs.grids.form import BEFORE
 from catalogs.low_speed import LOW_SPEED, LOW_SPEED_CUT
 from catalogs.studies.ablation import ABLATION
 from catalogs.vehicles import open_vehicle
 from catalogs.weather.grip import WEATHER
+from catalogs.wet_friction import WET_FRICTION
 from tasks.errors import InputError
 from tasks.render.camera import Camera
 from tasks.surface.state import SurfaceParameters
@@ -48,6 +50,7 @@ INPUTS = (
         needed=lambda settings: settings.marked_features,
     ),
     Input(name=LOW_SPEED, kind="low-speed rule", needed=lambda settings: settings.keeps_stops_steady),
+    Input(name=WET_FRICTION, kind="wet friction", needed=lambda settings: settings.grips_by_speed),
     Input(name=ABLATION, kind="ablation", needed=lambda settings: settings.variant == "fixed-mu"),
     Input(
         name=LOW_SPEED_CUT, kind="cut of the low-speed rule",
@@ -84,7 +87,8 @@ class GridEntries:
     @property
     def surface(self) -> SurfaceParameters:
         """The pavement."""
-        return self.values["surface.yaml"]
+        pavement, wet = self.values["surface.yaml"], self.values.get(WET_FRICTION)
+        return pavement if wet is None else wet.apply(pavement)
 
     @property
     def camera(self) -> Camera:
@@ -149,7 +153,8 @@ def find_private_entries(settings: GridFile) -> list[str]:
 
 
 def recorded_settings(settings: GridFile) -> GridFile:
-    """The settings as a dataset records them: with files by their name alone where their path is a private matter.
+    """The settings as a dataset records them: the law of wet friction that is driven on, and files by their name alone
+    where their path is a private matter.
 
     Parameters
     ----------
@@ -160,7 +165,8 @@ def recorded_settings(settings: GridFile) -> GridFile:
         for name in ("scene", *OWN_ENTRIES)
         if (value := getattr(settings, name)) is not None
     }
-    return settings.model_copy(update=references)
+    law = {} if settings.grips_by_speed else {"wet_friction": BEFORE["wet_friction"]}
+    return settings.model_copy(update=references | law)
 
 
 def recorded_reference(reference: str) -> str:

@@ -61,6 +61,7 @@ def read_grid_inputs(grid: Grid, tick_rate_hz: int) -> tuple[GridEntries, Scenes
         problems += cap_problems(_find_feature_problems(grid, entries.vehicle))
     if sound and grid.poses is None:
         problems += cap_problems(find_bend_problems(grid, entries))
+    entries.contents.update(grid.driven)
     if grid.poses is not None:
         traces, found = read_trace_inputs(grid, grid.poses, entries.values.get("surface.yaml"))
         entries.contents.update(traces)
@@ -146,7 +147,7 @@ def _find_buried_cameras(grid: Grid, entries: GridEntries) -> list[str]:
         f"scenario {label}: snow must be less than {deepest_mm:g} mm deep in a picture: its lumps reach the camera"
         f" {height_m:g} m above the road; it is {depth_mm:g} mm: take a shorter snow_accumulation_h or pictures: false"
         for label, scenario in grid.scenarios
-        # a faulty scenario has been told of
+        # a faulty scenario has been reported
         if find_weather_problem(scenario.weather) is None
         and not find_range_problems(scenario)
         and (depth_mm := surface_of(scenario, entries.surface).snow_depth_mm) >= deepest_mm
@@ -173,7 +174,7 @@ def _find_feature_problems(grid: Grid, vehicle: Vehicle) -> list[str]:
     problems: dict[str, str] = {}
     for label, scenario in grid.scenarios:
         if scenario.hazard_height_m == 0 or find_scenario_problems(scenario):
-            continue  # a faulty scenario has been told of
+            continue  # a faulty scenario has been reported
         travel = compute_strut_travel(vehicle, hazard_of(scenario), scenario.initial_speed_km_h / 3.6)
         rule = (
             f"strut travel on the road feature of {scenario.hazard_length_m:g} x {scenario.hazard_height_m:g} m at"

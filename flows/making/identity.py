@@ -31,6 +31,8 @@ def list_deciding(
         later["low_speed"] = BEFORE["low_speed"]
     # among the inputs, and only where a scenario has a feature
     later["hazard_marking"] = BEFORE["hazard_marking"]
+    if not settings.grips_by_speed:
+        later["wet_friction"] = BEFORE["wet_friction"]
     return {
         "scene": dict(scene),
         **({"scenes": [dict(one) for one in scenes]} if scenes else {}),

@@ -14,6 +14,7 @@ from flows.making.driving import hazard_of, weather_of
 from flows.making.plan import Plan, frame_ticks
 from tasks.render.camera import RigAt, body_poses, continuous_rig
 from tasks.render.clip import RigMotion, render_clip
+from tasks.render.feature_sign import add_sign
 from tasks.render.kerb_face import extend_kerbs
 from tasks.render.rasterise.backend import select_backend
 from tasks.render.road_edit import RoadRelief, apply_road_profile
@@ -22,6 +23,7 @@ from tasks.render.road_refinement import refine_road
 from tasks.render.weather.layers import ClipConditions
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.scene import Scene
+from tasks.scene.street.cars.near import detail_cars
 from tasks.surface.anchors import adjacent_anchors
 from tasks.surface.road_profile import RoadHazard, road_elevation, road_slope
 from tasks.surface.state import SurfaceState
@@ -62,17 +64,29 @@ def render_frames(
     rig_at: RigAt,
 ) -> dict[str, NDArray[Any]]:
     """Render the clip's finished frames, depth and class."""
+    T_world_rig = frames["T_world_rig"].reshape(-1, 4, 4)
+    scene = catalogue.scene
+    if (street := catalogue.street) is not None:
+        scene = replace(
+            scene,
+            gaussians=detail_cars(
+                scene.gaussians,
+                *street,
+                T_world_rig @ catalogue.camera.T_rig_camera,
+                float(catalogue.camera.K[0, 0]),
+            ),
+        )
     gaussians, relief = edit_scene(
-        catalogue.scene,
+        scene,
         hazard_of(scenario),
         catalogue.marking,
         catalogue.weather_parameters.sky.asphalt_albedo,
     )
     return render_clip(
-        replace(catalogue.scene, gaussians=gaussians),
+        replace(scene, gaussians=gaussians),
         catalogue.camera,
         RigMotion(
-            T_world_rig=frames["T_world_rig"].reshape(-1, 4, 4),
+            T_world_rig=T_world_rig,
             frame_rate_hz=plan.settings.frame_rate_hz,
             rig_at=rig_at,
         ),
@@ -100,7 +114,7 @@ def edit_scene(
     ----------
     scene : without the feature
     hazard : road feature; height 0 leaves the scene as it is
-    marking : painted on a hump; None leaves it plain
+    marking : finish of the feature; None leaves it plain
     asphalt_albedo : share of the light that the pavement sends back [1]
     """
     if hazard.height_m == 0:
@@ -116,6 +130,8 @@ def edit_scene(
     gaussians = refine_road(scene.gaussians, relief)
     if marking is not None:
         gaussians = paint_feature(gaussians, relief, marking, *carriageway, asphalt_albedo)
+        if marking.sign is not None:
+            gaussians = add_sign(gaussians, relief, marking.sign, scene.carriageway_right, asphalt_albedo)
     return extend_kerbs(apply_road_profile(gaussians, relief, *carriageway)[0], relief), relief
 
 

@@ -44,7 +44,7 @@ def make_dataset(
     """
     if grid is not None and manifest is None:
         asked = grid if poses is None else replace(load("grid", grid), poses=Path(poses))
-        return _list_facts(generate_dataset(asked, out, vehicle=vehicle, pictures=pictures, **execution))
+        return list_facts(generate_dataset(asked, out, vehicle=vehicle, pictures=pictures, **execution))
     if manifest is None or grid is not None:
         raise InputError("generate needs either a GRID or --manifest NAME, and not both")
     if vehicle is not None or poses is not None or not pictures:
@@ -53,13 +53,13 @@ def make_dataset(
             " --no-frames"
         )
     report, differing = reproduce_run(manifest, out, **execution)
-    return _list_facts(report) | {
+    return list_facts(report) | {
         "reproduced": report.clips - len(differing),
         "telemetry_differs": differing,
     }
 
 
-def _list_facts(report: RunReport) -> dict[str, Any]:
+def list_facts(report: RunReport) -> dict[str, Any]:
     layout = report.layout
     sheet = layout.previews / "contact_sheet.png"
     return {

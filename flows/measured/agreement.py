@@ -1,16 +1,18 @@
-"""Agreement of the vehicle model with reference traces, as the paper's Appendix A.2 measures it."""
+"""Agreement of the vehicle model with reference traces, as the paper's Appendix A.2 measures it, and its figure."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from catalogs.entries import load
 from catalogs.references import ReferenceCase, Traces, read_reference
 from catalogs.studies.agreement import find_printed_name, put_beside_print
 from catalogs.vehicles import open_vehicle
-from flows.measured.trajectory_figure import draw_trajectories
-from flows.pages.figures import Figure
+from flows.pages.figures import Figure, Line, Panel, Style
 from flows.pages.static import as_svg
 from flows.pages.writer import Section, Table, write_page
 from flows.store.outputs import Outputs
@@ -23,10 +25,20 @@ from tasks.vehicle.rollout import Mode, Rollout, simulate_scenario
 
 PAPER = ("paper-reference", "paper")
 """The paper's vehicle and mode, drawn beside any other."""
-
 BY = dict.fromkeys(("flat", "hump", "depression"), "road")
 """What a group's cases have in common, by its name; other names are those of what the cases vary."""
 STOP_FIGURES = ("braking_time_error_s", "slip_distance_error_m")
+Curves = dict[str, NDArray[np.float64]]
+QUANTITIES = {
+    "speed": "speed [m/s]",
+    "pitch": "pitch, nose down [deg]",
+    "slip": "mean braking slip",
+    "load": "load of a front wheel [N]",
+}
+"""The four quantities of the paper's figure, with their labels."""
+POINTS = 800
+"""Points of a curve that a figure of this size can show."""
+STYLES = (Style("a"), Style("b"))
 
 
 def measure_agreement(
@@ -174,3 +186,70 @@ def _average_stops(rows: list[dict[str, Any]]) -> dict[str, float]:
 def _make_plain(figures: dict[str, float]) -> dict[str, float | None]:
     """JSON has no NaN: a figure that a group cannot have is null."""
     return {name: None if value != value else value for name, value in figures.items()}
+
+
+def draw_trajectories(
+    case: str,
+    reference: Mapping[str, NDArray[Any]],
+    rides: Mapping[str, Rollout],
+    window: tuple[float, float],
+) -> Figure:
+    """Draw the four quantities of a case over time, and below each the model less the reference.
+
+    Parameters
+    ----------
+    case : its name
+    reference : its trace, as `tasks.eval.state_agreement.case_agreement` takes it
+    rides : of the models, by what they are called
+    window : time that is scored [s]
+    """
+    thin = slice(None, None, max(len(reference["time"]) // POINTS, 1))
+    time = reference["time"][thin]
+    truth = {name: values[thin] for name, values in _read_reference(reference).items()}
+    models = {
+        ride_name: {
+            name: np.interp(time, ride.columns["t_ns"] * 1e-9, values, right=np.nan)
+            for name, values in _read_ride(ride).items()
+        }
+        for ride_name, ride in rides.items()
+    }
+    above, below = [], []
+    for name, label in QUANTITIES.items():
+        curves = [
+            (ride_name, model[name], style)
+            for style, (ride_name, model) in zip(STYLES, models.items(), strict=False)
+        ]
+        shown = [Line(name=ride_name, x=time, y=y, style=style) for ride_name, y, style in curves]
+        left = [
+            Line(name=ride_name, x=time, y=y - truth[name], style=style) for ride_name, y, style in curves
+        ]
+        reference_line = Line(name="reference", x=time, y=truth[name], style=Style("ink", "dashed"))
+        above.append(Panel(y=label, lines=[reference_line, *shown], shaded=[window]))
+        below.append(Panel(y="difference", lines=left, shaded=[window]))
+    pairs = [[*above[k : k + 2], *below[k : k + 2]] for k in (0, 2)]
+    return Figure(
+        caption=f"{case}: reference, models, and what is left of each; shaded is what is scored",
+        panels=[panel for pair in pairs for panel in pair],
+        columns=2,
+        linked=True,
+        panel_px=190,
+    )
+
+
+def _read_reference(trace: Mapping[str, NDArray[Any]]) -> Curves:
+    """Return the four quantities of a trace, the front wheels' and all wheels' means."""
+    slips = [values for name, values in trace.items() if name.startswith("slip_")]
+    loads = [values for name, values in trace.items() if name.startswith("wheel_load_f")]
+    slip, load = np.mean(slips, axis=0), np.mean(loads, axis=0)
+    return {"speed": trace["speed"], "pitch": trace["pitch"], "slip": slip, "load": load}
+
+
+def _read_ride(ride: Rollout) -> Curves:
+    """Return the four quantities of a rollout, in the units of a trace."""
+    columns = ride.columns
+    return {
+        "speed": columns["speed"],
+        "pitch": np.rad2deg(columns["pitch"] + ride.static_pitch),
+        "slip": 0.5 * (columns["braking_slip_f"] + columns["braking_slip_r"]),
+        "load": 0.5 * columns["axle_load_f"],
+    }

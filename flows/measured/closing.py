@@ -14,7 +14,7 @@ from catalogs.effects import LIBRARY_FILE, load_effects
 from catalogs.entries import load
 from catalogs.vehicles import open_vehicle
 from flows.measured.closing_ledger import count_readings, record_reading
-from flows.measured.friction_pulls import compute_friction_pulls, tell_friction_pulls
+from flows.measured.friction_pulls import compute_friction_pulls, describe_friction_pulls
 from flows.measured.grown_vehicle import grown_vehicle, tyre_beside
 from flows.measured.residuals import compute_residual_rmse, predict_runs
 from flows.measured.verdict_report import write_verdict_page
@@ -63,12 +63,12 @@ def close_loop(
     beside = tyre_beside(name)
     results = Outputs(out, "close-loop", "split.json", "verdict.json", "report.html", grown, *beside)
     results.write_json("split.json", split_of(measured))
-    count_readings(measured)  # a faulty ledger is told of before the fit
+    count_readings(measured)  # a faulty ledger is reported before the fit
     measured = replace(measured, tolerances=measured.tolerances.with_session(session_tolerances(name)))
     outcome = judge_runs(measured, model, road, load_effects(), load_decision_rules())
     earlier = record_reading(measured, sha256_of([open_vehicle(name).content]))
-    result = verdict_json(outcome.verdict) | tell_search(outcome)
-    result = tell_friction_pulls(result, measured.tolerances.friction)
+    result = verdict_json(outcome.verdict) | describe_search(outcome)
+    result = describe_friction_pulls(result, measured.tolerances.friction)
     result["held_out_readings_before"] = earlier
     if earlier:
         result["reasons"].append(
@@ -129,7 +129,7 @@ def _reached_ranges(outcome: Outcome) -> dict[str, tuple[float, float]]:
     return {variable: find_reached_range(runs, verdict.theta, verdict.slots, variable) for variable in forms}
 
 
-def tell_search(outcome: Outcome) -> dict[str, Any]:
+def describe_search(outcome: Outcome) -> dict[str, Any]:
     """Return what a search says beside its verdict, as plain values: in words, and what is left over.
 
     Parameters
@@ -144,7 +144,7 @@ def tell_search(outcome: Outcome) -> dict[str, Any]:
     if len(verdict.odds) > 1:
         apart = [effect.name for effect in list_unshared(verdict.effects, verdict.odds)]
         force = measure_force(outcome.finding, outcome.fitted, apart)
-    sentence = tell_verdict(verdict, library, suggested, _say_own_numbers(outcome, library), force)
+    sentence = tell_verdict(verdict, library, suggested, _describe_own_numbers(outcome, library), force)
     return {
         "channels": [CHANNELS[c] for c in train[0].channels],
         "sentence": sentence,
@@ -165,10 +165,10 @@ def _number_json(
     }
 
 
-def _say_own_numbers(outcome: Outcome, library: Sequence[Effect]) -> str:
+def _describe_own_numbers(outcome: Outcome, library: Sequence[Effect]) -> str:
     """Return what the numbers that the file hardly knew say of the car, else the one pulled most beside no name."""
-    told = {rival.name for _, rival in outcome.verdict.rivals}
-    if own := [effect for effect in outcome.calibrated if effect.name not in told]:
+    rivals = {rival.name for _, rival in outcome.verdict.rivals}
+    if own := [effect for effect in outcome.calibrated if effect.name not in rivals]:
         return join_phrases(say_effect(effect, library) for effect in own)
     if outcome.verdict.effects or outcome.verdict.experiment is not None:
         return ""

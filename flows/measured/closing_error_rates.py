@@ -59,12 +59,12 @@ def describe_error_rates(named: list[str]) -> list[str]:
         if outcomes is None:
             lines.append(f"{name}: not among the effects that were tried")
             continue
-        told = ", ".join(f"{count} {outcome}" for outcome, count in outcomes.items())
+        counted = ", ".join(f"{count} {outcome}" for outcome, count in outcomes.items())
         others = {
             truth: of[name] for truth, of in rates["named_instead"].items() if truth != name and name in of
         }
         wrong = ", ".join(f"{truth} ({count})" for truth, count in others.items()) or "none"
-        lines.append(f"{name} in the data: {told}; named where the data held something else: {wrong}")
+        lines.append(f"{name} in the data: {counted}; named where the data held something else: {wrong}")
     return lines + _describe_engine(rates, engine_hash())
 
 
@@ -72,11 +72,11 @@ def _describe_engine(rates: dict[str, Any], engine: str) -> list[str]:
     """Return a sentence where the counts are not of the engine of this verdict."""
     if rates["engine_sha256"] == engine:
         return []
-    told = f"counted with engine {rates['engine_sha256'][:12]}; this verdict is of {engine[:12]}"
+    sentence = f"counted with engine {rates['engine_sha256'][:12]}; this verdict is of {engine[:12]}"
     again = rates.get("repeated_by", {})
     if again.get("engine_sha256") == engine:
-        told += f", which judged {again['campaigns']} of those campaigns again, with the same digits"
-    return [told]
+        sentence += f", which judged {again['campaigns']} of those campaigns again, with the same digits"
+    return [sentence]
 
 
 def _share(share: dict[str, Any]) -> str:

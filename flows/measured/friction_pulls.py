@@ -8,7 +8,7 @@ from tasks.identification.decision.words import join_phrases
 from tasks.identification.inference.disturbance import FRICTION
 
 TOLD_PULL = 2.5
-"""Pull of a run's friction from which it is told, in tolerances: one such run in 80 has it by chance [1]."""
+"""Pull of a run's friction from which it is reported, in tolerances: one such run in 80 has it by chance [1]."""
 
 
 def compute_friction_pulls(outcome: Outcome) -> dict[str, float]:
@@ -39,7 +39,7 @@ def find_pulled_runs(result: Mapping[str, Any]) -> dict[str, float]:
     return {name: pull for name, pull in pulls.items() if abs(pull) > TOLD_PULL}
 
 
-def tell_friction_pulls(result: Mapping[str, Any], tolerance: float) -> dict[str, Any]:
+def describe_friction_pulls(result: Mapping[str, Any], tolerance: float) -> dict[str, Any]:
     """Return a verdict with a reason that names the pulled runs, if any; where nothing is named, its sentence does too.
 
     Parameters

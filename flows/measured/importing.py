@@ -10,7 +10,6 @@ import numpy as np
 import pyarrow as pa
 import yaml
 
-from catalogs.campaign_checks import load_campaign_checks
 from catalogs.campaigns import HEAT_COLUMN, SLOPE_COLUMN
 from catalogs.channel_maps import ChannelMap, FaultyMap
 from catalogs.channel_maps.conditions import Conditions
@@ -83,13 +82,13 @@ def import_measurements(
     left_out += unused
     if problems := find_run_problems(planned, recordings, channel_map.sample_rate_hz):
         raise InputError(problems)
-    made, told = leave_out_faulty([(run, _assemble(run, recordings, channel_map)) for run in planned])
-    left_out += told
+    made, faults = leave_out_faulty([(run, _assemble(run, recordings, channel_map)) for run in planned])
+    left_out += faults
     lost += [run.name for run in planned if run.name not in {kept.name for kept, _ in made}]
     computed = dict.fromkeys(found.computed for _, found in made if found.computed)
     if computed:
         channel_map, made = _leave_out_acceleration(channel_map, made)
-    table = load_campaign_checks()
+    table = load("table of checks")
     of_session = apply_checks(table.session, Session(runs=[found.run for _, found in made]))
     if problems := [one.sentence for one in of_session if one.check.fault != "warning"]:
         raise InputError(problems)
@@ -125,7 +124,7 @@ def _assemble(
         slippery=run.conditions.weather != DRY,
         over_feature=run.conditions.hazard_length_m > 0.0,
     )
-    signals, rules, table = recordings[run.file], channel_map.rules, load_campaign_checks()
+    signals, rules, table = recordings[run.file], channel_map.rules, load("table of checks")
     return assemble_run(signals, rules, run.start, run.end, channel_map.sample_rate_hz, table, about=about)
 
 
@@ -157,7 +156,7 @@ def _fill_folder(
 ) -> dict[str, Any]:
     rate = channel_map.sample_rate_hz
     felt = "longitudinal_acceleration" in channel_map.channels
-    limits = {check.name: check.conditions for check in load_campaign_checks().session}
+    limits = {check.name: check.conditions for check in load("table of checks").session}
     slopes = estimate_slopes([found.run for _, found in made], **limits["felt_slope"]) if felt else {}
     split = {part: [run.name for run, _ in made if run.part == part] for part in ("train", "held_out")}
     table = io.StringIO()

@@ -1,15 +1,18 @@
 """Recordings and runs that can be used, and the few among many that cannot, with why."""
 
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-from catalogs.campaign_checks import load_campaign_checks
 from catalogs.channel_maps import ChannelMap
+from catalogs.entries import load
 from catalogs.recordings import read_signals, recording_files
+from catalogs.sentences import shorten
 from flows.measured.run_plan import PlannedRun
-from flows.measured.shared_problems import PlacedProblem, join_shared_problems, place_in_file
 from tasks.campaign.assembly import Assembled
 from tasks.campaign.channels import UNITS
-from tasks.campaign.checks import apply_checks
+from tasks.campaign.checks import apply_checks, list_names
 from tasks.campaign.measured import Recordings
 from tasks.campaign.signals import Signal
 from tasks.campaign.stated_units import choose_unit, find_unit_problems
@@ -18,6 +21,10 @@ from tasks.errors import InputError
 Signals = dict[Path, dict[str, Signal]]
 MOST_FAULTY = 1 / 3
 """Share of recordings, or of runs, that may be left out for their faults; more are a fault of the map [1]."""
+SHARED = 3
+"""Places from which a fault is reported once for all of them [1]."""
+NUMBER = re.compile(r"(?<![\w.^-])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?!\w)")
+"""A figure of a sentence; no digit of a name (run-01, w_2) or of a unit (m/s^2)."""
 
 
 def read_recordings(
@@ -51,11 +58,11 @@ def read_recordings(
                 PlacedProblem(name=file.name, place=file.name, sentence=problem) for problem in found
             ]
             del recordings[file]
-    told = join_shared_problems(problems, len(files), "files", exact=True)
+    joined = join_shared_problems(problems, len(files), "files", exact=True)
     lost = [file.name for file in files if file not in recordings]
     if len(lost) > MOST_FAULTY * len(files):
-        raise InputError(told)
-    return channel_map, recordings, told, lost
+        raise InputError(joined)
+    return channel_map, recordings, joined, lost
 
 
 def find_signal_problems(source: Path, channel_map: ChannelMap | None) -> list[str]:
@@ -101,13 +108,13 @@ def leave_out_faulty(
         for run, found in made
         for problem in found.problems
     ]
-    told = join_shared_problems(placed, len(made), "runs")
+    joined = join_shared_problems(placed, len(made), "runs")
     faulty = {problem.name for problem in placed}
     kept = [(run, found) for run, found in made if run.name not in faulty]
     parts = {run.part for run, _ in made} - {run.part for run, _ in kept}
     if parts or len(faulty) > MOST_FAULTY * len(made) or any(found.of_map for _, found in made):
-        raise InputError(told)
-    return kept, told
+        raise InputError(joined)
+    return kept, joined
 
 
 def _fill_units(channel_map: ChannelMap, recordings: Signals) -> ChannelMap:
@@ -135,5 +142,86 @@ def _find_recording_problems(signals: dict[str, Signal], channel_map: ChannelMap
     clock = channel_map.time
     taken = clock.unit if clock is not None and clock.unit in UNITS else "s"
     recording = Recordings(signals=[signals], rules=channel_map.rules, clock_unit=taken)
-    told = apply_checks(load_campaign_checks().recording, recording)
-    return [*find_unit_problems(channel_map.rules, signals), *(one.sentence for one in told)]
+    violations = apply_checks(load("table of checks").recording, recording)
+    return [*find_unit_problems(channel_map.rules, signals), *(one.sentence for one in violations)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlacedProblem:
+    """A fault and where it is.
+
+    Parameters
+    ----------
+    name : of the run or the file, short
+    place : the same in full; empty where the sentence needs none
+    sentence : the fault, without the place
+    """
+
+    name: str
+    place: str
+    sentence: str
+
+
+def place_in_file(path: Path, problem: str) -> PlacedProblem:
+    """Return a file's fault, whose sentence begins with the file's path or name, without it.
+
+    Parameters
+    ----------
+    path : of the file
+    problem : as its reader reported it
+    """
+    place = next((start for start in (str(path), path.name) if problem.startswith(start)), "")
+    sentence = problem[len(place) :].lstrip(": ") if place else problem
+    return PlacedProblem(name=path.name, place=place, sentence=sentence)
+
+
+def join_shared_problems(
+    found: Sequence[PlacedProblem], total: int, kind: str, *, exact: bool = False
+) -> list[str]:
+    """Return one sentence per fault, where three or more places that share a fault share its sentence.
+
+    Figures that differ stand as a range, such as 212..250. Of two faults of one place that differ in figures alone, the
+    first is joined with the first of other places.
+
+    Parameters
+    ----------
+    found : in the order in which they are reported
+    total : runs or files that were looked at [1]
+    kind : what they are, such as runs
+    exact : join only what is reported in the same figures, as the names of signals are
+    """
+    groups: dict[tuple[str, int], list[PlacedProblem]] = {}
+    counts: dict[tuple[str, str], int] = {}
+    for problem in found:
+        form = problem.sentence if exact else NUMBER.sub("#", problem.sentence)
+        before = counts.get((problem.place, form), 0)
+        counts[problem.place, form] = before + 1
+        groups.setdefault((form, before), []).append(problem)
+    return [
+        sentence
+        for group in groups.values()
+        for sentence in (
+            [_join_group(group, total, kind)]
+            if len(group) >= SHARED
+            else [f"{problem.place}: {problem.sentence}".removeprefix(": ") for problem in group]
+        )
+    ]
+
+
+def _join_group(group: Sequence[PlacedProblem], total: int, kind: str) -> str:
+    names = [shorten(problem.name, 60) for problem in group]
+    return f"in {len(names)} of {total} {kind} ({list_names(names)}): {_write_ranges(group)}"
+
+
+def _write_ranges(group: Sequence[PlacedProblem]) -> str:
+    """Return the sentence of a group, each figure that differs as a range from the lowest to the highest."""
+    if len({problem.sentence for problem in group}) == 1:
+        return group[0].sentence
+    figures = zip(*(NUMBER.findall(problem.sentence) for problem in group), strict=True)
+    ranges = iter([_write_range(values) for values in figures])
+    return NUMBER.sub(lambda _: next(ranges), group[0].sentence)
+
+
+def _write_range(values: Sequence[str]) -> str:
+    low, high = min(values, key=float), max(values, key=float)
+    return low if float(low) == float(high) else f"{low}..{high}"

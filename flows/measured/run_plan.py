@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from catalogs.campaign_checks import load_campaign_checks
 from catalogs.campaign_files import MOST_SAMPLES
 from catalogs.channel_maps import ChannelMap, SegmentEntry
 from catalogs.channel_maps.conditions import Conditions
+from catalogs.entries import load
 from catalogs.names import find_name_problem
 from catalogs.sentences import cap_problems, shorten
 from tasks.campaign.channels import BRAKE_SIGNALS
@@ -35,7 +35,7 @@ def plan_runs(
 ) -> tuple[list[PlannedRun], list[str]]:
     """The runs that a map asks for: as it lists them, one per brake application, or one per file.
 
-    Brake applications that are no runs, and recordings without one, are told beside them, one sentence each.
+    Brake applications that are no runs, and recordings without one, are reported beside them, one sentence each.
 
     Parameters
     ----------
@@ -140,11 +140,11 @@ def _cut_recordings(
     left_out: list[str] = []
     faulty = 0
     for file, signals in recordings.items():
-        parts = cut_segments(signals, channel_map.rules, rule, cut, load_campaign_checks())
+        parts = cut_segments(signals, channel_map.rules, rule, cut, load("table of checks"))
         if not parts:
             left_out.append(
                 f"{shorten(file.relative_to(root))}: no run, for the brake is never applied above"
-                f" {rule.tell_pressure(segment.above_mpa)} for {segment.minimum_s:g} s: cut it by runs in place of"
+                f" {rule.describe_pressure(segment.above_mpa)} for {segment.minimum_s:g} s: cut it by runs in place of"
                 " segment where it is to be used, as a coast-down is"
             )
         for part in parts:
@@ -165,11 +165,11 @@ def _cut_recordings(
                 )
             )
     if not runs:
-        raise InputError([_say_why_none(faulty), *cap_problems(left_out)])
+        raise InputError([_explain_absence(faulty), *cap_problems(left_out)])
     return runs, left_out
 
 
-def _say_why_none(faulty: int) -> str:
+def _explain_absence(faulty: int) -> str:
     """Return why a map's segment makes no run, and what to do, by the number of brake applications that it finds."""
     if not faulty:
         return "the map's segment finds no brake application: lower above_mpa or minimum_s"

@@ -110,12 +110,12 @@ def _open_page(result: Mapping[str, Any]) -> tuple[str, list[str]]:
     first, _, rest = re.sub(r"(?<=\w\.) (?=[A-Z])", "\n", result["sentence"], count=1).partition("\n")
     if len(first.split()) <= MOST_WORDS:
         return first, [rest] if rest else []
-    meaning = _tell_meaning(result)
+    meaning = _describe_meaning(result)
     return f"{meaning[0].upper()}{meaning[1:]}.", [result["sentence"]]
 
 
 def _list_verdict(result: Mapping[str, Any]) -> list[Part]:
-    """Return the verdict's name, what was found, and what it cannot be told from."""
+    """Return the verdict's name, what was found, and what it cannot be distinguished from."""
     found = [
         {"in words": "" if k else effect["says"], "kind": "" if k else effect["class"], "number": _as_words(name),
          "value": Cell(value=p["value"], tone="strong"), "95 % interval": _as_range(p),
@@ -141,7 +141,7 @@ def _list_verdict(result: Mapping[str, Any]) -> list[Part]:
     ]
     missing = ", ".join(result["not_carried_by_coupled_mode"])
     return [
-        f"{result['verdict']}: {_tell_meaning(result)}",
+        f"{result['verdict']}: {_describe_meaning(result)}",
         Table(title="Numbers that were found", rows=found, digits=3,
               note="With the interval that holds the true one in 95 % of cases; shares, which have no unit, and other"
               " numbers are on top of the vehicle file's."),
@@ -280,7 +280,7 @@ def find_next_steps(result: Mapping[str, Any], campaign: Campaign) -> list[tuple
     return steps
 
 
-def _tell_meaning(result: Mapping[str, Any]) -> str:
+def _describe_meaning(result: Mapping[str, Any]) -> str:
     missed = result["verdict"] == "NOTHING" and result["disagreement"]
     return MISSED if missed else MEANING[result["verdict"]]
 

@@ -25,7 +25,7 @@ def open_frames_store(layout: Layout, manifest: Mapping[str, Any]) -> Any:
     ------
     InputError
         If the dataset was made without frames, a folder lacks some of them, which Zarr would take for black, or their
-        metadata are not those that muSync writes. In an object store one that is missing is told when it is read.
+        metadata are not those that muSync writes. In an object store one that is missing is reported when it is read.
     """
     grid = manifest["grid"]
     require_frames(manifest, layout)

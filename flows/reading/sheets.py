@@ -80,7 +80,7 @@ def draw_sheets(
 
 
 def _open_finished(datasets: Sequence[str]) -> list[tuple[Layout, Manifest]]:
-    """Return each dataset with its manifest; every folder that holds none is told."""
+    """Return each dataset with its manifest; every folder that holds none is reported."""
     layouts = [open_for_reading(dataset) for dataset in datasets]
     lacking = [name for name, layout in zip(datasets, layouts, strict=True) if not layout.manifest.is_file()]
     if lacking:

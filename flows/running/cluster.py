@@ -42,18 +42,18 @@ def find_version_problems(
     here : `facts_here` of this machine
     there : the same of each worker by its address, or what asking it raised
     """
-    told: dict[str, list[str]] = {}
+    found: dict[str, list[str]] = {}
     for address, facts in there.items():
         if isinstance(facts, BaseException):
-            told.setdefault(
+            found.setdefault(
                 f"cannot run muSync ({type(facts).__name__}: {facts}): install this version there", []
             ).append(address)
             continue
         for name, version in here.items():
             if facts.get(name) != version:
                 sentence = f"{name} is {facts.get(name, 'absent')} there and {version} here: install the same"
-                told.setdefault(sentence, []).append(address)
-    return [f"{_name_some(addresses)}: {sentence}" for sentence, addresses in told.items()]
+                found.setdefault(sentence, []).append(address)
+    return [f"{_name_some(addresses)}: {sentence}" for sentence, addresses in found.items()]
 
 
 def check_cluster(client: Any, address: str) -> None:
@@ -90,11 +90,11 @@ def check_joining(client: Any, address: str) -> Iterator[None]:
     address : of its scheduler
     """
     check = JoiningCheck(facts_here())
-    told = set(client.get_events(TURNED_AWAY))
+    seen = set(client.get_events(TURNED_AWAY))
 
     def tell(event: tuple[float, str]) -> None:
-        if event not in told:
-            told.add(event)
+        if event not in seen:
+            seen.add(event)
             print_lines(f"--scheduler {address}: {event[1]}", error=True)
 
     client.subscribe_topic(TURNED_AWAY, tell)

@@ -127,9 +127,9 @@ def input_sentence(error: BaseException, given: Sequence[str]) -> str | None:
         return f"{cut_middle(str(error), 200)}: {SURROUNDINGS[errno.ELOOP]}"
     if not isinstance(error, OSError):
         return None
-    told = disk_full_sentence(error)
-    if told is not None:
-        return told
+    full = disk_full_sentence(error)
+    if full is not None:
+        return full
     path = error.filename if isinstance(error.filename, str) else None
     sentence = SURROUNDINGS.get(error.errno or 0)
     if path is not None and _is_in_cache(path) and error.errno in SURROUNDINGS.keys() | NAMED.keys():

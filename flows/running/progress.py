@@ -21,7 +21,7 @@ from flows.running.terminal import escape_controls, open_console, print_lines
 
 @dataclass(frozen=True, kw_only=True)
 class Progress:
-    """How far a kind of work is, told at its beginning and after every piece.
+    """How far a kind of work is, reported at its beginning and after every piece.
 
     Parameters
     ----------

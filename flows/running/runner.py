@@ -145,7 +145,7 @@ def _dask_client(workers: int, scheduler: str | None, warm: Callable[[], Any] | 
             Client(cluster) as client,
         ):
             share_gpus(client)
-            tell_dashboard(client)
+            log_dashboard(client)
             yield client
         return
     try:
@@ -163,7 +163,7 @@ def _dask_client(workers: int, scheduler: str | None, warm: Callable[[], Any] | 
             share_gpus(client)
             if warm is not None:
                 warm_cluster(client, warm, scheduler)
-            tell_dashboard(client)
+            log_dashboard(client)
             yield client
 
 
@@ -185,7 +185,7 @@ def _connect(address: str) -> Any:
     return client
 
 
-def tell_dashboard(client: Any) -> None:
+def log_dashboard(client: Any) -> None:
     """Print where Dask's dashboard is; without bokeh its pages say no more than that bokeh is missing."""
     if find_spec("bokeh") is not None:
         print_lines(f"Dask's dashboard: {client.dashboard_link}", error=True)

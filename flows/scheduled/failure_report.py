@@ -1,4 +1,4 @@
-"""Report a scheduled run that failed, is late or has ended: in a file, and to whoever is_told_of to be told."""
+"""Report a scheduled run that failed, is late or has ended: in a file, and to whoever asked to be notified."""
 
 import subprocess
 from collections.abc import Mapping
@@ -79,7 +79,7 @@ def report_run(
     return path
 
 
-def is_told_of(event: str, notify_on: str = WHEN_NONE_IS_NAMED) -> bool:
+def wants_notice(event: str, notify_on: str = WHEN_NONE_IS_NAMED) -> bool:
     """Whether a schedule tells of an event, by the value of ``--notify-on``."""
     return event in (word.strip() for word in notify_on.split(","))
 

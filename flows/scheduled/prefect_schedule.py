@@ -13,6 +13,11 @@ import cv2
 from flows import prefect_flows  # noqa: F401  (first: it sets what Prefect reads when it is imported)
 
 # isort: split
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from datetime import timedelta
+from threading import Timer
+
 from prefect import flow, get_run_logger, task
 from prefect.artifacts import create_image_artifact, create_link_artifact, create_table_artifact
 from prefect.cache_policies import NO_CACHE
@@ -32,8 +37,7 @@ from catalogs.entries import load
 from catalogs.sentences import shorten
 from flows.running.prefect_progress import show_progress
 from flows.running.runner import RunnerName, end_with_parent
-from flows.scheduled.failure_report import is_told_of, report_failure, report_run
-from flows.scheduled.lateness import watch_lateness
+from flows.scheduled.failure_report import report_failure, report_run, wants_notice
 from flows.scheduled.retention import remove_oldest
 from flows.scheduled.scheduling import recorded_run
 from flows.scheduled.serving import read_options, serve_flow
@@ -44,6 +48,8 @@ RETRIES = 3
 FIRST_DELAY_S = 10
 SHEET_PX, SHEET_QUALITY = 1000, 75
 """Longer side of the contact sheet that Prefect keeps [px], and its JPEG quality [1 to 100]."""
+LATE_AFTER = timedelta(minutes=10)
+"""Between the time of a run and its beginning."""
 
 
 def _worth_trying_again(_task: Any, _run: Any, state: Any) -> bool:
@@ -77,7 +83,7 @@ def _report_crash(flow: Any, flow_run: Any, state: Any) -> None:
     """A run whose process was killed cannot report by itself: whoever started it does."""
     options = read_options(flow_run.parameters)
     at = flow_run.expected_start_time or datetime.now(UTC)
-    notify = options["notify"] if is_told_of("failed", options["notify_on"]) else None
+    notify = options["notify"] if wants_notice("failed", options["notify_on"]) else None
     report_failure(
         options["grid"], options["root"], at, _explain_crash(flow_run.parameters, state.message), notify
     )
@@ -121,7 +127,7 @@ def _make_dataset_at(
     log = get_run_logger()
 
     def tell(event: str, facts: dict[str, str]) -> None:
-        if notify is not None and is_told_of(event, notify_on):
+        if notify is not None and wants_notice(event, notify_on):
             report_run(event, grid, root, at, facts, notify)
 
     try:
@@ -131,7 +137,7 @@ def _make_dataset_at(
         ):
             result = make_dataset(grid, root, at=at, **execution)
     except Exception as error:
-        report_failure(grid, root, at, error, notify if is_told_of("failed", notify_on) else None)
+        report_failure(grid, root, at, error, notify if wants_notice("failed", notify_on) else None)
         raise
     dataset: str = result["dataset"]
     wrong = [row["clip"] for row in result["verdicts"] if row["passed"] is False]
@@ -194,3 +200,37 @@ def _next_time() -> datetime | None:
 def serve_schedule(every: str, options: dict[str, Any]) -> None:
     """Serve `scheduled` (see `flows.scheduled.serving.serve_flow`)."""
     serve_flow(scheduled, every, options)
+
+
+@contextmanager
+def watch_lateness(at: datetime, next_at: datetime | None, tell: Callable[[str], object]) -> Iterator[None]:
+    """Tell, once, of a run that is late while the block makes it.
+
+    Parameters
+    ----------
+    at : scheduled time of the run
+    next_at : of the next run; None where none is planned
+    tell : called with a sentence, from another thread where the next run falls due
+    """
+    now = datetime.now(UTC)
+    if now - at > LATE_AFTER:
+        late_min = (now - at).total_seconds() / 60
+        tell(f"it was due at {_format(at)} and began {late_min:.0f} min later")
+        next_at = None
+    if next_at is None or next_at <= now:
+        yield
+        return
+    sentence = (
+        f"it was due at {_format(at)} and still goes on at {_format(next_at)}, when the next run is due"
+    )
+    timer = Timer((next_at - now).total_seconds(), tell, [sentence])
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
+def _format(at: datetime) -> str:
+    return f"{at.astimezone(UTC):%Y-%m-%d %H:%M} UTC"

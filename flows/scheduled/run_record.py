@@ -6,17 +6,18 @@ It is rewritten while the run goes on, at most every `EVERY_S`: a file, or an ob
 import os
 import platform
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
+from typing import Any
 
+from prometheus_client import CollectorRegistry, Gauge, generate_latest
 from pydantic import TypeAdapter
 
 from catalogs.documents import parse_json
 from flows.running.progress import Progress, watch_progress
-from flows.scheduled.metrics import format_metrics
 from flows.store.objects import Objects, is_address
 from flows.store.outputs import Outputs
 from manifests.canonical import canonical_bytes
@@ -29,6 +30,26 @@ LOCAL = Path(".musync")
 EVERY_S = 2.0
 CLIPS = "clips"
 """Title of the progress that counts clips."""
+GAUGES = {
+    "to_make": ("musync_run_clips", "clips that the run has to make"),
+    "made": ("musync_run_clips_done", "clips that the run has made"),
+    "failed": ("musync_run_clips_failed", "clips that could not be made"),
+    "quarantined": (
+        "musync_dataset_clips_quarantined",
+        "clips whose pose check failed, of the finished dataset",
+    ),
+    "cpu_s": ("musync_run_cpu_seconds", "processor time of the run"),
+    "bytes": ("musync_dataset_bytes", "size of the finished dataset"),
+    "scheduled": ("musync_run_scheduled_timestamp_seconds", "when the run was due"),
+    "began": ("musync_run_began_timestamp_seconds", "when the run began"),
+    "updated": ("musync_run_updated_timestamp_seconds", "when the run last made a sign"),
+    "ended": ("musync_run_ended_timestamp_seconds", "when the run ended; absent while it goes on"),
+}
+"""Name and help of each metric by key of the record; one that is not known is absent."""
+SUCCEEDED = (
+    "musync_run_succeeded",
+    "1 for a run that made its dataset, 0 for one that failed; absent before",
+)
 
 
 @dataclass(kw_only=True)
@@ -188,3 +209,25 @@ def find_run_id(content: bytes, place: object) -> str | None:
 def format_now() -> str:
     """The time now: ISO 8601, UTC, to the second."""
     return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+def format_metrics(record: Mapping[str, Any]) -> bytes:
+    """The text of a run's metrics, labelled with the grid's name.
+
+    Parameters
+    ----------
+    record : fields of `flows.scheduled.run_record.RunRecord`
+    """
+    registry = CollectorRegistry()
+    known = {spec: _number_of(record[key]) for key, spec in GAUGES.items() if record[key] is not None}
+    if record["ended"] is not None:
+        known[SUCCEEDED] = float(record["error"] is None)
+    for (name, text), value in known.items():
+        Gauge(name, text, ["grid"], registry=registry).labels(record["grid"]).set(value)
+    return generate_latest(registry)
+
+
+def _number_of(value: Any) -> float:
+    if isinstance(value, list):
+        return float(len(value))
+    return datetime.fromisoformat(value).timestamp() if isinstance(value, str) else float(value)

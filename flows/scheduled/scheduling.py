@@ -169,8 +169,8 @@ def checked_parameters(
     problems += list_runner_problems(runner, scheduler)
     if scheduler is not None and not re.fullmatch(r"(tcp|tls)://[^/]+:\d+", scheduler):
         problems.append(f"--scheduler must be like tcp://host:8786 or tls://host:8786; it is {scheduler!r}")
-    told = notify_problem(notify) if notify is not None else None
-    problems += [told] if told is not None else []
+    problem = notify_problem(notify) if notify is not None else None
+    problems += [problem] if problem is not None else []
     unknown = [word for word in notify_on.split(",") if word.strip() not in EVENTS]
     if unknown:
         problems.append(
@@ -223,7 +223,7 @@ def serve_grid(
     grid : grid file or name
     every : cron expression, UTC
     out : folder, or address in an object store, in which each run makes its dated dataset
-    notify : who is told, as of `flows.scheduled.notification.send_notice`
+    notify : who is notified, as of `flows.scheduled.notification.send_notice`
     notify_on : of what, of `flows.scheduled.notification.EVENTS`, with commas between
     keep : how many datasets stay; None keeps all [1]
     execution : ``runner``, ``workers`` and ``scheduler``, as for generating

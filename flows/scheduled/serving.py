@@ -153,7 +153,7 @@ def cancel_runs(deployment: UUID) -> None:
             for run in client.read_flow_runs(flow_run_filter=_runs_in(deployment, UNDER_WAY)):
                 client.set_flow_run_state(run.id, Cancelled(message=message), force=True)
     except (httpx.HTTPError, PrefectException):
-        logging.getLogger(__name__).warning("the server could not be told that the schedule was stopped")
+        logging.getLogger(__name__).warning("the server did not learn that the schedule was stopped")
 
 
 def _runs_in(deployment: UUID, states: list[StateType]) -> FlowRunFilter:

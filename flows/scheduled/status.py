@@ -185,8 +185,8 @@ def _read_plan(content: bytes | None, place: object) -> dict[str, str] | None:
 
 def _read_report(content: bytes) -> dict[str, str]:
     lines = (line.partition(": ") for line in content.decode(errors="replace").splitlines())
-    told = {key: value for key, found, value in lines if found}
-    return {key: told.get(key, "") for key in ("scheduled", "error")}
+    values = {key: value for key, found, value in lines if found}
+    return {key: values.get(key, "") for key in ("scheduled", "error")}
 
 
 def format_text(result: Mapping[str, Any]) -> str:

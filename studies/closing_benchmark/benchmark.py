@@ -77,7 +77,7 @@ def close_loop_benchmark(
     minutes : no campaign is begun after so long
     vehicle : catalogue name or file
     """
-    results = Outputs(out, "closing-benchmark", FILE, RATES, TABLES)
+    results = Outputs(out, "lab close-loop-benchmark", FILE, RATES, TABLES)
     log, engine = results.path(FILE).with_name(LOG), engine_hash()
     rows = [row for row in read_lines(log, {"engine", "truth", "seed"}) if row["engine"] == engine]
     done = {(row["truth"], row["seed"]) for row in rows}

@@ -13,7 +13,7 @@ from catalogs.scenes.gaussian_files import read_gaussians
 from catalogs.scenes.route_files import read_route
 from catalogs.scenes.stereo_folder import read_stereo_folder
 from catalogs.scenes.street import load_street_layout
-from flows.judging.claims import read_claim
+from flows.judging.foreign import read_claim
 from flows.judging.foreign_sources import read_camera, read_footage
 from flows.judging.physics_constants import read_constants
 from flows.judging.trajectories import read_trajectory

@@ -153,7 +153,7 @@ def list_steps(asked: Asked, entries: Catalogue, drive: Drive) -> list[Step]:
     response = compute_surface_response(vehicle, drive.state.kind, drive.state.friction)
     return [
         *surface_steps(weather_of(drive.scenario), entries.surface, vehicle, row),
-        *force_steps(vehicle, response, hazard, asked.mode, row),
+        *force_steps(vehicle, response, hazard, asked.mode, row, drive.state.grip),
         *pitch_steps(vehicle, response, hazard, row, drive.ride, entries.steady),
     ]
 

@@ -20,24 +20,24 @@ def format_text(result: Mapping[str, Any]) -> str:
     """
     return "\n".join(
         [
-            *_tell_summary(result),
+            *_describe_summary(result),
             "",
             "each column rests on:",
-            *_tell_columns(result["columns"]),
-            *_tell_reached(result),
+            *_describe_columns(result["columns"]),
+            *_describe_reached(result),
             "",
             "the lines:",
-            *_tell_lines(result["lines"]),
+            *_describe_lines(result["lines"]),
             "",
             "the works that these lines cite:",
             *(f"  {_name_work(work)}: {_count(work['lines'], 'line')}" for work in result["works"]),
-            *_tell_others(result["other_sources"]),
-            *_tell_measured(result["measured"]),
+            *_describe_others(result["other_sources"]),
+            *_describe_measured(result["measured"]),
         ]
     ) + "\n"  # fmt: skip
 
 
-def _tell_summary(result: Mapping[str, Any]) -> list[str]:
+def _describe_summary(result: Mapping[str, Any]) -> list[str]:
     catalogue = [row for row in result["lines"] if row["file"] in {one["file"] for one in result["files"]}]
     asked, files = len(result["lines"]) - len(catalogue), {row["file"] for row in catalogue}
     declared = sum("declared" in row["works"] for row in catalogue)
@@ -59,7 +59,7 @@ def _tell_summary(result: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _tell_columns(columns: Sequence[Mapping[str, Any]]) -> list[str]:
+def _describe_columns(columns: Sequence[Mapping[str, Any]]) -> list[str]:
     """Columns that rest on the same lines together, in the order in which one follows from another."""
     groups: dict[tuple[tuple[str, str], ...], list[str]] = {}
     for column in columns:
@@ -87,7 +87,7 @@ def _name_column(column: Mapping[str, Any]) -> str:
     return column["column"] + (f" ({inside})" if inside else "")
 
 
-def _tell_reached(result: Mapping[str, Any]) -> list[str]:
+def _describe_reached(result: Mapping[str, Any]) -> list[str]:
     """Return the sentences on what is known by file alone: pictures and their check."""
     said = []
     for reached in dict.fromkeys(name for row in result["lines"] for name in row["reaches"]):
@@ -106,7 +106,7 @@ def _tell_reached(result: Mapping[str, Any]) -> list[str]:
     return said
 
 
-def _tell_lines(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+def _describe_lines(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     cells = [
         (row["file"], row["key"], f"{shorten(_format_value(row['value']), WIDEST_VALUE)} {row['unit']}".strip(),
          shorten(row["source"], WIDEST_SOURCE))
@@ -117,7 +117,7 @@ def _tell_lines(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     return ["  " + "  ".join([*(cell[k].ljust(widths[k]) for k in range(3)), cell[3]]) for cell in cells]
 
 
-def _tell_others(others: Sequence[Mapping[str, Any]]) -> list[str]:
+def _describe_others(others: Sequence[Mapping[str, Any]]) -> list[str]:
     if not others:
         return []
     told = [
@@ -126,7 +126,7 @@ def _tell_others(others: Sequence[Mapping[str, Any]]) -> list[str]:
     return ["", "lines that cite no work, by the first words of their source:", *told]
 
 
-def _tell_measured(provenance: Mapping[str, Any] | None) -> list[str]:
+def _describe_measured(provenance: Mapping[str, Any] | None) -> list[str]:
     if provenance is None:
         return ["", "no number of the vehicle was fitted to measured or reference runs"]
     data = [f"    {name}: {digest}" for name, digest in provenance["data_sha256"].items()]

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from catalogs.road_grade import SCENE_GRADES, name_grade_file
 from flows.auditing.explain import find_planned_clip, find_route
 from flows.making.catalogue import Catalogue
+from flows.making.driven import refuse_driven
 from flows.making.gathering import table_parts
 from flows.making.input_changes import read_kept
 from flows.making.plan import Plan
@@ -77,11 +78,12 @@ def trace_lineage(dataset: str, clip: str, *, out: str | None = None) -> dict[st
     InputError
         The folder is no sealed dataset, has no such clip, or its kept entries are not those recorded.
     """
-    results = Outputs(out, "lineage", "lineage.json", "lineage.csv", "lineage.txt")
+    results = Outputs(out, "lab lineage", "lineage.json", "lineage.csv", "lineage.txt")
     layout = open_for_reading(dataset, want_inputs)
     manifest = read_manifest(layout)
     plan = Plan.of(manifest, layout.manifest)
-    refuse_traced(plan.inputs, dataset, "lineage")
+    refuse_traced(plan.inputs, dataset, "lab lineage")
+    refuse_driven(plan.inputs, dataset, "lab lineage")
     planned = find_planned_clip(plan, clip, dataset)
     kept = {
         name: content

@@ -56,7 +56,7 @@ def brake_protocol(
     InputError
         If the campaign lacks what the protocol needs.
     """
-    results = Outputs(out, "brake-protocol", "brake_protocol.json", "attrition.csv", DIVES, PAGE)
+    results = Outputs(out, "lab brake-protocol", "brake_protocol.json", "attrition.csv", DIVES, PAGE)
     rules = load_plan("protocol", protocol)
     recorded = read_drives(campaign)
     base = load("vehicle", vehicle or recorded.vehicle)

@@ -39,7 +39,7 @@ def bump_study(
     InputError
         If the run or a channel is missing, or a window lies outside the run.
     """
-    results = Outputs(out, "bump-study", "bump_study.json")
+    results = Outputs(out, "lab bump-study", "bump_study.json")
     plan = load_plan("bump study", study)
     recorded = read_drives(campaign, needed=NEEDED)
     drive = next((drive for drive in recorded.drives if drive.name == plan.run), None)

@@ -44,7 +44,7 @@ def stop_study(
     InputError
         If a run or a channel is missing, or a run holds no stop.
     """
-    results = Outputs(out, "stop-study", "stop_study.json")
+    results = Outputs(out, "lab stop-study", "stop_study.json")
     plan = load_plan("stop study", study)
     recorded = read_drives(campaign)
     by_name = {drive.name: drive for drive in recorded.drives}

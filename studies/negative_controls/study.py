@@ -14,6 +14,7 @@ from flows.judging.evaluation_rows import find_control
 from flows.judging.judged_clip import METHODS, JudgedClip, View, judge_clip
 from flows.judging.physics import clip_facts
 from flows.making.catalogue import Catalogue, catalogue_of
+from flows.making.driven import refuse_driven
 from flows.making.driving import simulate_drive
 from flows.making.places import refuse_changed_scene
 from flows.making.plan import Plan, read_plan
@@ -84,10 +85,12 @@ def run_controls(dataset: str, *, out: str | None = None) -> dict[str, Any]:
         If the folder is no finished dataset with frames, or holds fewer than two clips, or these or the scene are not
         as recorded.
     """
-    results = Outputs(out, "controls", "controls.json", "controls.svg")
+    results = Outputs(out, "lab controls", "controls.json", "controls.svg")
     layout = open_for_reading(dataset)
     root, manifest = layout.root, read_manifest(layout)
-    refuse_traced(read_plan(root).inputs, dataset, "controls")
+    inputs = read_plan(root).inputs
+    refuse_traced(inputs, dataset, "lab controls")
+    refuse_driven(inputs, dataset, "lab controls")
     require_frames(manifest, dataset)
     refuse_changed_content(layout, manifest, manifest["clips"])
     for scene in list_scenes(manifest):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from catalogs.entries import load
 from catalogs.references import Traces, read_reference
 from catalogs.scenario import Scenario
-from catalogs.studies import Condition, load_conditions
+from catalogs.studies import Condition
 from catalogs.studies.ablation import AblationEntry, cut_coupling
 from catalogs.variants import COUPLINGS, Variant
 from catalogs.vehicles import open_vehicle
@@ -54,7 +54,7 @@ def load_ablation() -> Ablation:
     """The study of the paper's Section 4.4."""
     entry: AblationEntry = load("ablation")
     protocol = load("sensitivity study")[0]
-    conditions = {condition.name: condition for condition in load_conditions()}
+    conditions = {condition.name: condition for condition in load("list of conditions")}
     dry = conditions[entry.stop_condition].scenario
     stops: dict[str, tuple[Scenario, ...]] = {}
     for study in protocol.weathers.values():
@@ -94,7 +94,9 @@ def run_ablation(
     InputError
         If the traces do not hold the condition that is compared.
     """
-    results = Outputs(out, "ablation", "ablation.json", "ablation.parquet", "ablation.svg", "ablation.html")
+    results = Outputs(
+        out, "lab ablation", "ablation.json", "ablation.parquet", "ablation.svg", "ablation.html"
+    )
     file = open_vehicle(vehicle)
     study, car, surface = load_ablation(), file.build(), load("surface", "dense-asphalt")
     provenance = file.provenance

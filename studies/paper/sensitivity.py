@@ -18,7 +18,7 @@ QUANTITIES = {"mu": "surface friction", "stop_m": "stopping distance [m]"}
 
 def run_sensitivity(*, out: str | None = None) -> dict[str, Any]:
     """The paper's Appendix E: envelopes and rank correlations, beside the printed figures."""
-    results = Outputs(out, "sensitivity", "sensitivity.json", "sensitivity.svg", "sensitivity.html")
+    results = Outputs(out, "lab sensitivity", "sensitivity.json", "sensitivity.svg", "sensitivity.html")
     protocol, printed = load("sensitivity study")
     vehicle, surface = load("vehicle", "paper-reference"), load("surface", "dense-asphalt")
     started = time.process_time()

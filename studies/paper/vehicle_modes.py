@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from catalogs.entries import load
 from catalogs.scenario import Scenario
-from catalogs.studies import load_conditions
 from tasks.surface.road_profile import RoadHazard
 from tasks.surface.state import SurfaceParameters
 from tasks.surface.weather import Weather, surface_state
@@ -91,7 +90,7 @@ def compute_differences() -> dict[str, ModeDifference]:
             simulate_condition(vehicle, surface, condition.scenario, "paper"),
             simulate_condition(vehicle, surface, condition.scenario, "coupled"),
         )
-        for condition in load_conditions()
+        for condition in load("list of conditions")
     }
 
 

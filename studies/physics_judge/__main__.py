@@ -40,6 +40,8 @@ def judge(clip: StudyClip, tables: tuple[Any, Any] | None = None) -> list[Law]:
 def draw_braked_clip(draw: np.random.Generator) -> StudyClip:
     """Return a random clip in which every error has something to change: it is held, brakes, meets a hump and stops.
 
+    Water stands above the texture, below which the rate of the rain leaves friction by speed alone.
+
     Parameters
     ----------
     draw : source of the numbers
@@ -48,7 +50,7 @@ def draw_braked_clip(draw: np.random.Generator) -> StudyClip:
     speed = float(draw.uniform(35, 60))
     length, height = float(draw.uniform(1.5, 4.0)), float(draw.uniform(0.04, 0.09))
     scenario = Scenario(
-        weather="rain", precipitation_mm_h=float(draw.uniform(2, 12)), initial_speed_km_h=speed,
+        weather="rain", precipitation_mm_h=float(draw.uniform(22, 36)), initial_speed_km_h=speed,
         peak_pressure_mpa=float(draw.uniform(6, 10)), ramp_s=0.3, brake_onset_s=float(draw.uniform(0.5, 0.8)),
         hold_speed=True, hazard_center_m=speed / 3.6, hazard_length_m=length, hazard_height_m=height,
     )  # fmt: skip

@@ -16,6 +16,7 @@ from tasks.eval.physics.constants import Constants
 from tasks.render.camera import body_poses
 from tasks.scene.route import Route, route_from_positions
 from tasks.scene.route_shape import sample_grade
+from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.table import EFFECT_UNITS, PARAMETERS
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Mode
@@ -89,7 +90,7 @@ def make_clip(scenario: Scenario, vehicle: Vehicle, mode: Mode, *, duration_s: f
     mode : paper or coupled
     duration_s : length [s]
     """
-    pavement, steady = load("surface", "dense-asphalt"), load("low-speed rule")
+    pavement, steady = _read_pavement(mode), load("low-speed rule")
     route = make_route(scenario.initial_speed_km_h / 3.6 * duration_s + 30.0)
     state, ride = simulate_drive(scenario, vehicle, pavement, mode, duration_s, steady, sample_grade(route))
     ticks = ride.columns
@@ -127,6 +128,11 @@ def make_route(length: float) -> Route:
     return route_from_positions(np.column_stack([x, 5.0 * np.sin(x / 60.0), 0.5 * np.sin(x / 40.0)]))
 
 
+def _read_pavement(mode: Mode) -> SurfaceParameters:
+    pavement: SurfaceParameters = load("surface", "dense-asphalt")
+    return load("wet friction").apply(pavement) if mode == "coupled" else pavement
+
+
 def _read_constants(vehicle: Vehicle, mode: Mode) -> Constants:
     car = {
         f.name: value for f in fields(vehicle) if isinstance(value := getattr(vehicle, f.name), float | int)
@@ -134,7 +140,7 @@ def _read_constants(vehicle: Vehicle, mode: Mode) -> Constants:
     steady = load("low-speed rule")
     tyre = None if vehicle.tyre is None else tyre_entries(find_entry("tyre", TYRE).read_bytes())
     return make_constants(
-        car, vehicle, load("surface", "dense-asphalt"), mode=mode, ticks_per_frame=100.0, steady=steady, tyre=tyre
+        car, vehicle, _read_pavement(mode), mode=mode, ticks_per_frame=100.0, steady=steady, tyre=tyre
     )  # fmt: skip
 
 

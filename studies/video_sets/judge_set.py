@@ -8,8 +8,8 @@ import numpy as np
 
 from catalogs.learned_judges import load_judges
 from catalogs.sentences import cap_problems
-from flows.judging.claims import read_claim
 from flows.judging.evaluation_means import average_within_seeds
+from flows.judging.foreign import read_claim
 from flows.judging.foreign_sources import read_camera
 from flows.judging.judged_clip import Row
 from flows.judging.motion_curves import draw_motion
@@ -60,7 +60,7 @@ def judge_video_set(
     InputError
         For every file that cannot be read, or that no clip of the protocol has; or for another window.
     """
-    results = Outputs(out, "judge-set", "judge-set.json", "judge-set.md", MOTION)
+    results = Outputs(out, "lab judge-set", "judge-set.json", "judge-set.md", MOTION)
     chosen = load_protocol(protocol)
     smoothing = int(chosen.smoothing_window.value) if window is None else window
     known = [width or 0 for width in WINDOWS]

@@ -1,12 +1,12 @@
 """Figures of a set of edited videos, clip by clip, by the tasks of a protocol."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from catalogs.entries import load
-from flows.judging.evaluation_rows import figure_row
+from flows.judging.evaluation_rows import Scored, figure_row, windowed_rows
 from flows.judging.judged_clip import Row
 from studies.video_sets.compared_motion import (
     find_control_clip,
@@ -21,7 +21,6 @@ from tasks.errors import InputError
 from tasks.eval.foreign_video import judge_motion, sample_claim
 from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.video_motion import (
-    WINDOWS,
     geometry_error,
     motion_retention,
     path_error,
@@ -58,7 +57,7 @@ def clip_rows(judged: JudgedSet, seen: SetMotion) -> Iterator[Row]:
         yield from _weather_rows(judged, seen)
     if task == "geometry" and name != judged.protocol.geometry_control:
 
-        def compute(window: int | None) -> tuple[float, float]:
+        def compute(window: int | None) -> Scored:
             meant = sample_claimed_pitch(judged, seen)
             opening = judged.protocol.event_opening.value
             return (
@@ -66,7 +65,7 @@ def clip_rows(judged: JudgedSet, seen: SetMotion) -> Iterator[Row]:
                 geometry_error(seen.times, meant, meant, opening, window),
             )
 
-        yield from _windowed_rows(f"e_geometry_{name}", seen, compute)
+        yield from windowed_rows(f"e_geometry_{name}", seen.clip.method, seen.clip.clip, compute)
 
 
 def claim_rows(judged: JudgedSet, seen: SetMotion) -> Iterator[Row]:
@@ -120,14 +119,14 @@ def _weather_rows(judged: JudgedSet, seen: SetMotion) -> Iterator[Row]:
     clip, (control, own) = seen.clip, find_control_clip(judged, seen)
     from_source = "" if own or control is None else "against the source's control: the model made none"
 
-    def compute(window: int | None) -> tuple[float, float]:
+    def compute(window: int | None) -> Scored:
         pair = pair_with_control(judged, seen)
         return (
             weather_error(pair.way, pair.dry_way, pair.station, pair.dry_station, window),
             weather_error(pair.station, pair.dry_station, pair.station, pair.dry_station, window),
         )
 
-    yield from _windowed_rows("e_weather", seen, compute, from_source)
+    yield from windowed_rows("e_weather", clip.method, clip.clip, compute, from_source)
     error, note = None, from_source
     try:
         other = require_control_clip(judged, seen)
@@ -135,20 +134,6 @@ def _weather_rows(judged: JudgedSet, seen: SetMotion) -> Iterator[Row]:
     except InputError as fault:
         note = str(fault)
     yield figure_row("e_path", clip.method, clip.clip, error, "1", note=note, floor=0.0)
-
-
-def _windowed_rows(
-    metric: str, seen: SetMotion, compute: Callable[[int | None], tuple[float, float]], remark: str = ""
-) -> Iterator[Row]:
-    for window in WINDOWS:
-        error, floor, note = None, None, remark
-        try:
-            error, floor = compute(window)
-        except InputError as fault:
-            note = str(fault)
-        yield figure_row(
-            metric, seen.clip.method, seen.clip.clip, error, "1", note=note, window=window, floor=floor
-        )
 
 
 def _cut_motion(motion: RecoveredMotion, rows: NDArray[np.int64]) -> RecoveredMotion:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from tasks.campaign.campaign import LEAST_SAMPLES
 from tasks.campaign.channels import COLUMN_UNITS
-from tasks.campaign.checks import CheckTable, Told, apply_checks
+from tasks.campaign.checks import CheckTable, Violation, apply_checks
 from tasks.campaign.measured import STAND_IN, LoggedSignal, MeasuredRun, Stretch
 from tasks.campaign.signals import (
     ChannelRule,
@@ -36,7 +36,7 @@ class Assembled:
         if there are problems
     run : what can be read of it, for the checks that need all runs
     problems : one sentence each
-    of_map : one of them is told by the channels together, so that the map may be wrong for every run
+    of_map : one of them is reported for the channels together, so that the map may be wrong for every run
     computed : sentence on an acceleration that the logger computed from the speed; empty where it is none
     """
 
@@ -78,13 +78,13 @@ def assemble_run(
     about : run of that name and on that road, without columns; None for one without a name on a dry and flat road
     """
     logged = _log_channels(signals, rules, start, end, table)
-    told = [
+    violations = [
         one
         for own in logged.values()
         for signal in own
         for one in apply_checks((*table.times, *table.signal), signal)
     ]
-    problems = _join_channels(told)
+    problems = _join_channels(violations)
     usable = {channel: own for channel, own in logged.items() if not any(_is_unreadable(one) for one in own)}
     run = replace(about or MeasuredRun(interval=1.0 / rate), interval=1.0 / rate, spans=table.spans)
     nothing = Assembled(start=start, columns={}, run=run, problems=tuple(problems))
@@ -101,7 +101,7 @@ def assemble_run(
         channel: np.mean([resample_on_clock(signal, clock) for signal in own], axis=0)
         for channel, own in converted.items()
     }
-    broken = {one.channel for one in told}
+    broken = {one.channel for one in violations}
     whole = {channel: values for channel, values in columns.items() if channel not in broken}
     stands_in = any(rule.channel == "brake_pressure" and rule.gain is not None for rule in rules)
     run = replace(
@@ -161,7 +161,7 @@ def judge_columns(
     clock = about.interval * np.arange(count, dtype=np.float64)
     sampled = {name: mark_samples(name, columns[name]) for name in COLUMN_UNITS if name in columns}
     signals = {name: Signal(time=clock[own], values=columns[name][own]) for name, own in sampled.items()}
-    told = [
+    violations = [
         one
         for name, signal in signals.items()
         for one in apply_checks(
@@ -169,11 +169,11 @@ def judge_columns(
             LoggedSignal(channel=name, logged=signal, converted=signal, speed=signals.get("speed")),
         )
     ]
-    broken = {one.channel for one in told if one.check.name != "frozen"} | misread
+    broken = {one.channel for one in violations if one.check.name != "frozen"} | misread
     usable = {name: fill_between_samples(name, columns[name]) for name in signals if name not in broken}
     run = replace(about, columns=_name_brake(usable, brake_stands_in), spans=table.spans)
     of_run = [one.sentence for one in apply_checks(table.run, run)]
-    return run, problems + _join_channels(told) + of_run
+    return run, problems + _join_channels(violations) + of_run
 
 
 def _log_channels(
@@ -217,10 +217,10 @@ def _name_brake(
     }
 
 
-def _join_channels(told: Iterable[Told]) -> list[str]:
+def _join_channels(violations: Iterable[Violation]) -> list[str]:
     """Write one sentence per problem; channels of one clock share its faults, so they share the sentence."""
     channels: dict[str, list[str]] = {}
-    for one in told:
+    for one in violations:
         if one.channel not in channels.setdefault(one.sentence, []):
             channels[one.sentence].append(one.channel)
     return [

@@ -96,6 +96,20 @@ COLUMN_UNITS = {"time": "s", **{name: channel.unit for name, channel in CHANNELS
 """Units of the columns of a run's file."""
 
 
+def say_brake(pressure: float, signal: str) -> str:
+    """Return how hard a brake is applied, by the signal that was logged: "2.4 MPa", or "0.24 of the brake command".
+
+    Parameters
+    ----------
+    pressure : that the signal stands for [MPa]
+    signal : a channel of `BRAKE_SIGNALS`, or the unit of another signal
+    """
+    if BRAKE_SIGNALS.get(signal, 1.0) == 1.0:
+        return f"{pressure:.3g} MPa"
+    unit = "" if CHANNELS_BY_NAME[signal].unit == "1" else f" {CHANNELS_BY_NAME[signal].unit}"
+    return f"{pressure / BRAKE_SIGNALS[signal]:.3g}{unit} of the {signal.replace('_', ' ')}"
+
+
 def unit_factor(unit: str, target: str) -> float:
     """Return the factor that converts a value in ``unit`` to ``target``.
 

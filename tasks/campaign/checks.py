@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Literal, Self
 
 Fault = Literal["run", "map", "warning"]
-"""Of the run's own samples, which is then left out; perhaps of the map, which is refused; or none, which is told."""
+"""Of the run's own samples, which is then left out; perhaps of the map, which is refused; or none: a warning."""
 Channels = tuple[tuple[str, ...], ...]
 """Channels that a check needs: of each group of names one."""
 MOST_NAMES = 6
@@ -92,7 +92,7 @@ class CheckTable:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Told:
+class Violation:
     """A fault that a check tells.
 
     Parameters
@@ -120,29 +120,29 @@ class Channelled:
         return self if all(set(group) & {*self.names} for group in channels) else None
 
 
-def apply_checks(checks: Sequence[Check], view: Channelled) -> list[Told]:
+def apply_checks(checks: Sequence[Check], view: Channelled) -> list[Violation]:
     """Return what the checks tell of a signal, a run or a session.
 
-    Of the figures of one check and channel that break its limits the worst is told, with the places of all.
+    Of the figures of one check and channel that break its limits the worst is reported, with the places of all.
 
     Parameters
     ----------
-    checks : rows of the table that suit the view, in the order in which they are told
+    checks : rows of the table that suit the view, in the order in which they are reported
     view : what they look at
     """
-    told: list[Told] = []
+    violations: list[Violation] = []
     for check in checks:
         seen = view.having(check.channels)
         broken: dict[str, list[Figure]] = {}
         for figure in () if seen is None else check.measure(seen, **check.conditions):
-            better = {one.check.name for one in told if figure.channel in ("", one.channel)}
+            better = {one.check.name for one in violations if figure.channel in ("", one.channel)}
             if not better & {*check.unless} and not check.lowest <= figure.value <= check.highest:
                 broken.setdefault(figure.channel, []).append(figure)
-        told += [_tell(check, figures) for figures in broken.values()]
-    return told
+        violations += [_make_violation(check, figures) for figures in broken.values()]
+    return violations
 
 
-def _tell(check: Check, figures: Sequence[Figure]) -> Told:
+def _make_violation(check: Check, figures: Sequence[Figure]) -> Violation:
     worst = max(figures, key=lambda figure: max(check.lowest - figure.value, figure.value - check.highest))
     sentence = check.sentence.format(
         value=worst.value,
@@ -152,7 +152,7 @@ def _tell(check: Check, figures: Sequence[Figure]) -> Told:
         highest=check.highest,
         **worst.words,
     )
-    return Told(check=check, channel=worst.channel, sentence=sentence)
+    return Violation(check=check, channel=worst.channel, sentence=sentence)
 
 
 def list_names(names: Sequence[str]) -> str:

@@ -20,8 +20,8 @@ def convert_to_seconds(stamps: NDArray[np.float64], unit: str) -> NDArray[np.flo
     unit : of time, or `TIME_OF_DAY`; days, as of a spreadsheet or MATLAB's datenum, count from the first one's midnight
     """
     if unit == "d":
-        told = stamps[np.isfinite(stamps)]
-        return (stamps - np.floor(told[0] if told.size else 0.0)) * DAY
+        known = stamps[np.isfinite(stamps)]
+        return (stamps - np.floor(known[0] if known.size else 0.0)) * DAY
     return read_time_of_day(stamps) if unit == TIME_OF_DAY else stamps * unit_factor(unit, "s")
 
 
@@ -45,8 +45,8 @@ def pass_midnight(time: NDArray[np.float64], period: float = DAY) -> NDArray[np.
     period : [s]
     """
     passed = time.copy()
-    told = np.isfinite(time)
-    passed[told] += period * np.cumsum(np.diff(time[told], prepend=time[told][:1]) < -0.5 * period)
+    known = np.isfinite(time)
+    passed[known] += period * np.cumsum(np.diff(time[known], prepend=time[known][:1]) < -0.5 * period)
     return passed
 
 
@@ -57,8 +57,8 @@ def has_digits_of_day(stamps: NDArray[np.float64]) -> bool:
     ----------
     stamps : float64 [N] [1]
     """
-    told = stamps[np.isfinite(stamps)]
-    below = (told >= 0.0) & (told < 24e4) & (told % 1e4 < 6e3) & (told % 1e2 < 60.0)
+    known = stamps[np.isfinite(stamps)]
+    below = (known >= 0.0) & (known < 24e4) & (known % 1e4 < 6e3) & (known % 1e2 < 60.0)
     return bool(below.all())
 
 

@@ -68,21 +68,21 @@ def plan_experiments(gain: float) -> tuple[tuple[str, RunPlan], ...]:
         ("coast down from 36 m/s for 12 s", RunPlan(speed=36.0, peak=0.0, duration=12.0)),
         ("coast down from 12 m/s for 12 s", RunPlan(speed=12.0, peak=0.0, duration=12.0)),
         (
-            f"hard stop from 33 m/s with cold discs, {hard} MPa",
+            "hard stop from 33 m/s with cold discs",
             RunPlan(speed=33.0, peak=hard, duration=7.0),
         ),
         (
-            f"hard stop from 33 m/s with hot discs, {hard} MPa",
+            "hard stop from 33 m/s with hot discs",
             RunPlan(speed=33.0, peak=hard, duration=7.0, disc_rise=350.0),
         ),
-        (f"gentle stop from 14 m/s, {gentle} MPa", RunPlan(speed=14.0, peak=gentle, duration=9.0)),
-        (f"pulsed braking from 28 m/s, {hard} MPa", RunPlan(speed=28.0, peak=-hard, duration=7.0)),
+        ("gentle stop from 14 m/s", RunPlan(speed=14.0, peak=gentle, duration=9.0)),
+        ("pulsed braking from 28 m/s", RunPlan(speed=28.0, peak=-hard, duration=7.0)),
         (
-            f"ABS stop from 22 m/s in rain of 10 mm/h, {limit} MPa",
+            "ABS stop from 22 m/s in rain of 10 mm/h",
             RunPlan(weather="rain", rate=10.0, speed=22.0, peak=limit),
         ),
         (
-            f"ABS stop from 14 m/s on snow, {snow} MPa",
+            "ABS stop from 14 m/s on snow",
             RunPlan(weather="snow", rate=2.0, speed=14.0, peak=snow),
         ),
         (

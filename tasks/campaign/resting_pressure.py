@@ -27,7 +27,7 @@ STEADY = 0.02
 ROLLING = 1.0
 """Deceleration of a car that rolls, in gear or on a slope, at most; 0.4 MPa of brake pressure give as much [m/s^2]."""
 DRIFT = 0.04
-"""Pressure at rest from which a gauge that drifts is told [MPa]: the model brakes by 0.1 m/s^2; gauges resolve 0.03."""
+"""Pressure at rest from which a gauge counts as drifting [MPa]: the model brakes by 0.1 m/s^2; gauges resolve 0.03."""
 FEWEST_RUNS = 2
 """Runs that rest at one level from which it is the gauge's and not the driver's [1]."""
 BRAKED = 0.5

@@ -131,8 +131,8 @@ def cut_segments(
     lowest, low, highest = np.nanquantile(pressure, (0.0, 0.25, 1.0))
     if lowest >= cut.threshold and low <= lowest + IDLING * (highest - lowest):
         fault = (
-            f"channel {brake.channel} never falls below {brake.tell_pressure(lowest)}: above_mpa must be more than it"
-            f" idles at; it is {brake.tell_pressure(cut.threshold)}"
+            f"channel {brake.channel} never falls below {brake.describe_pressure(lowest)}: above_mpa must be more than"
+            f" it idles at; it is {brake.describe_pressure(cut.threshold)}"
         )
         return [Segment(start=float(applied.time[0]), end=float(applied.time[-1]), fault=fault)]
     episodes = find_pressure_episodes(
@@ -174,8 +174,10 @@ def _judge_segment(
         inside = signal.cut_window(segment.start, segment.end)
         if len(inside.time) < 2:
             return replace(segment, fault=f"channel {channel} has {len(inside.time)} samples in it")
-        if told := apply_checks(table.times, LoggedSignal(channel=channel, logged=inside, converted=inside)):
-            return replace(segment, fault=f"channel {channel} {told[0].sentence}")
+        if violations := apply_checks(
+            table.times, LoggedSignal(channel=channel, logged=inside, converted=inside)
+        ):
+            return replace(segment, fault=f"channel {channel} {violations[0].sentence}")
     return segment
 
 

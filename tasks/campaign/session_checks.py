@@ -24,15 +24,15 @@ from tasks.campaign.speed_by_acceleration import estimate_slopes, measure_apart
 
 def _count_restarts(clock: Clock, *, step_back: float) -> Iterator[Figure]:
     """Return how often a clock begins again [1], so that its times stand for several stretches."""
-    told = np.flatnonzero(np.isfinite(clock.time))
-    back = np.flatnonzero(np.diff(clock.time[told]) < -step_back)
+    known = np.flatnonzero(np.isfinite(clock.time))
+    back = np.flatnonzero(np.diff(clock.time[known]) < -step_back)
     if back.size:
-        rows = [str(row + clock.first) for row in told[back + 1]]
+        rows = [str(row + clock.first) for row in known[back + 1]]
         more = f" and {len(rows) - 5} more" if len(rows) > 5 else ""
         words = {
             "rows": f"{clock.kind}{'s' if len(rows) > 1 else ''} {', '.join(rows[:5])}{more}{clock.where}",
-            "start": clock.time[told[back[0]]],
-            "end": clock.time[told[back[0] + 1]],
+            "start": clock.time[known[back[0]]],
+            "end": clock.time[known[back[0] + 1]],
             "which": f"{'each such' if len(rows) > 1 else 'that'} {clock.kind}",
         }
         yield Figure(value=back.size, words=words)

@@ -101,11 +101,11 @@ def _measure_hold(
     differences = np.abs(np.diff(values))
     changes = np.flatnonzero(differences > ROUNDING_STEP * float(np.max(np.abs(values))))
     edges = np.concatenate(([0], changes + 1, [len(time) - 1]))
-    dwells, told = np.diff(time[edges]), len(changes) > 2
-    usual, most = np.quantile(dwells, (0.5, 0.95)) if told else (0.0, np.inf)
+    dwells, enough = np.diff(time[edges]), len(changes) > 2
+    usual, most = np.quantile(dwells, (0.5, 0.95)) if enough else (0.0, np.inf)
     jumps = differences[changes]
     beside = np.maximum(np.concatenate(([0.0], jumps)), np.concatenate((jumps, [0.0])))
-    step = max(float(jumps.min()), _find_smallest_step(values, changes)) if told else 0.0
+    step = max(float(jumps.min()), _find_smallest_step(values, changes)) if enough else 0.0
     locked = values[edges[:-1]] == 0.0
     longest = np.maximum(shortest, times_usual * usual)
     of_steady = np.where(locked, np.inf, np.maximum(shortest_of_steady, times_usual * most))
@@ -226,7 +226,7 @@ def compare_with_rate_of_speed(
 
     It may be the rate of a finer speed than the logged one, where the rounding of the logged one is small. An
     accelerometer beside a speed of coarser rounding deviates by that rounding at least, and the rate of the logged
-    speed itself by its own rounding alone. The rate of a finer speed is not told there: an inertial navigation system
+    speed itself by its own rounding alone. The rate of a finer speed is not known there: an inertial navigation system
     integrates its speed, so that its acceleration deviates by the rounding of the speed too. Infinite where too little
     changes to tell.
 

@@ -88,7 +88,7 @@ class ChannelRule:
         inward = unit_factor(self.unit, self.gain.source_unit)
         return self.sign * self.scale * inward * self.gain.value * unit_factor(self.gain.target_unit, target)
 
-    def tell_pressure(self, pressure: float) -> str:
+    def describe_pressure(self, pressure: float) -> str:
         """Return a pressure [MPa] as this signal of the brake was logged, such as 15 % (taken for 1.5 MPa)."""
         if self.channel == "brake_pressure" and self.gain is None:
             return f"{pressure:.3g} MPa"

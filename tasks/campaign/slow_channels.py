@@ -20,7 +20,7 @@ SLOW = 2
 NEARLY = 0.9
 """Share of `SLOW` that a logger's own clock may be off [1]."""
 FEWEST_UPDATES, ALIKE = 20, 0.8
-"""Updates from which a held signal can be told, and the share of holds of the usual length."""
+"""Updates from which a held signal can be detected, and the share of holds of the usual length."""
 SHORTEST_UNEVEN = 4
 """Samples of a hold from which one sample more or less is the logger's jitter."""
 FEWEST_CHANGES = 10

@@ -124,7 +124,7 @@ def estimate_slopes(
     ----------
     runs : whose acceleration is measured, and not computed from the speed
     drift : standard deviation over the runs of a session of an accelerometer's zero [m/s^2]
-    fewest_runs : of which a deviation is told [1]
+    fewest_runs : of which a deviation is reported [1]
     steepest : sine beyond which no slope is believed: the accelerometer is off by something else [1]
     shortest : time in motion that a run needs to tell its mean [s]
     """

@@ -94,7 +94,7 @@ def render_clip(
         gbuffer = backend.rasterise_view(
             prepared, view, field.K, field.width, field.height, normals=labels or weather.reads_normals
         )
-        if scene.gaussians.surroundings is not None:
+        if scene.daylight is not None:
             gbuffer = add_grain(gbuffer, pose, field.K)
         sky = environment_view(scene.environment, view, field.K, field.width, field.height)
         shutter = Shutter(

@@ -31,7 +31,7 @@ BRIGHTEST = 0.5
 _TILE = 256
 _TEXELS_A_WAVE = 3.0
 _PIXELS_A_WAVE = 2.0
-_UPRIGHT = np.array([c in (SemanticClass.BUILDING,) for c in range(256)])
+_UPRIGHT = np.arange(256) == SemanticClass.BUILDING
 _STRENGTH = np.array([DEVIATION.get(c, 0.0) for c in range(256)], dtype=np.float32)  # type: ignore[call-overload]
 
 
@@ -58,23 +58,21 @@ def add_grain(gbuffer: GBuffer, T_world_camera: NDArray[np.float64], K: NDArray[
     K : [3, 3] intrinsics, pixel centres at +0.5 [px]
     """
     rgb = gbuffer.rgb.copy()
-    _modulate(
-        rgb, gbuffer.depth, gbuffer.class_id, np.ascontiguousarray(T_world_camera[:3]), np.ascontiguousarray(K, dtype=np.float64),
-        _NOISE, WAVES, _STRENGTH, _UPRIGHT,
-    )  # fmt: skip
+    pose, intrinsics = (np.ascontiguousarray(m, dtype=np.float64) for m in (T_world_camera[:3], K))
+    _modulate(rgb, gbuffer.depth, gbuffer.class_id, pose, intrinsics)
     return replace(gbuffer, rgb=rgb)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _modulate(rgb, depth, class_id, pose, K, noise, waves, strength, upright):  # type: ignore[no-untyped-def]
+def _modulate(rgb, depth, class_id, pose, K):  # type: ignore[no-untyped-def]
     height, width = depth.shape
-    size = noise.shape[0]
-    coarsest = waves[-1]
+    size = _NOISE.shape[0]
+    coarsest = WAVES[-1]
     for i in range(height):
         down = (i + 0.5 - K[1, 2]) / K[1, 1]
         for j in range(width):
             kind = class_id[i, j]
-            deviation = strength[kind]
+            deviation = _STRENGTH[kind]
             z = np.float64(depth[i, j])
             if deviation == 0 or not z * _PIXELS_A_WAVE < coarsest * K[0, 0]:
                 continue
@@ -86,25 +84,25 @@ def _modulate(rgb, depth, class_id, pose, K, noise, waves, strength, upright):  
             dy = pose[1, 0] * across + pose[1, 1] * down + pose[1, 2]
             dz = pose[2, 0] * across + pose[2, 1] * down + pose[2, 2]
             x, y, up = pose[0, 3] + z * dx, pose[1, 3] + z * dy, pose[2, 3] + z * dz
-            if upright[kind]:
+            if _UPRIGHT[kind]:
                 u, v, facing = 0.8 * x + 0.6 * y, up, 0.45
             else:
                 u, v = x, y + up
                 facing = max(abs(dz) / np.sqrt(dx * dx + dy * dy + dz * dz), 0.02)
             pixel = z / K[0, 0] / np.sqrt(facing)
             total = 0.0
-            for k in range(len(waves)):
-                share = min(waves[k] / pixel / _PIXELS_A_WAVE - 1, 1.0)
+            for k in range(len(WAVES)):
+                share = min(WAVES[k] / pixel / _PIXELS_A_WAVE - 1, 1.0)
                 if share <= 0:
                     continue
-                a, b = u * _TEXELS_A_WAVE / waves[k], v * _TEXELS_A_WAVE / waves[k]
+                a, b = u * _TEXELS_A_WAVE / WAVES[k], v * _TEXELS_A_WAVE / WAVES[k]
                 r, c = np.floor(a), np.floor(b)
                 ta, tb = a - r, b - c
                 r0, c0 = int(r) % size, int(c) % size
                 r1, c1 = (r0 + 1) % size, (c0 + 1) % size
                 total += share * (
-                    (1 - ta) * ((1 - tb) * noise[r0, c0] + tb * noise[r0, c1])
-                    + ta * ((1 - tb) * noise[r1, c0] + tb * noise[r1, c1])
+                    (1 - ta) * ((1 - tb) * _NOISE[r0, c0] + tb * _NOISE[r0, c1])
+                    + ta * ((1 - tb) * _NOISE[r1, c0] + tb * _NOISE[r1, c1])
                 )
             gain = np.float32(max(1 + deviation * total, 0.3))
             for channel in range(3):

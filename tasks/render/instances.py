@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from tasks.conventions import SemanticClass
 from tasks.scene.gaussians import Gaussians
 
-NEAR_M, NEAR_SHARE = 0.15, 0.01
+NEAR_M, NEAR_SHARE = 0.25, 0.01
 """A pixel shows an object whose Gaussian lies within this distance [m] and this share of its depth [1] more."""
 LEAST_SEEN = 8
 """Gaussians of an object that face the camera inside the picture, below which its visibility is not represented [1]."""

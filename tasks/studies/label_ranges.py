@@ -37,6 +37,8 @@ def sampled_friction(
     """
     varied = study.weathers.get(weather.kind)
     names = varied.parameters if varied else tuple(surface.bounds)
+    # the study is the paper's, whose law knows none of these; drawn last, they leave the others their samples
+    names += tuple(name for name in surface.bounds if name.startswith("wet_") and name not in names)
     seed = (varied or next(iter(study.weathers.values()))).seed
     columns = latin_hypercube(surface.bounds, names, study.samples, seed)
     rows: list[dict[str, Any]] = [
@@ -51,8 +53,8 @@ def label_ranges(
 ) -> dict[str, float]:
     """Percentiles of friction, stopping distance and peak pitch over samples of the surface.
 
-    The surface reaches the vehicle through mu_c alone, so the clip is driven at `DRIVEN_PERCENTILES` of mu_c, and each
-    sample's stop and pitch lie between those of its neighbours.
+    The surface reaches the vehicle through mu_c, with the nominal dependence on speed, so the clip is driven at
+    `DRIVEN_PERCENTILES` of mu_c, and each sample's stop and pitch lie between those of its neighbours.
 
     Parameters
     ----------

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from math import isfinite, nan
 
 from tasks.errors import InputError
+from tasks.surface.wet_friction import ANY_SPEED, WetGrip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +29,14 @@ class SurfaceParameters:
     full_cover_depth_mm : snow depth that covers the whole pavement, h_cover [mm]
     glaze_mm : clear ice after freezing rain, from the bottom of the texture; NaN where no entry of ice was read [mm]
     ice_friction : friction of that ice, mu_ice; NaN where no entry of ice was read [1]
+    wet_friction : friction on wet texture at rest; this and what follows is NaN under the paper's law, which knows no
+        speed [1]
+    wet_decay_speed : speed over which it falls to 1/e [m/s]
+    wet_planing_film_mm : film above the texture that carries 1 - 1/e of the load from the onset of hydroplaning on [mm]
+    wet_planing_exponent : of that film [1]
+    wet_tyre_pressure_kpa : inflation pressure, from which that onset follows [kPa]
+    wet_planing_friction : friction that is left where water carries the tyre [1]
+    wet_reference_speed : speed that the friction of the surface state is told for [m/s]
     bounds : declared range of each parameter that the sensitivity study varies, by field name
     """
 
@@ -49,7 +58,19 @@ class SurfaceParameters:
     full_cover_depth_mm: float
     glaze_mm: float = nan
     ice_friction: float = nan
+    wet_friction: float = nan
+    wet_decay_speed: float = nan
+    wet_planing_film_mm: float = nan
+    wet_planing_exponent: float = nan
+    wet_tyre_pressure_kpa: float = nan
+    wet_planing_friction: float = nan
+    wet_reference_speed: float = nan
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict, compare=False)
+
+    @property
+    def grips_by_speed(self) -> bool:
+        """Whether wet friction depends on speed, beside the film."""
+        return isfinite(self.wet_friction)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,6 +85,7 @@ class SurfaceState:
     snow_depth_mm : h_s [mm]
     snow_coverage : share of the road that snow covers, c_s; friction takes it for that of the tyres' contact [1]
     friction : reference surface coefficient, mu_c; NaN where only the picture is asked for [1]
+    grip : how friction depends on speed; mu_c is that at the pavement's ``wet_reference_speed``
 
     Raises
     ------
@@ -77,6 +99,7 @@ class SurfaceState:
     snow_depth_mm: float = 0.0
     snow_coverage: float = 0.0
     friction: float = nan
+    grip: WetGrip = ANY_SPEED
 
     def __post_init__(self) -> None:
         problems = [

@@ -12,6 +12,7 @@ from math import exp
 
 from tasks.errors import InputError
 from tasks.surface.state import Derivation, SurfaceParameters, SurfaceState
+from tasks.surface.wet_friction import ANY_SPEED, WetGrip, make_wet_grip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,7 +93,7 @@ def dry_friction(film_mm: float, coverage: float, parameters: SurfaceParameters)
 
 
 def wet_friction(film_mm: float, coverage: float, parameters: SurfaceParameters) -> float:
-    """Friction under a film of water, from dry_friction down to flooded_friction [1].
+    """Friction under a film of water, from dry_friction down to flooded_friction, or that at the reference speed [1].
 
     Parameters
     ----------
@@ -102,11 +103,28 @@ def wet_friction(film_mm: float, coverage: float, parameters: SurfaceParameters)
 
     References
     ----------
-    Paper, Eq. surface_friction_mapping.
+    Paper, Eq. surface_friction_mapping; `tasks.surface.wet_friction` where the pavement grips by speed.
     """
     p = parameters
+    if p.grips_by_speed:
+        return p.wet_friction * find_wet_grip(film_mm, p).reference
     r_f = p.flooded_friction / p.dry_friction
     return p.dry_friction * (r_f + (1 - r_f) * exp(-film_mm / p.film_decay_mm))
+
+
+def find_wet_grip(film_mm: float, parameters: SurfaceParameters) -> WetGrip:
+    """Return how friction under a film depends on speed, on a pavement that grips by speed.
+
+    Parameters
+    ----------
+    film_mm : film depth h_t [mm]
+    parameters : the pavement
+    """
+    p = parameters
+    return make_wet_grip(
+        film_mm - p.texture_depth_mm, p.wet_friction, p.wet_decay_speed, p.wet_planing_film_mm,
+        p.wet_planing_exponent, p.wet_tyre_pressure_kpa, p.wet_planing_friction, p.wet_reference_speed,
+    )  # fmt: skip
 
 
 def snow_friction(film_mm: float, coverage: float, parameters: SurfaceParameters) -> float:
@@ -148,6 +166,14 @@ def derive_rain(weather: Weather, state: SurfaceState, p: SurfaceParameters) -> 
     """Derivations of film and friction in rain."""
     r_f = p.flooded_friction / p.dry_friction
     decay = f"exp(-{state.film_depth_mm:.4g} / {p.film_decay_mm:g})"
+    friction = _friction_derivation("5, S22", f"{p.dry_friction:g} * ({r_f:.4g} + (1 - {r_f:.4g}) * {decay})")
+    if p.grips_by_speed:
+        speed = p.wet_reference_speed
+        friction = _friction_derivation(
+            "none",
+            f"at {3.6 * speed:.3g} km/h: {p.wet_friction:g} * exp(-{speed:.4g} / {p.wet_decay_speed:.4g})"
+            f" * (1 - {state.grip.carried:.4g} * min({speed:.4g} / {state.grip.onset:.4g}, 1)^2)",
+        )
     return (
         Derivation(
             field="film_depth_mm", quantity="water film", symbol="h_t", equation="3, S21",
@@ -156,7 +182,7 @@ def derive_rain(weather: Weather, state: SurfaceState, p: SurfaceParameters) -> 
             f" * {weather.precipitation_mm_h:g}^{p.film_rate_exponent:g}"
             f" * {p.crossfall:g}^{p.film_crossfall_exponent:g}",
         ),
-        _friction_derivation("5, S22", f"{p.dry_friction:g} * ({r_f:.4g} + (1 - {r_f:.4g}) * {decay})"),
+        friction,
     )  # fmt: skip
 
 
@@ -310,4 +336,5 @@ def surface_state(weather: Weather, parameters: SurfaceParameters) -> SurfaceSta
         snow_depth_mm=snow,
         snow_coverage=coverage,
         friction=kind.friction(film, coverage, parameters),
+        grip=find_wet_grip(film, parameters) if kind.wet and parameters.grips_by_speed else ANY_SPEED,
     )

@@ -5,10 +5,15 @@ Dynamics, SAE R-114, chapter 5); the modes of the whole half-car lie some per ce
 """
 
 from collections.abc import Callable, Mapping
-from math import nan, pi, sqrt
+from math import degrees, nan, pi, sqrt
 from typing import NamedTuple
 
+from tasks.vehicle.effects.equations import compute_engine_torque, compute_resistance
+from tasks.vehicle.effects.table import pack_effect_values
 from tasks.vehicle.parameters import Vehicle
+
+COASTING_SPEED = 60 / 3.6
+"""Speed of the figure of the road load [m/s]."""
 
 
 def compute_ride_rate(spring: float, tyre: float) -> float:
@@ -97,6 +102,37 @@ def compute_peak_deceleration(vehicle: Vehicle) -> float:
     return max(peaks) * vehicle.gravity
 
 
+def compute_road_load(vehicle: Vehicle) -> float:
+    """Return the deceleration at which a car coasts at `COASTING_SPEED` on a level dry road [m/s2].
+
+    Parameters
+    ----------
+    vehicle : the vehicle, whose effects roll, meet the air and drag; its wheels add their inertia to the mass
+    """
+    v, effects, speed = vehicle, pack_effect_values(vehicle.effects), COASTING_SPEED
+    rolling = (effects.rolling_coefficient + effects.rolling_speed * speed) * v.gravity
+    engine = compute_engine_torque(effects, speed / v.wheel_radius, v.wheel_radius)
+    force = v.mass * (v.coast_deceleration + rolling) + compute_resistance(effects, speed, 1.0, 0.0)
+    force += (engine + effects.pad_drag) / v.wheel_radius
+    return force / (v.mass + (v.wheel_inertia_f + v.wheel_inertia_r) / v.wheel_radius**2)
+
+
+def compute_dive_gradient(vehicle: Vehicle) -> float:
+    """Return the steady pitch for each g of braking [deg], from the load transfer on springs, links and tyres.
+
+    Parameters
+    ----------
+    vehicle : the vehicle, whose anti-dive and anti-lift pass a part of the load transfer beside the springs
+    """
+    v, effects = vehicle, pack_effect_values(vehicle.effects)
+    transfer = v.mass * v.gravity * v.cg_height / v.wheelbase
+    through_f = 1.0 - effects.anti_dive * v.front_brake_share
+    through_r = 1.0 - effects.anti_lift * (1.0 - v.front_brake_share)
+    springs = through_f / v.suspension_stiffness_f + through_r / v.suspension_stiffness_r
+    tyres = 1.0 / v.tyre_stiffness_f + 1.0 / v.tyre_stiffness_r
+    return degrees(transfer * (springs + tyres) / v.wheelbase)
+
+
 class Figure(NamedTuple):
     """One figure: its unit, as catalogue files write it, and the function that computes it."""
 
@@ -140,6 +176,8 @@ FIGURES: Mapping[str, Figure] = {
     "front_brake_share": Figure("1", lambda v: v.front_brake_share),
     "peak_deceleration": Figure("m s-2", compute_peak_deceleration),
     "coast_deceleration": Figure("m s-2", lambda v: v.coast_deceleration),
+    "road_load": Figure("m s-2", compute_road_load),
+    "dive_gradient": Figure("deg", compute_dive_gradient),
     "gravity": Figure("m s-2", lambda v: v.gravity),
 }
 """Every figure by its name, in the order in which people read them."""

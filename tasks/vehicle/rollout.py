@@ -19,7 +19,7 @@ from tasks.vehicle.model.chassis import Conditions
 from tasks.vehicle.model.simulation import COLUMNS, Recording, Simulation, simulate
 from tasks.vehicle.paper.low_speed import SteadyStop
 from tasks.vehicle.paper.paper_mode import StepGrid, run_paper_mode, sample_history
-from tasks.vehicle.parameters import Vehicle, compute_surface_response
+from tasks.vehicle.parameters import SurfaceResponse, Vehicle, compute_surface_response
 
 Mode = Literal["paper", "coupled"]
 MODES: tuple[Mode, ...] = ("paper", "coupled")
@@ -102,7 +102,8 @@ def simulate_scenario(
     Parameters
     ----------
     vehicle : the vehicle
-    surface : kind of weather, mu_c, and the depth of the snow for vehicles with the ploughing effect
+    surface : kind of weather, mu_c and how it depends on speed, which paper mode does not know, and the depth of the
+        snow for vehicles with the ploughing effect
     controls : initial speed and brake
     hazard : road feature
     mode : paper follows the publication, coupled is the physical model
@@ -131,11 +132,29 @@ def simulate_scenario(
             simulate(
                 vehicle, response,
                 make_command_input(controls.brake.profile, hold_speed=controls.hold_speed_until_brake),
-                Conditions(hazard=hazard, snow_depth_mm=snow_depth_mm, grade=grade),
+                Conditions(hazard=hazard, snow_depth_mm=snow_depth_mm, grade=grade, grip=surface.grip),
                 Recording(samples=ticks + 1, interval=0.001, substeps=per_tick),
                 initial_speed=controls.initial_speed,
             )
         )  # fmt: skip
+    return describe_rollout(
+        history, vehicle, response, surface_friction, mode=mode, duration_s=duration_s, grade=grade
+    )
+
+
+def describe_rollout(
+    history: History, vehicle: Vehicle, response: SurfaceResponse, surface_friction: float, *, mode: Mode,
+    duration_s: float, grade: RoadGrade,
+) -> Rollout:  # fmt: skip
+    """Return the telemetry of a drive.
+
+    Parameters
+    ----------
+    history : motion at the ticks, and its events
+    vehicle, response : the vehicle, and its tyres on the surface
+    surface_friction : mu_c [1]
+    mode, duration_s, grade : as of `simulate_scenario`
+    """
     columns: dict[str, NDArray[Any]] = dict(history.columns)
     columns["t_ns"] = np.arange(len(columns["speed"]), dtype=np.int64) * TICK_NS
     columns["road_grade"] = grade.at(columns["station"])

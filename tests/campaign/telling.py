@@ -5,13 +5,13 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from catalogs.campaign_checks import load_campaign_checks
+from catalogs.entries import load
 from tasks.campaign.checks import apply_checks
 from tasks.campaign.measured import LoggedSignal, MeasuredRun, Session
 from tasks.campaign.signals import Signal
 
 Columns = Mapping[str, NDArray[np.float64]]
-TABLE = load_campaign_checks()
+TABLE = load("table of checks")
 CONDITIONS = {
     check.name: check.conditions for check in (*TABLE.recording, *TABLE.stretch, *TABLE.run, *TABLE.session)
 }

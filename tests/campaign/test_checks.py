@@ -6,13 +6,14 @@ from string import Formatter
 
 import pytest
 
-from catalogs.campaign_checks import CAMPAIGN_CHECKS, MEASURES, CheckTableEntry
+from catalogs.campaign_checks import MEASURES, CheckTableEntry
+from catalogs.entries import find_entry
 from catalogs.quantities import read_entry
 from tasks.campaign.channels import CHANNELS_BY_NAME
 from tasks.campaign.checks import Check, Figure, apply_checks, list_names
 from tasks.campaign.measured import BRAKES, Clock
 
-ENTRY = read_entry(CheckTableEntry, CAMPAIGN_CHECKS, "table of checks")
+ENTRY = read_entry(CheckTableEntry, find_entry("table of checks"), "table of checks")
 ROWS = {name: row for rows in ENTRY.groups.values() for name, row in rows.items()}
 
 

@@ -13,7 +13,6 @@ from catalogs.entries import entry_names, find_entry, load
 from catalogs.grids import GridFile, expand_grid, warn_of_late_brakes
 from catalogs.grids.schema import grid_schema
 from catalogs.scenario import Scenario
-from catalogs.studies import load_conditions
 from tasks.errors import InputError
 
 
@@ -190,7 +189,8 @@ def test_a_draw_may_leave_nothing_out(tmp_path):
 def test_the_papers_conditions_have_the_papers_relationship():
     """Appendix C: 19 development cases; held out, five weathers interpolate and seven controls are off the grid."""
     tags = {
-        c.name: (c.split, calibration_tag(c.scenario, load("calibrated range"))) for c in load_conditions()
+        c.name: (c.split, calibration_tag(c.scenario, load("calibrated range")))
+        for c in load("list of conditions")
     }
     assert {tag for split, tag in tags.values() if split == "development"} == {"in-grid"}
     held_out = {name: tag for name, (split, tag) in tags.items() if split == "held-out"}

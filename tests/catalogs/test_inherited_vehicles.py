@@ -85,7 +85,7 @@ def test_a_number_is_inherited_with_its_tolerance_or_given_whole(write):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("extends: tractor", "a file beside this one; tractor: no such vehicle; give a YAML file or one of: bmw-m8"),
+        ("extends: tractor", "a file beside this one; tractor: no such vehicle; give a YAML file or one of: bmw-320i"),
         ("extends: tractor.yaml", "tractor.yaml: no such vehicle"),
         ("extends: ../car.yaml", "the name of the vehicle that it extends must be no path; it is '../car.yaml'"),
         ("extends: ''", "must have 1 to 100 characters"),
@@ -120,7 +120,7 @@ def test_a_line_of_files_has_an_end(write):
     )
 
 
-def test_a_problem_of_the_other_vehicle_is_told_of_its_file(write):
+def test_a_problem_of_the_other_vehicle_wants_notice_its_file(write):
     base = write("base.yaml", "extends: paper-reference\nwheel_radius: {value: -1, unit: m, source: tape}")
     problem = refusal(write("car.yaml", "extends: base.yaml"))
     assert problem.startswith(f"{base}: wheel_radius")

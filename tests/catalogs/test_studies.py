@@ -7,24 +7,25 @@ import pytest
 from catalogs.entries import load
 from catalogs.references import ReferenceCase
 from catalogs.scenario import find_scenario_problems
-from catalogs.studies import load_conditions
-from catalogs.studies.agreement import find_printed_name, printed_agreement, put_beside_print
+from catalogs.studies.agreement import find_printed_name, put_beside_print
 
 
 def test_there_are_nineteen_development_and_twelve_held_out_conditions():
-    splits = [condition.split for condition in load_conditions()]
+    splits = [condition.split for condition in load("list of conditions")]
     assert (splits.count("development"), splits.count("held-out")) == (19, 12)
-    assert len({condition.name for condition in load_conditions()}) == 31
+    assert len({condition.name for condition in load("list of conditions")}) == 31
 
 
 def test_every_condition_is_a_sound_scenario():
     assert not [
-        problem for condition in load_conditions() for problem in find_scenario_problems(condition.scenario)
+        problem
+        for condition in load("list of conditions")
+        for problem in find_scenario_problems(condition.scenario)
     ]
 
 
 def test_held_out_conditions_change_one_control_each():
-    held_out = {c.name: c.scenario for c in load_conditions() if c.split == "held-out"}
+    held_out = {c.name: c.scenario for c in load("list of conditions") if c.split == "held-out"}
     assert held_out["pressure-1.6mpa"].peak_pressure_mpa == 1.6
     assert held_out["ramp-0.2s"].ramp_s == 0.2
     assert held_out["onset-12m"].brake_onset_m == 12.0 and held_out["onset-12m"].brake_onset_s is None
@@ -44,7 +45,7 @@ def test_the_study_samples_the_published_parameters():
 
 
 def test_the_printed_groups_add_up_to_the_printed_means():
-    printed = printed_agreement()
+    printed = load("table of printed agreement")
     for split, parts in (
         ("held-out", ("weather", "brake", "road")),
         ("development", ("flat", "hump", "depression")),
@@ -58,8 +59,8 @@ def test_the_printed_groups_add_up_to_the_printed_means():
 
 def test_the_printed_cases_are_the_held_out_conditions_and_add_up_to_their_groups():
     """Table carsim_ood_per_case_supp beside Table carsim_validation: means and maxima to the printed digits."""
-    printed = printed_agreement()["held-out"]
-    conditions = {one.name: one.scenario for one in load_conditions() if one.split == "held-out"}
+    printed = load("table of printed agreement")["held-out"]
+    conditions = {one.name: one.scenario for one in load("list of conditions") if one.split == "held-out"}
     assert set(conditions) == set(printed) - {"weather", "brake", "road", "all"}
 
     def half_digit(value: float) -> float:

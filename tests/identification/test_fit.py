@@ -25,7 +25,7 @@ from tasks.identification.inference import evidence as inference_evidence
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.derivatives import differentiate_run
 from tasks.identification.inference.disturbance import Disturbance
-from tasks.identification.inference.fit import Fit, fit_hypotheses
+from tasks.identification.inference.fit import Fit, _measure_scatter, fit_hypotheses
 from tasks.identification.inference.forward import (
     RunModel,
     compute_starting_speed,
@@ -296,3 +296,15 @@ def test_a_form_is_made_again_from_its_name() -> None:
     ):
         with pytest.raises(InputError, match="no port, variable and shape of the grammar"):
             make_form_in_range(wrong, (0.1,), 0.0, 1.0)
+
+
+def test_scatter_of_the_runs_is_what_they_differ_beyond_noise_by_the_t_of_so_few() -> None:
+    """Scores of 2, -2, 2, -2 standard errors: a mean square of 16/3 over three degrees of freedom, t 3.18 over 1.96."""
+    slopes = [(np.array([[1.0]]), np.zeros((1, 1)))] * 4
+    scores = np.array([[2.0], [-2.0], [2.0], [-2.0]])
+    widened = 2.0 * np.sqrt(16.0 / 3.0 - 1.0) * 3.182446 / 1.959964
+    assert _measure_scatter(scores, slopes, np.eye(1)) == pytest.approx([widened], rel=1e-6)
+    assert _measure_scatter(scores / 4.0, slopes, np.eye(1)) == [0.0]
+    assert _measure_scatter(scores[:2], slopes[:2], np.eye(1)) == [0.0], (
+        "two runs say nothing of their scatter"
+    )

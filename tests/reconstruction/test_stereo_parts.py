@@ -5,8 +5,13 @@ import pytest
 
 from tasks.conventions import SemanticClass
 from tasks.reconstruction.camera import pixel_rays
-from tasks.reconstruction.carriageway import classify_points, measure_carriageway
-from tasks.reconstruction.cloud import LONGEST, _depth_factor_onto_route, _split_long_discs
+from tasks.reconstruction.cloud import (
+    LONGEST,
+    _depth_factor_onto_route,
+    _split_long_discs,
+    classify_points,
+    measure_carriageway,
+)
 from tasks.reconstruction.disparity import fill_disparity, match_stereo
 from tasks.reconstruction.exposure import estimate_exposure
 from tasks.reconstruction.fusion import find_finest_view, fuse_depth

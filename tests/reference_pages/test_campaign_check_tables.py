@@ -4,13 +4,13 @@ import re
 
 import yaml
 
-from catalogs.campaign_checks import CAMPAIGN_CHECKS
+from catalogs.entries import find_entry
 from reference_pages.markdown import format_cell, format_value
 from reference_pages.pages import insert_tables
 from tests.documents import DOCS
 
 PAGE = insert_tables((DOCS / "reference" / "campaign-checks.md").read_text())
-CONTENT = yaml.safe_load(CAMPAIGN_CHECKS.read_text())
+CONTENT = yaml.safe_load(find_entry("table of checks").read_text())
 SPANS = CONTENT.pop("spans")
 CHECKS = {name: check for group in CONTENT.values() for name, check in group.items()}
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tasks.eval.poses.rolling_shutter import correct_rolling_shutter, row_times
+from tasks.eval.poses.checks import correct_rolling_shutter, row_times
 from tasks.render.composition import encode_8bit
 from tasks.render.labels import compute_row_flow
 from tasks.render.lens import distort_rays

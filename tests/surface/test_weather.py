@@ -60,7 +60,7 @@ def test_the_judge_finds_the_same_surface_and_the_derivation_names_what_moved(ki
         | {"surface_friction": state.friction}
     )
     derived = [one.field for one in WEATHERS[kind].derive(weather, state, ASPHALT)]
-    names = {field.name for field in fields(SurfaceState)} - {"kind", "precipitation_mm_h"}
+    names = {field.name for field in fields(SurfaceState)} - {"kind", "precipitation_mm_h", "grip"}
     assert derived[-1] == "friction"
     assert set(derived[:-1]) == {name for name in names - {"friction"} if getattr(state, name) > 0}
 
@@ -100,6 +100,7 @@ def test_dry_is_the_kind_that_changes_no_picture():
 
 
 def test_no_number_of_the_pavement_is_left_out():
-    """Kinds of weather bring the fields that a pavement's file does not have."""
-    assert all(value == value for name, value in vars(ASPHALT).items() if name != "bounds")
+    """Kinds of weather and the law of wet friction bring the fields that a pavement's file does not have."""
+    whole = load("wet friction").apply(ASPHALT)
+    assert all(value == value for name, value in vars(whole).items() if name != "bounds")
     assert set(ASPHALT.bounds) <= {field.name for field in fields(SurfaceParameters)}

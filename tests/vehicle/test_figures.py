@@ -7,7 +7,11 @@ import numpy as np
 import pytest
 
 from catalogs.entries import entry_names, load
+from tasks.surface.road_profile import FLAT_ROAD
+from tasks.surface.state import SurfaceState
+from tasks.vehicle.brake import BrakeCommand
 from tasks.vehicle.figures import FIGURES, compute_figures
+from tasks.vehicle.rollout import Controls, simulate_scenario
 
 
 def half_car_modes(v):
@@ -53,10 +57,31 @@ def test_the_papers_car_has_these_figures():
             "pitch_frequency": 1.1091322, "pitch_damping_ratio": 0.4438786, "wheel_hop_frequency_f": 10.1648171,
             "wheel_hop_frequency_r": 10.1648171, "wheel_radius": 0.32, "wheel_inertia_f": 2.4, "wheel_inertia_r": 2.4,
             "deceleration_per_pressure": 1000 / 0.32 / 1308, "front_brake_share": 0.65,
-            "peak_deceleration": 0.82 * 1.01 * 9.81, "coast_deceleration": 0.004, "gravity": 9.81,
+            "peak_deceleration": 0.82 * 1.01 * 9.81, "coast_deceleration": 0.004,
+            "road_load": 0.004 * 1308 / (1308 + 4.8 / 0.32**2), "dive_gradient": 4.6826539, "gravity": 9.81,
         },
         rel=1e-6,
     )  # fmt: skip
+
+
+def test_dive_and_road_load_are_those_of_a_drive():
+    """A stop at a steady 4 m/s2, and the first second of coasting from 60 km/h."""
+    car = load("vehicle", "bmw-320i")
+    figures, dry = compute_figures(car), SurfaceState(kind="dry", friction=0.82)
+
+    def drive(pressure, speed, **brake):
+        command = BrakeCommand(
+            peak_pressure_mpa=pressure, ramp_s=0.2, onset_s=0.0, onset_station_m=None, hold_s=None, release_s=1.0
+        )  # fmt: skip
+        controls = Controls(initial_speed=speed, brake=command, hold_speed_until_brake=False)
+        return simulate_scenario(car, dry, controls, FLAT_ROAD, mode="coupled", duration_s=3.0).columns
+
+    braked = drive(1.5, 30.0)
+    gradient = np.degrees(braked["pitch"][-1]) / (-braked["longitudinal_acceleration"][-1] / 9.81)
+    assert gradient == pytest.approx(figures["dive_gradient"], rel=0.03)
+    assert gradient == pytest.approx(2.8, abs=0.1)
+    coasted = drive(0.0, 60 / 3.6)
+    assert -coasted["longitudinal_acceleration"][500] == pytest.approx(figures["road_load"], rel=0.03)
 
 
 def test_a_figure_beyond_what_floats_hold_is_nan():

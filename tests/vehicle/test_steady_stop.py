@@ -7,7 +7,6 @@ import pytest
 
 from catalogs.entries import load
 from catalogs.scenario import Scenario
-from catalogs.studies import load_conditions
 from flows.making.driving import controls_of, hazard_of, weather_of
 from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
 from tasks.surface.state import SurfaceState
@@ -22,7 +21,7 @@ from tests.vehicle.conftest import command
 
 STEADY = load("low-speed rule")
 SURFACES = (("dry", 0.82), ("rain", 0.5), ("snow", 0.51), ("snow", 0.42), ("snow", 0.24))
-BRAKED = [one.scenario for one in load_conditions() if one.scenario.peak_pressure_mpa]
+BRAKED = [one.scenario for one in load("list of conditions") if one.scenario.peak_pressure_mpa]
 """The conditions of Appendix C that brake."""
 ROLLING = ("speed", "braking_slip_f", "braking_slip_r", "longitudinal_acceleration")
 """Signals that the rule sets to zero at the stop: there each of them jumps."""

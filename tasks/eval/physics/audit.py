@@ -13,11 +13,10 @@ from tasks.eval.physics.commands import command_laws, road_height_laws
 from tasks.eval.physics.constants import Constants
 from tasks.eval.physics.coupled_laws import coupled_laws
 from tasks.eval.physics.effects import find_unjudged
-from tasks.eval.physics.frames import frame_laws, pose_laws
+from tasks.eval.physics.frames import frame_laws, pose_check_laws, pose_laws
 from tasks.eval.physics.grade import grade_laws
 from tasks.eval.physics.half_step import follow_half_step
 from tasks.eval.physics.laws import Law, motion_laws, wheel_laws
-from tasks.eval.physics.pose_check import pose_check_laws
 from tasks.eval.physics.route import RouteLine, route_laws
 
 COPIED = "frame rows are ticks: "

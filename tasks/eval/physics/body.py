@@ -10,8 +10,7 @@ from tasks.eval.physics.constants import DT, SURFACE_FORMS, Constants, Floats, d
 from tasks.eval.physics.coupled import find_hits, spread
 from tasks.eval.physics.half_step import INNER_STEP, HalfStep, find_brake_onset
 from tasks.eval.physics.laws import Law, evaluate_law, is_shaken, rounding_tolerance
-from tasks.eval.physics.stop_pitch import CAP_S, compute_pitching_deceleration
-from tasks.eval.physics.superposition import sum_contact_changes
+from tasks.eval.physics.superposition import CAP_S, compute_pitching_deceleration, sum_contact_changes
 
 ROUND = 1e-9
 """Relative rounding of closed forms [1]."""

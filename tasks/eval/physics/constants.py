@@ -57,6 +57,7 @@ class Constants:
         the tyre
     effects : numbers that the car adds to the plain laws, by name [units of the table of effects]
     forms : port and variable of each form outside that table
+    policy : whether a policy braked, and no scenario
     """
 
     car: Mapping[str, float]
@@ -70,6 +71,7 @@ class Constants:
     tyre: Mapping[str, str] | None = None
     effects: Mapping[str, float] = field(default_factory=dict)
     forms: tuple[tuple[str, str], ...] = ()
+    policy: bool = False
 
     @property
     def mass(self) -> float:
@@ -225,7 +227,30 @@ def _fallen_snow(rate: float, hours: float, surface: Mapping[str, float]) -> flo
     return rate * hours * surface["water_density"] / surface["fresh_snow_density"]
 
 
+def compute_wet_friction(speed: Floats | float, film: float, surface: Mapping[str, float]) -> Floats:
+    """Return friction under a film by speed, any shape [1]: what wet texture leaves, less the load that water carries.
+
+    Parameters
+    ----------
+    speed : any shape [m/s]
+    film : from the bottom of the texture [mm]
+    surface : pavement values with those of ``wet_friction: by-speed``
+    """
+    v, above = np.asarray(speed, np.float64), max(0.0, film - surface["texture_depth_mm"])
+    share = -np.expm1(-np.power(above / surface["wet_planing_film_mm"], surface["wet_planing_exponent"]))
+    pressure = np.clip(np.square(3.6 * v / 6.36) / surface["wet_tyre_pressure_kpa"], 0.0, 1.0)
+    texture = surface["wet_friction"] * np.exp(-v / surface["wet_decay_speed"])
+    return np.asarray(np.maximum(texture * (1.0 - share * pressure), surface["wet_planing_friction"]))
+
+
+def grips_by_speed(surface: Mapping[str, float]) -> bool:
+    """Return whether wet friction depends on speed."""
+    return bool(np.isfinite(surface.get("wet_friction", np.nan)))
+
+
 def _wet_friction(film: float, cover: float, surface: Mapping[str, float]) -> float:
+    if grips_by_speed(surface):
+        return float(compute_wet_friction(surface["wet_reference_speed"], film, surface))
     flooded = surface["flooded_friction"]
     return flooded + (surface["dry_friction"] - flooded) * float(np.exp(-film / surface["film_decay_mm"]))
 

@@ -8,7 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
-from tasks.eval.physics.constants import DT, Constants, Floats, pressure_at, read_grade
+from tasks.eval.physics.constants import (
+    DT,
+    Constants,
+    Floats,
+    compute_wet_friction,
+    grips_by_speed,
+    pressure_at,
+    read_grade,
+)
 from tasks.eval.physics.effects import (
     bound_lateral_hold,
     compute_engine_torque,
@@ -162,9 +170,11 @@ def _compute_axle(
     squeeze = static + np.maximum(stiff * (height - u), -static)
     damped = np.maximum(squeeze + e("tyre_damping", 0.0) * (v * slope - rate), 0.0)
     ratio, wet = load / static, facts["weather"] in WET
+    by_speed = _compare_with_reference(v, facts, constants)
 
     def grip(slip: Floats) -> Floats:
-        return load * compute_friction(slip, load, v, ratio, wet=wet, curve=curve, effects=constants.effects)
+        friction = compute_friction(slip, load, v, ratio, wet=wet, curve=curve, effects=constants.effects)
+        return load * friction * by_speed
 
     # what holds a standing car is what its weight asks for
     rest = -load * slope - static / sum(map(constants.static_load, "fr")) * constants.mass * climb
@@ -213,6 +223,16 @@ def _compute_axle(
     )  # fmt: skip
 
 
+def _compare_with_reference(v: Floats, facts: Mapping[str, Any], constants: Constants) -> Floats:
+    """Wet friction at each speed over that which the clip's mu_c tells [1]."""
+    surface = constants.surface
+    if facts["weather"] not in WET or not grips_by_speed(surface):
+        return np.ones(len(v))
+    film = facts["film_depth_mm"]
+    told = compute_wet_friction(surface["wet_reference_speed"], film, surface)
+    return compute_wet_friction(v, film, surface) / told
+
+
 def _drag_shaft(ticks: Mapping[str, Floats], moves: NDArray[np.bool_], constants: Constants) -> Floats:
     omega = ticks["wheel_speed_f"]
     turning = np.clip(omega / constants.car["lock_speed"], -1.0, 1.0)
@@ -224,7 +244,9 @@ def _doubt_line(line: Floats, facts: Mapping[str, Any], constants: Constants) ->
     """Error of the pressure at the pads: none where it is recorded, else an inner step's where the onset is a place."""
     if not (constants.effects.get("dead_time") or constants.effects.get("lag")):
         return np.zeros(len(line))
-    by_place = facts["brake_onset_m"] is not None and np.isfinite(facts["brake_onset_m"])
+    by_place = constants.policy or (
+        facts["brake_onset_m"] is not None and np.isfinite(facts["brake_onset_m"])
+    )
     change = spread(np.abs(np.diff(line, prepend=line[:1])), 1)
     return np.asarray((0.5 if by_place else 1e-6) * change + 1e-9)
 
@@ -235,6 +257,10 @@ def _act_on_pads(ticks: Mapping[str, Floats], facts: Mapping[str, Any], constant
     if dead == 0.0 and constants.effects.get("lag", 0.0) <= 0.0:
         return ticks["brake_pressure_mpa"]
     time = INNER_STEP * np.arange(2 * len(ticks["speed"]) - 1, dtype=np.float64)
+    if constants.policy:
+        told = ticks["brake_pressure_mpa"]
+        commanded = np.interp(time - dead, DT * np.arange(len(told)), told)
+        return delay_pressure(commanded, INNER_STEP, constants.effects)[::2]
     commanded = pressure_at(time - find_brake_onset(ticks, facts) - dead, *pressure_shape(facts))
     return delay_pressure(commanded, INNER_STEP, constants.effects)[::2]
 

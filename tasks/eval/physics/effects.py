@@ -25,6 +25,7 @@ STICK_SLIP = 0.002
 
 FORCE, TORQUE, SUM = "tyre force of slip and load", "brake torque of pressure", "m dv/dt is the sum of forces"
 HEAVE, PITCH, AXLE = "body's heave equation", "body's pitch equation", "axle's own motion"
+COMMANDED = "brake pressure as commanded"
 REMEMBERED: Mapping[str, tuple[str, ...]] = {
     "relaxation_length": (FORCE,),
     "tyre_heating": (FORCE,),
@@ -60,6 +61,8 @@ def find_unjudged(facts: Mapping[str, Any], constants: Constants) -> dict[str, s
     if facts["hazard_height_m"] and np.pi * abs(facts["hazard_height_m"]) > STEEP * facts["hazard_length_m"]:
         kept = ("road height as commanded",) if constants.mode == "coupled" else ()
         found = {law: f"road feature steeper than {STEEP:g}" for law in STEEP_LAWS if law not in kept}
+    if constants.policy:
+        found |= {COMMANDED: "a policy brakes"}
     found |= {law: f"effect {name}" for name in constants.effects for law in REMEMBERED.get(name, ())}
     return found | {
         law: f"form of {variable} at {port}" for port, variable in constants.forms for law in FORMS[port]

@@ -158,7 +158,7 @@ def _measure_air(
     guesses: list[Floats],
     settings: PhotometricSettings,
 ) -> Air | None:
-    """Return the air of a clip from a few of its runs of frames, or None where it is clear or cannot be told.
+    """Return the air of a clip from a few of its runs of frames, or None where it is clear or cannot be measured.
 
     Smaller pictures suffice: an error of the pose moves greys either way, the veil all of them towards its own. Pixels
     without a gradient are read too: they tell of the veil and nothing of the pose.

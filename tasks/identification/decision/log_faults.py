@@ -6,7 +6,7 @@ from math import sin
 import numpy as np
 
 from tasks.campaign.campaign import Campaign
-from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME
+from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME, say_brake
 from tasks.campaign.resting_pressure import describe_rest, measure_resting_levels
 from tasks.identification.decision.answer import NamedEffect
 from tasks.identification.inference.evidence import RunEvidence
@@ -78,8 +78,8 @@ def tell_inputs(campaign: Campaign, train: Sequence[RunEvidence]) -> list[str]:
     pressure = max(float(run.model.pressure.max()) for run in train)
     told = [
         f"inputs that were measured: {', '.join(inputs)}; compared: {', '.join(compared)}",
-        f"the training runs reach {speed.min():.3g} to {speed.max():.3g} m/s and {pressure:.3g} MPa: beyond that"
-        " nothing is claimed",
+        f"the training runs reach {speed.min():.3g} to {speed.max():.3g} m/s and"
+        f" {say_brake(pressure, campaign.brake_signal)}: beyond that nothing is claimed",
     ]
     if BRAKE_SIGNALS.get(campaign.brake_signal, 1.0) == 1.0:
         return told

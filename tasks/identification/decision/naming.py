@@ -9,10 +9,20 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from tasks.campaign.campaign import CHANNELS, FILE_NUMBERS, SESSION
+from tasks.identification.decision.agreement import measure_disagreement
 from tasks.identification.decision.answer import NamedEffect, Parameter, make_estimate
 from tasks.identification.decision.candidates import Candidate
+from tasks.identification.decision.comparison import compare_explanations, temper_odds
 from tasks.identification.decision.forms import KNOTS, find_scanned_ranges, make_form_hypotheses
-from tasks.identification.decision.odds import Explanation, RunGrams, keep_members, weigh_explanation
+from tasks.identification.decision.odds import (
+    LEVELS,
+    Explanation,
+    RunGrams,
+    can_stand_for,
+    compute_likelihood,
+    keep_members,
+    weigh_explanation,
+)
 from tasks.identification.decision.search import Finding, make_hypotheses, widen_session
 from tasks.identification.decision.told import OpenExplanation
 from tasks.identification.inference.fit import SETTLED, Fit, fit_hypotheses
@@ -69,7 +79,8 @@ def settle_told(
 ) -> tuple[list[OpenExplanation], Fit]:
     """Return the open explanations and the fit of the first, whose members are surely large when fitted alone too.
 
-    No form is told whose every coefficient has an interval that holds 0, the file's value.
+    Nothing is told whose interval holds 0, the file's value: of an effect its first number's, of a form every one. A
+    number of the file that this fit pulls far beyond its tolerance stays open beside it.
 
     Parameters
     ----------
@@ -79,22 +90,95 @@ def settle_told(
     """
     first, *others = opened
     reach = float(ndtri(rules.named_odds / (1.0 + rules.named_odds)))
+    share = estimate_signature_share(finding, first, rules)
     while True:
-        fitted = refine_fit(finding, fit_told(finding, first))
+        fitted = fit_told(finding, first)
+        if not first.told and knows_brakes(fitted, rules):
+            return [first], fitted  # there is nothing whose size a closer fit would tell
+        fitted = refine_fit(finding, fitted)
         large = []
         for member in first.told:
-            if member.effect is None:
-                _, coefficients = _list_parameters(member, first.explanation, fitted)
-                if all(number.ci_low <= 0.0 <= number.ci_high for number in coefficients):
-                    continue
-            else:
-                value, error = _find_first_number(member, member.effect, first.explanation, fitted)
+            _, numbers = _list_parameters(member, first.explanation, fitted, share)
+            if member.effect is not None:
+                value, error, _ = _find_first_number(member, member.effect, first.explanation, fitted)
                 if abs(value) - reach * error <= member.matters:
                     continue
-            large.append(member)
+                numbers = numbers[:1]
+            if not all(number.ci_low <= 0.0 <= number.ci_high for number in numbers):
+                large.append(member)
         if len(large) == len(first.told):
-            return [first, *(other for other in others if not other.numbers >= first.numbers)], fitted
+            break
         first = replace(first, told=tuple(large))
+    others = [other for other in others if not other.numbers >= first.numbers]
+    varying = _find_varying(finding, first)
+    if varying is not None:
+        anew = refine_fit(finding, fit_told(finding, varying))
+        odds = _compare_fits((anew, varying), (fitted, first), finding, rules)
+        if odds > log(rules.named_odds):
+            first, fitted = varying, anew
+        elif odds > -log(rules.named_odds):
+            others.append(replace(varying, log_odds=odds))
+    return [first, *others, *_list_strained(finding, first, fitted, rules)], fitted
+
+
+def _find_varying(finding: Finding, first: OpenExplanation) -> OpenExplanation | None:
+    """Return what is told with the best form in place of a level; None where no level is told.
+
+    Derivatives about the fit of one value undervalue what varies at its port: a run's own friction decides when its
+    tyres let go.
+    """
+    grams = finding.grams
+    varying = [
+        weigh_explanation(grams, [*(m for m in first.told if m is not level), form], spread=False)
+        for level in first.told
+        if level.name in LEVELS
+        for form in grams.columns.candidates
+        if form.effect is None and can_stand_for(form, level)
+    ]
+    found = max((e for e in varying if e), key=lambda e: compute_likelihood(grams, e), default=None)
+    return None if found is None else OpenExplanation(explanation=found, told=found.members, log_odds=0.0)
+
+
+def _compare_fits(
+    one: tuple[Fit, OpenExplanation],
+    other: tuple[Fit, OpenExplanation],
+    finding: Finding,
+    rules: DecisionRules,
+) -> float:
+    """Return the logarithm of the odds of one told fit against another, each about its own values [1].
+
+    Every number costs what a run tells of it (Schwarz 1978, doi:10.1214/aos/1176344136).
+    """
+    runs, gains, odds = len(finding.evidence.train), [], []
+    for fitted, opened in (one, other):
+        gains.append(0.5 * (finding.null.objective - fitted.objective))
+        numbers = len(fitted.values) + sum(n in SESSION for n in opened.numbers)
+        odds.append(gains[-1] + sum(m.log_prior for m in opened.told) - 0.5 * numbers * log(runs))
+    return temper_odds(odds[0] - odds[1], max(gains), 0.0, rules.signature_error)
+
+
+def _list_strained(
+    finding: Finding, first: OpenExplanation, fitted: Fit, rules: DecisionRules
+) -> list[OpenExplanation]:
+    """Return explanations with a number of the file besides, of those that what is told pulls far beyond its tolerance.
+
+    Data that contradict a prior (Box 1980, doi:10.2307/2982063) leave open that the number itself is another.
+    """
+    told, grams = first.explanation.members, finding.grams
+    strained = []
+    for candidate in grams.columns.candidates if first.told else ():
+        number = candidate.effect.parameters[0].name if candidate.effect else ""
+        if number not in SESSION or fitted.pulls[SESSION.index(number)] <= rules.foreign_misfit:
+            continue
+        explanation = weigh_explanation(grams, [*told, candidate]) if candidate not in told else None
+        if explanation is not None:
+            odds = min(
+                compare_explanations(grams, explanation, first.explanation, rules.signature_error),
+                log(rules.named_odds),
+            )
+            more = OpenExplanation(explanation=explanation, told=(*first.told, candidate), log_odds=odds)
+            strained.append(more)
+    return strained
 
 
 def refine_fit(finding: Finding, fitted: Fit) -> Fit:
@@ -138,7 +222,25 @@ def measure_force(finding: Finding, fitted: Fit, names: Sequence[str]) -> float:
     return float(np.mean(free - felt))
 
 
-def name_members(opened: OpenExplanation, grams: RunGrams, fitted: Fit | None) -> list[NamedEffect]:
+def estimate_signature_share(finding: Finding, opened: OpenExplanation, rules: DecisionRules) -> float:
+    """Return the error of a value, over the value, by what the car's equations differ from the model's [1].
+
+    It is the error of a signature where the runs disagree with the model by as much as their noise, and 0 where noise
+    alone explains them.
+
+    Parameters
+    ----------
+    finding : what the runs say
+    opened : the explanation that is told
+    rules : the error of a signature
+    """
+    excess = measure_disagreement(finding.grams, opened.explanation) - 1.0
+    return rules.signature_error * float(np.sqrt(np.clip(excess, 0.0, 1.0)))
+
+
+def name_members(
+    opened: OpenExplanation, grams: RunGrams, fitted: Fit | None, share: float = 0.0
+) -> list[NamedEffect]:
     """Return what an explanation tells in the form in which the verdict reports it, what gains most first.
 
     Parameters
@@ -146,6 +248,7 @@ def name_members(opened: OpenExplanation, grams: RunGrams, fitted: Fit | None) -
     opened : the explanation
     grams : what the runs say
     fitted : fit of what it tells; None to report the values of the explanation
+    share : `estimate_signature_share` [1]
     """
     named = []
     for member in opened.told:
@@ -154,7 +257,7 @@ def name_members(opened: OpenExplanation, grams: RunGrams, fitted: Fit | None) -
         score = opened.explanation.log_odds - (0.0 if without is None else without.log_odds)
         gain = opened.explanation.gain - (0.0 if without is None else without.gain)
         spread = opened.explanation.spreads[opened.explanation.members.index(member)]
-        name, parameters = _list_parameters(member, opened.explanation, fitted)
+        name, parameters = _list_parameters(member, opened.explanation, fitted, share)
         named.append(
             NamedEffect(
                 name=name,
@@ -170,8 +273,19 @@ def name_members(opened: OpenExplanation, grams: RunGrams, fitted: Fit | None) -
     return sorted(named, key=lambda effect: -effect.gain)
 
 
+def knows_brakes(fitted: Fit, rules: DecisionRules) -> bool:
+    """Return whether a vehicle file knows the gain of its brakes.
+
+    Parameters
+    ----------
+    fitted : under the tolerances of the file
+    rules : from which tolerance it hardly knows it
+    """
+    return float(fitted.session_sigma[FILE_NUMBERS.index("pressure_gain")]) < rules.hardly_known_tolerance
+
+
 def list_calibrated(
-    fitted: Fit, named: Sequence[NamedEffect], library: Sequence[Effect], least: float
+    fitted: Fit, named: Sequence[NamedEffect], library: Sequence[Effect], rules: DecisionRules
 ) -> list[NamedEffect]:
     """Return the vehicle's own numbers that a prediction rests on where its file hardly knows the brake's gain.
 
@@ -182,9 +296,9 @@ def list_calibrated(
     fitted : fit of what is named
     named : effects that are named
     library : effects, of which the numbers are
-    least : tolerance of the gain from which the file hardly knows it [1]
+    rules : from which tolerance of the gain the file hardly knows it
     """
-    if fitted.session_sigma[FILE_NUMBERS.index("pressure_gain")] < least:
+    if knows_brakes(fitted, rules):
         return []
     told = {effect.parameters[0].name for effect in named}
     numbers = {e.parameters[0].name: e for e in library if e.effect_class == "retune"}
@@ -198,21 +312,24 @@ def list_calibrated(
 
 
 def _list_parameters(
-    member: Candidate, explanation: Explanation, fitted: Fit | None
+    member: Candidate, explanation: Explanation, fitted: Fit | None, share: float
 ) -> tuple[str, tuple[Parameter, ...]]:
-    """Return the name and the parameters of a member: of the last fit, if there is one."""
+    """Return the name and the parameters of a member: of the last fit, if there is one.
+
+    Intervals hold noise, what differs from run to run, and what the signature of another car may be off.
+    """
     places = explanation.find_places(member)
     value, error = explanation.values[places], explanation.errors[places]
     if member.effect is None:
-        return _list_form_parameters(member, value, error, fitted)
-    values, errors = value, error
+        return _list_form_parameters(member, value, error, fitted, share)
+    values, errors, scatter = value, error, np.zeros(len(value))
     if fitted is not None:
-        number = member.effect.parameters[0].name
-        values, errors = (
-            _find_part(member.name, fitted) if number not in SESSION else (value.copy(), error.copy())
-        )
-        values[0], errors[0] = _find_first_number(member, member.effect, explanation, fitted)
+        values, errors, scatter = value.copy(), error.copy(), scatter.copy()
+        if member.effect.parameters[0].name not in SESSION:
+            values, errors, scatter = _find_part(member.name, fitted)
+        values[0], errors[0], scatter[0] = _find_first_number(member, member.effect, explanation, fitted)
     rows = member.effect.parameters[: len(values)]
+    errors = np.sqrt(errors**2 + scatter**2 + (share * values) ** 2)
     return member.name, tuple(
         _make_parameter(row.name, v, e, row.lower, row.upper, row.unit)
         for row, v, e in zip(rows, values, errors, strict=True)
@@ -221,23 +338,28 @@ def _list_parameters(
 
 def _find_first_number(
     member: Candidate, effect: Effect, explanation: Explanation, fitted: Fit
-) -> tuple[float, float]:
-    """Return the first number of a member by the last fit, and its error: the fit's or the explanation's.
+) -> tuple[float, float, float]:
+    """Return the first number of a member by the last fit, its error, and what the runs' scatter adds.
 
-    That of the explanation knows what every other number may be off, and what differs from run to run; that of the fit
+    The explanation's error knows what every other number may be off, and what differs from run to run; that of the fit
     is about each run's own offsets. The larger holds.
     """
     error = float(explanation.errors[explanation.find_places(member)][0])
     name = effect.parameters[0].name
     if name in SESSION:
-        place = SESSION.index(name)
-        return float(fitted.session[place]), max(error, float(fitted.session_error[place]))
-    values, errors = _find_part(member.name, fitted)
-    return float(values[0]), max(error, float(errors[0]))
+        place, last = SESSION.index(name), len(fitted.values)
+        own = fitted.session_error[place], fitted.scatter[last + place]
+        return float(fitted.session[place]), max(error, float(own[0])), float(own[1])
+    values, errors, scatter = _find_part(member.name, fitted)
+    return float(values[0]), max(error, float(errors[0])), float(scatter[0])
 
 
 def _list_form_parameters(
-    member: Candidate, value: NDArray[np.float64], error: NDArray[np.float64], fitted: Fit | None
+    member: Candidate,
+    value: NDArray[np.float64],
+    error: NDArray[np.float64],
+    fitted: Fit | None,
+    share: float,
 ) -> tuple[str, tuple[Parameter, ...]]:
     """Return a form's name and coefficients, or the values at its knots where it was not fitted."""
     part = (
@@ -250,24 +372,26 @@ def _list_form_parameters(
             _make_parameter(f"knot_{k + 1}", v, e, member.lower, member.upper, PORT_UNITS[member.port])
             for k, (v, e) in enumerate(zip(value, error, strict=True))
         )
-    values, errors = _find_part(part.name, fitted)
+    values, errors, scatter = _find_part(part.name, fitted)
     # the shape's own errors know nothing of the small errors everywhere: the spline's do
     wider = max(1.0, float(np.median(error)) / max(float(np.median(errors)), 1e-300))
+    errors = np.sqrt((wider * errors) ** 2 + scatter**2 + (share * values) ** 2)
     return part.name, tuple(
-        _make_parameter(n, v, wider * e, low, high, u)
+        _make_parameter(n, v, e, low, high, u)
         for n, v, e, low, high, u in zip(
             part.names, values, errors, part.lower, part.upper, part.units, strict=True
         )
     )
 
 
-def _find_part(name: str, fitted: Fit) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return values and standard errors of a part of a fit."""
+def _find_part(name: str, fitted: Fit) -> tuple[NDArray[np.float64], ...]:
+    """Return values, standard errors and scatter of a part of a fit."""
     at = 0
     for part in fitted.parts:
         own = slice(at, at + len(part.names))
         if part.name == name:
-            return fitted.values[own], np.sqrt(np.maximum(np.diag(fitted.covariance)[own], 0.0))
+            errors = np.sqrt(np.maximum(np.diag(fitted.covariance)[own], 0.0))
+            return fitted.values[own].copy(), errors, fitted.scatter[own].copy()
         at = own.stop
     raise KeyError(name)
 

@@ -27,6 +27,8 @@ PORT_OF_NUMBER = {
     "retuned_grade": "longitudinal_force",
 }  # fmt: skip
 """Port at which a number of the vehicle's file acts."""
+LEVELS = {"retuned_friction_level", "retuned_pressure_gain", "retuned_grade"}
+"""Numbers that a form with one value everywhere is too."""
 SAME_VARIABLE = {"speed": "wheel_speed", "wheel_speed": "speed"}
 """Variables that differ by the slip of the tyres alone."""
 FEWEST = 3
@@ -175,6 +177,19 @@ def weigh_explanation(
         errors=np.sqrt(np.einsum("ij,ij->j", inverse, inverse)), spreads=tuple(spreads),
         session=(mean + prior.centre)[: len(nobody.columns)][-len(FILE_NUMBERS) :], everything=everything,
     )  # fmt: skip
+
+
+def compute_likelihood(grams: RunGrams, explanation: Explanation) -> float:
+    """Return the log likelihood of the runs at an explanation's numbers, less that at the linearisation point [1].
+
+    Parameters
+    ----------
+    grams : of the runs
+    explanation : its numbers
+    """
+    used = np.flatnonzero(explanation.everything != 0.0)
+    moved = (explanation.everything - grams.centre)[used]
+    return float(grams.total_score[used] @ moved - 0.5 * moved @ grams.total[np.ix_(used, used)] @ moved)
 
 
 def search_explanations(

@@ -16,6 +16,7 @@ from tasks.identification.decision.held_out import compute_held_out_errors
 from tasks.identification.decision.log_faults import tell_inputs, tell_log_faults
 from tasks.identification.decision.missed import tell_miss
 from tasks.identification.decision.naming import (
+    estimate_signature_share,
     find_detectable_sizes,
     fit_told,
     list_calibrated,
@@ -104,8 +105,9 @@ def judge_runs(
     opened, fitted = settle_told(finding, opened, rules)
     first, *others = opened
     evidence = finding.evidence
-    named = name_members(first, finding.grams, fitted)
-    rivals = _list_rivals(first, others, finding)
+    share = estimate_signature_share(finding, first, rules)
+    named = name_members(first, finding.grams, fitted, share)
+    rivals = _list_rivals(first, others, finding, share)
     tried = _list_tried(finding, first)
     reasons = tell_open_explanations(opened, finding.explanations, rules)
     why = say_foreign(disagreement, rules) if foreign else ""
@@ -146,26 +148,28 @@ def judge_runs(
         split_hash=campaign.split_hash,
         theta=theta,
         slots=slots,
-        experiment=None if foreign else _plan(finding, fitted, opened, vehicle, surface),
+        experiment=None
+        if foreign
+        else _plan(finding, fitted, opened, vehicle, surface, campaign.brake_signal),
         step_sensitive=evidence.step_sensitive,
         reasons=tuple(reasons),
         disagreement=why,
     )
     verdict = tell_miss(verdict, rules.foreign_misfit)
-    calibrated = list_calibrated(fitted, named, library, rules.hardly_known_tolerance)
+    calibrated = list_calibrated(fitted, named, library, rules)
     return Outcome(
         verdict=verdict, finding=finding, opened=tuple(opened), fitted=fitted, calibrated=tuple(calibrated)
     )
 
 
 def _list_rivals(
-    first: OpenExplanation, others: Sequence[OpenExplanation], finding: Finding
+    first: OpenExplanation, others: Sequence[OpenExplanation], finding: Finding, share: float
 ) -> list[tuple[str, NamedEffect]]:
     """Return what the other explanations name instead, each with what it stands in for."""
     rivals: dict[str, tuple[str, NamedEffect]] = {}
     for other in others:
         replaced = [m.name for m in first.told if m.name not in other.names] or ["nothing"]
-        for effect in name_members(other, finding.grams, None):
+        for effect in name_members(other, finding.grams, None, share):
             if effect.name not in first.names:
                 rivals.setdefault(effect.name, (replaced[0], effect))
     return list(rivals.values())
@@ -194,6 +198,7 @@ def _plan(
     opened: Sequence[OpenExplanation],
     vehicle: Vehicle,
     surface: SurfaceParameters,
+    brake_signal: str,
 ) -> Experiment | None:
     """Return the run that tells the first explanation from its closest rival, or what is suggested from nothing."""
     if len(opened) > 1:
@@ -208,7 +213,9 @@ def _plan(
             return None
         between = (suggested.told[0].name, "the model as it stands")
         pair = (fit_told(finding, suggested), finding.null)
-    return plan_next_experiment(finding.evidence, *pair, (between[0], between[1]), vehicle, surface)
+    return plan_next_experiment(
+        finding.evidence, *pair, (between[0], between[1]), vehicle, surface, brake_signal
+    )
 
 
 def _find_suggested(finding: Finding) -> OpenExplanation | None:

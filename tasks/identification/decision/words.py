@@ -127,8 +127,9 @@ def _tell_open(verdict: Verdict, library: Sequence[Effect], force: float) -> str
     # a form of another shape at the same port reads the same
     said: dict[str, float] = {}
     for own, other in zip(told, opened, strict=True):
-        if rest := [effect for effect in own if effect not in effects or effect in left]:
-            said.setdefault(join_phrases(say_effect(effect, library) for effect in rest), other.odds)
+        rest = [effect for effect in own if effect not in effects or effect in left]
+        phrase = join_phrases(say_effect(effect, library) for effect in rest) if rest else "nothing more"
+        said.setdefault(phrase, other.odds)
     if len(said) < 2:
         return _tell_in_sentences([say_effect(effect, library) for effect in effects])
     common = _say_common([e for own in told for e in own if e not in effects or e in left], left, force)

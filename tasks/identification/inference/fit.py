@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
 from tasks.campaign.campaign import FILE_NUMBERS
 from tasks.identification.inference.evidence import SESSION_INDEX, RunEvidence
@@ -15,6 +16,7 @@ from tasks.identification.inference.linearisation_points import (
     linearise_runs,
     move_linearisation_points,
 )
+from tasks.identification.inference.quantiles import NORMAL_QUANTILE, OUTSIDE
 from tasks.vehicle.effects.slots import Slot
 from tasks.vehicle.effects.table import PARAMETERS
 
@@ -23,6 +25,8 @@ HELD = 1e18
 MISSED = 0.3
 """Relative error of the predicted fall of the misfit from which derivatives are taken anew."""
 
+INFORMED = 0.01
+"""Share of the best informed run's information from which a run informs a direction [1]."""
 SETTLED = 1.0
 """Fall of the misfit that a fit no longer seeks: half a unit of log likelihood [1]."""
 LIMITS = tuple(
@@ -50,6 +54,7 @@ class Fit:
     by_run : float64 [R] misfit of each run without the session's prior
     covariance : float64 [K, K] of the parameters, session marginalised
     session_error : float64 [8] standard deviations of the session's nuisances, parameters marginalised
+    scatter : float64 [K + 8] standard deviations that the runs' scatter adds to those of noise
     residuals : whitened residual of each run at the fit
     offsets : float64 [D] each, the run's own offsets about which its residual is linearised
     """
@@ -62,6 +67,7 @@ class Fit:
     by_run: NDArray[np.float64]
     covariance: NDArray[np.float64]
     session_error: NDArray[np.float64]
+    scatter: NDArray[np.float64]
     residuals: tuple[NDArray[np.float64], ...]
     offsets: tuple[NDArray[np.float64], ...]
 
@@ -138,9 +144,8 @@ def fit_hypotheses(
             # a threshold has no derivative while its effect is 0: take derivatives again after the effect has moved
             blind = bool(np.any(np.diag(normal)[:k] == 0.0))
         right = np.concatenate((np.zeros(k), -prior * here.session))
-        for run, point, (columns, q) in zip(evidence, here.points, slopes, strict=True):
-            # the offsets' linear part N d of the residual: columns' N = q' factor'
-            right += columns.T @ point.residual + q.T @ (run.factor.T @ point.offsets - point.projected)
+        for score in _score_runs(evidence, here.points, slopes):
+            right += score
         move = _compute_gauss_newton_step(
             normal, right, np.concatenate((here.values, here.session)), least, most
         )
@@ -158,16 +163,55 @@ def fit_hypotheses(
     inverse = np.asarray(
         np.linalg.pinv(normal / np.outer(size, size)) / np.outer(size, size), dtype=np.float64
     )
+    scatter = _measure_scatter(_score_runs(evidence, here.points, slopes) @ inverse, slopes, inverse)
     return Fit(
         parts=parts, values=here.values, session=here.session, session_sigma=session_sigma, objective=here.misfit,
         by_run=collect_misfits(here.points), covariance=inverse[:k, :k],
-        session_error=np.sqrt(np.diag(inverse)[k:]),
+        session_error=np.sqrt(np.diag(inverse)[k:]), scatter=scatter,
         residuals=tuple(
             run.add_offsets(point.residual, point.offsets)
             for run, point in zip(evidence, here.points, strict=True)
         ),
         offsets=tuple(point.offsets for point in here.points),
     )  # fmt: skip
+
+
+def _score_runs(
+    evidence: tuple[RunEvidence, ...], points: tuple[LinearisedRun, ...], slopes: list[Slopes]
+) -> NDArray[np.float64]:
+    """Return the score of every run by parameters and session, float64 [R, K + 8]."""
+    # the offsets' linear part N d of the residual: columns' N = q' factor'
+    return np.array(
+        [
+            columns.T @ point.residual + q.T @ (run.factor.T @ point.offsets - point.projected)
+            for run, point, (columns, q) in zip(evidence, points, slopes, strict=True)
+        ]
+    )
+
+
+def _measure_scatter(
+    scores: NDArray[np.float64], slopes: list[Slopes], inverse: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the standard deviations that the runs' scatter adds to those of noise, float64 [K + 8].
+
+    The variance that noise of the runs makes counts as often as Cochran's mean square is above 1, by the t quantile of
+    so few runs over the normal one (Hartung and Knapp 2001, doi:10.1002/sim.791). Fewer than three runs say nothing.
+
+    Parameters
+    ----------
+    scores : float64 [R, K + 8] of every run, along the columns of ``inverse``
+    slopes : derivatives of every run
+    inverse : float64 [K + 8, K + 8] covariance
+    """
+    size = np.array(
+        [np.sum((c @ inverse) ** 2, axis=0) - np.sum((q @ inverse) ** 2, axis=0) for c, q in slopes]
+    )
+    informed = size > INFORMED * size.max(axis=0)
+    square = np.where(informed, scores**2 / np.maximum(size, 1e-300), 0.0).sum(axis=0)
+    freedom = informed.sum(axis=0) - 1
+    few = np.maximum(freedom, 2)
+    excess = np.where(freedom < 2, 0.0, np.maximum(square / few - 1.0, 0.0))
+    return np.asarray(np.sqrt(size.sum(axis=0) * excess) * stdtrit(few, 1.0 - OUTSIDE) / NORMAL_QUANTILE)
 
 
 def _step_along(

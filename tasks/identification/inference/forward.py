@@ -135,7 +135,11 @@ def prepare_run(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunMo
         vehicle=vehicle,
         surface_friction=state.friction,
         conditions=Conditions(
-            hazard=hazard, snow_depth_mm=state.snow_depth_mm, direction=run.direction, disc_rise=run.disc_rise
+            hazard=hazard,
+            snow_depth_mm=state.snow_depth_mm,
+            direction=run.direction,
+            disc_rise=run.disc_rise,
+            grip=state.grip,
         ),
         samples=samples,
         initial_speed=float(

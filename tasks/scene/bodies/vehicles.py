@@ -103,6 +103,8 @@ SHAPES = {
 """Side views; chosen after usual vehicles, not measured."""
 
 _EDGE = 0.09
+_COARSE = 0.15
+"""Spacing from which the borders of materials are cut once alone [m]."""
 _PLATE = (0.26, 0.055)
 """Half width and half height of a number plate: 520 mm x 110 mm, Regulation (EC) 2411/98 and DIN 74069 [m]."""
 
@@ -336,7 +338,7 @@ def _build_discs(kind: str, size: tuple[float, float, float], cell: float, seed:
     bodywork = _Bodywork(shape, size, seed)
     length, width, height = size
     low, high = [-length / 2 - 0.02, 0.0, 0.0], [length / 2 + 0.02, width / 2 + 0.2, height + 0.06]
-    body = cover_surface(bodywork.distance, low, high, cell, bodywork.material)
+    body = cover_surface(bodywork.distance, low, high, cell, bodywork.material, 2 if cell < _COARSE else 1)
     wheels = [_wheel(shape, size, axle, cell) for axle in shape.axles]
     half = join_discs([body, *wheels])
     kept = half.centre[:, 1] > 0

@@ -41,11 +41,13 @@ def asphalt_albedo(
         shade *= 1 - 0.07 * np.exp(-(((d - lane) / 0.3) ** 2))
     to_kerb = np.minimum(layout.carriageway_left - d, d - layout.carriageway_right)
     shade *= 1 + 0.12 * np.exp(-(((to_kerb - 0.35) / 0.25) ** 2)) - 0.3 * np.exp(-to_kerb / 0.07)
-    albedo = _ASPHALT * shade[:, None] * (1 + 0.015 * grain[:, 1:] * np.array([1, 0, -1]))
+    albedo = (
+        layout.asphalt_scale * _ASPHALT * shade[:, None] * (1 + 0.015 * grain[:, 1:] * np.array([1, 0, -1]))
+    )
     albedo = _add_repairs(layout, seed, s, d, size, albedo)
     albedo = _add_cracks(layout, seed, s, d, size, albedo)
     albedo = _add_covers(layout, seed, s, d, size, albedo)
-    return _add_leaves(seed, to_kerb, albedo)
+    return _add_leaves(layout, seed, to_kerb, albedo)
 
 
 def paint_albedo(seed: int, s: Floats, d: Floats, grain: Floats) -> Floats:
@@ -60,7 +62,8 @@ def _add_repairs(
     rng = named_generator(seed, "repairs")
     shade = np.ones(len(s))
     seam = np.zeros(len(s))
-    for slot in np.arange(14.0, layout.station_range[1], 15.0):
+    spacing = 15.0 / max(layout.wear_scale, 0.05)
+    for slot in np.arange(14.0, layout.station_range[1], spacing):
         middle = slot + rng.uniform(-6, 6)
         half_s, half_d = rng.uniform(0.5, 3.2), rng.uniform(0.4, 0.9)
         lateral, tone = rng.uniform(-1.6, 1.5 * layout.lane_width), rng.choice([0.68, 0.78, 0.86, 1.14])
@@ -76,7 +79,7 @@ def _add_cracks(
     rng = named_generator(seed, "cracks")
     cover = np.zeros(len(s))
     last = layout.station_range[1]
-    for middle in rng.uniform(0, last, 26):
+    for middle in rng.uniform(0, last, round(26 * layout.wear_scale)):
         along, across = rng.random() < 0.5, rng.uniform(-1.7, 1.5 * layout.lane_width)
         half = rng.uniform(3, 10) if along else rng.uniform(0.8, 2.5)
         run, offset = (s - middle, d - across) if along else (d - across, s - middle)
@@ -101,9 +104,10 @@ def _add_covers(
     return albedo
 
 
-def _add_leaves(seed: int, to_kerb: Floats, albedo: Floats) -> Floats:
+def _add_leaves(layout: StreetLayout, seed: int, to_kerb: Floats, albedo: Floats) -> Floats:
     rng = named_generator(seed, "leaves on the road")
-    fallen = rng.random(len(albedo)) < 0.10 * np.exp(-to_kerb / 0.4) + 0.002
+    often = (0.10 + 0.25 * layout.autumn_share) * np.exp(-to_kerb / 0.4) + 0.002 + 0.01 * layout.autumn_share
+    fallen = rng.random(len(albedo)) < often
     colour = _LEAVES[rng.integers(0, len(_LEAVES), len(albedo))]
     return _mix_colours(albedo, colour, np.where(fallen, 0.75, 0.0))
 

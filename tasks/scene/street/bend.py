@@ -8,7 +8,6 @@ from scipy.spatial.transform import Rotation
 
 from tasks.scene.route import Route
 from tasks.scene.street.layout import StreetLayout
-from tasks.scene.street.noise import smooth_step
 
 _STEP = 0.05
 _MARGIN = 150.0
@@ -17,7 +16,7 @@ _ROUTE_STEP = 0.5
 
 @dataclass(frozen=True, kw_only=True)
 class Course:
-    """The route's line, straight and level at first, then bending left and climbing.
+    """The route's line in the world.
 
     On a hill points are lifted by the road's rise, so that walls stand upright, and directions tilt with the road.
 
@@ -78,21 +77,19 @@ class Course:
 
 
 def integrate_course(layout: StreetLayout) -> Course:
-    """Integrate curvature and grade, which grow smoothly from 0; the curvature grows again beyond the route."""
+    """Integrate curvature and grade of the layout's course."""
     first, last = layout.station_range
     n = round((last - first + 2 * _MARGIN) / _STEP) + 1
     station = first - _MARGIN + _STEP * np.arange(n, dtype=np.float64)
-    curvature = smooth_step((station - layout.bend_start) / layout.bend_transition) / layout.bend_radius
-    beyond = smooth_step((station - layout.route_length) / layout.bend_transition)
-    curvature += beyond * (1 / layout.end_radius - 1 / layout.bend_radius)
-    heading = _cumulative_integral(curvature)
-    grade = layout.grade * smooth_step((station - layout.grade_start) / layout.grade_transition)
+    heading = _cumulative_integral(layout.course.curvature_at(station))
+    grade = layout.course.grade_at(station)
     flat = np.sqrt(1 - grade**2)
     x, y = _cumulative_integral(flat * np.cos(heading)), _cumulative_integral(flat * np.sin(heading))
+    z = _cumulative_integral(grade)
+    start = [np.interp(0.0, station, values) for values in (x, y, z)]
     return Course(
-        station=station, x=x - np.interp(0.0, station, x), y=y, heading=heading, z=_cumulative_integral(grade),
-        grade=grade,
-    )  # fmt: skip
+        station=station, x=x - start[0], y=y - start[1], heading=heading, z=z - start[2], grade=grade
+    )
 
 
 def lay_route(layout: StreetLayout, line: Course) -> Route:

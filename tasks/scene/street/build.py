@@ -5,6 +5,7 @@ import numpy as np
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.scene import Scene, mix_daylight
 from tasks.scene.street.bend import integrate_course, lay_route
+from tasks.scene.street.boundaries import build_boundaries
 from tasks.scene.street.cars.parked import build_cars, car_boxes, car_footprints
 from tasks.scene.street.furniture import build_furniture, post_boxes
 from tasks.scene.street.ground import build_ground
@@ -16,6 +17,7 @@ from tasks.scene.street.light import Casters, share_light
 from tasks.scene.street.pavement import build_pavement
 from tasks.scene.street.plan import CROWN_BALLS, plan_street
 from tasks.scene.street.road import build_road
+from tasks.scene.street.roadside import build_roadside
 from tasks.scene.street.sky import draw_panorama
 from tasks.scene.street.surfels import THICKNESS, join_surfels
 from tasks.scene.street.vegetation import LEAF_EXTINCTION, build_gardens, build_trees
@@ -37,7 +39,7 @@ def build_street(layout: StreetLayout, seed: int) -> Scene:
     Returns
     -------
     Scene
-        200k to 500k Gaussians with true classes and normals, colours in linear light with the sun and
+        200k to 600k Gaussians with true classes and normals, colours in linear light with the sun and
         its shadows baked in, the route in the right lane and a panorama of the sky.
     """
     line = integrate_course(layout)
@@ -46,6 +48,8 @@ def build_street(layout: StreetLayout, seed: int) -> Scene:
         [
             build_road(layout, seed),
             build_ground(layout, seed),
+            build_boundaries(layout, seed),
+            build_roadside(layout, seed),
             build_pavement(layout, plan.trees, seed),
             build_facades(layout, plan.buildings, seed),
             build_roofs(layout, plan.buildings, seed),
@@ -66,7 +70,7 @@ def build_street(layout: StreetLayout, seed: int) -> Scene:
         boxes=np.concatenate(boxes),
         footprints=car_footprints(plan.cars),
         balls=np.array([tree.balls for tree in plan.trees]).reshape(-1, CROWN_BALLS, 4),
-        leaf_extinction=LEAF_EXTINCTION,
+        leaf_extinction=LEAF_EXTINCTION * max(layout.leaf_share, 0.2),
     )
     light = share_light(surfels, layout, line, casters)
     daylight = layout.sun_rgb, layout.sky_rgb, layout.bounce_rgb

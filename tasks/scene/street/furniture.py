@@ -8,6 +8,7 @@ from tasks.scene.street import palette
 from tasks.scene.street.layout import StreetLayout
 from tasks.scene.street.noise import named_generator
 from tasks.scene.street.plan import Plan
+from tasks.scene.street.roadside import list_signs
 from tasks.scene.street.surfels import Surfels, build_box, build_tube, join_surfels, tile_surface
 
 Floats = NDArray[np.float64]
@@ -39,6 +40,7 @@ def list_furniture(layout: StreetLayout, plan: Plan, seed: int) -> list[tuple[st
     """
     pieces = [("lamp", join_surfels(_build_lamp(layout, station, side))) for station, side in plan.lamps]
     pieces += _build_crossing_signs(layout) if layout.has_crossing else []
+    pieces += [("sign", sign) for sign in list_signs(layout, seed)]
     rng = named_generator(seed, "bins")
     for station, side in plan.lamps[::2] if layout.has_pavement else ():
         pieces.append(("bin", join_surfels(_build_bin(layout, station + rng.uniform(1.2, 2.2), side))))

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tasks.errors import InputError
+from tasks.scene.street.course import Stretches
 
 EYE_HEIGHT = 1.4
 """Height of the camera the street is sampled for [m]."""
@@ -17,7 +18,7 @@ PIXEL = 1 / 400
 
 MAY_BE_NONE = (
     "parking_width", "crossing_length", "kerb_height", "kerb_width", "pavement_width", "front_garden", "open_ground",
-    "lamp_spacing", "tree_spacing",
+    "lamp_spacing", "tree_spacing", "delineator_spacing", "sign_spacing", "wire_spacing", "boundary_distance",
 )  # fmt: skip
 """Lengths of a `StreetLayout` that may be 0, where the street has no such thing."""
 
@@ -30,13 +31,7 @@ class StreetLayout:
     ----------
     route_length : length of the ego route [m]
     behind, beyond : how far the street goes on before and after the route [m]
-    bend_start : station at which the road begins to turn left [m]
-    bend_transition : length over which the curvature grows to its full value [m]
-    bend_radius : radius of the bend [m]
-    end_radius : radius of the bend beyond the route, so that houses close the view [m]
-    grade_start : station at which the road begins to climb [m]
-    grade_transition : length over which the grade grows to its full value [m]
-    grade : rise of the road per metre of way from there on; negative falls [1]
+    course : bends and hills of the road
     lane_width : width of a traffic lane [m]
     parking_width : width of the parking strip, or of the shoulder, on either side [m]
     parked_share : share of the parking places that are taken [1]
@@ -51,17 +46,30 @@ class StreetLayout:
     open_ground : grass beyond the pavement, under gardens and houses and behind them; 0 without [m]
     slab : edge of a paving slab [m]
     ground_storey_height, storey_height : floor to floor [m]
+    built_share : share of the lots with a house [1]
     fewest_storeys, most_storeys : of a house, the ground floor among them [1]
     fewest_bays, most_bays : window bays of a front [1]
     gap_share : share of the houses after which there is a gap [1]
     shortest_gap, longest_gap : such gaps [m]
     shop_share : share of the houses with a shop [1]
+    cladding_share : share of the fronts of sheet metal [1]
     flat_share, mansard_share : share of flat and of mansard roofs; the others are pitched [1]
+    hedge_share, fence_share, wall_share, mesh_share : share of the lots that a hedge, a wooden fence, a wall or a wire
+        fence closes off the road; the others are open [1]
+    boundary_distance : from the pavement to hedge, fence or wall [m]
+    shortest_lot, longest_lot : length of a lot along the road [m]
+    rail_share : share of the road's sides that has a guard rail [1]
+    delineator_spacing, sign_spacing, wire_spacing : of delineators, traffic signs, and poles with wires; 0 for none [m]
+    ground_trees_scale : trees on the open ground of either side, in 100 m of road [1]
     canyon_height : mean height of the houses, which hide the low sky [m]
     lamp_spacing, lamp_height : of the street lamps on one side; no lamps with a spacing of 0 [m]
     tree_spacing : between the trees of one side; 0 for none [m]
     tree_share : share of the places of trees that are planted [1]
     tree_scale : size of a tree over that of a young lime of 7 m [1]
+    leaf_share, autumn_share : share of the leaves that hang, and of these that have turned [1]
+    dead_grass_share : share of the grass that is yellow [1]
+    asphalt_scale : reflectance of the asphalt over that of an old town street [1]
+    wear_scale : cracks and repairs over those of an old town street [1]
     sun_azimuth_deg : direction of the sun, from the route's start heading to the left [deg]
     sun_elevation_deg : height of the sun [deg]
     sun_rgb : irradiance of the sun over pi, on a surface that faces it, linear light [1]
@@ -72,13 +80,7 @@ class StreetLayout:
     route_length: float
     behind: float
     beyond: float
-    bend_start: float
-    bend_transition: float
-    bend_radius: float
-    end_radius: float
-    grade_start: float
-    grade_transition: float
-    grade: float
+    course: Stretches
     lane_width: float
     parking_width: float
     parked_share: float
@@ -96,6 +98,7 @@ class StreetLayout:
     slab: float
     ground_storey_height: float
     storey_height: float
+    built_share: float
     fewest_storeys: float
     most_storeys: float
     fewest_bays: float
@@ -104,14 +107,32 @@ class StreetLayout:
     shortest_gap: float
     longest_gap: float
     shop_share: float
+    cladding_share: float
     flat_share: float
     mansard_share: float
+    hedge_share: float
+    fence_share: float
+    wall_share: float
+    mesh_share: float
+    boundary_distance: float
+    shortest_lot: float
+    longest_lot: float
+    rail_share: float
+    delineator_spacing: float
+    sign_spacing: float
+    wire_spacing: float
+    ground_trees_scale: float
     canyon_height: float
     lamp_spacing: float
     lamp_height: float
     tree_spacing: float
     tree_share: float
     tree_scale: float
+    leaf_share: float
+    autumn_share: float
+    dead_grass_share: float
+    asphalt_scale: float
+    wear_scale: float
     sun_azimuth_deg: float
     sun_elevation_deg: float
     sun_rgb: tuple[float, float, float]

@@ -24,7 +24,7 @@ KINDS = ("car", "lamp", "sign", "bollard", "bin", "letter box")
 
 @dataclass(frozen=True, kw_only=True)
 class StreetObject:
-    """One object with the box around it, which stands upright.
+    """One object with the box around it.
 
     Parameters
     ----------
@@ -33,6 +33,7 @@ class StreetObject:
     centre : float64 [3] middle of the box in the world [m]
     size : float64 [3] along its heading, across, and upward [m]
     heading : counter-clockwise from the world's x; of a car its nose, of others the road's direction [rad]
+    pitch : of that direction below the horizon, which a car has on a hill; others stand upright [rad]
     """
 
     number: int
@@ -40,6 +41,7 @@ class StreetObject:
     centre: NDArray[np.float64]
     size: NDArray[np.float64]
     heading: float
+    pitch: float = 0.0
 
 
 def list_objects(
@@ -93,10 +95,12 @@ def _describe(number: int, kind: str, facing: int, surfels: Surfels, line: Cours
     reach = 0.5 / OVERLAP * np.einsum("nk,nkj->nj", surfels.scale, np.abs(surfels.axes[:, :2]))
     low, high = (surfels.centre - reach).min(axis=0), (surfels.centre + reach).max(axis=0)
     middle = (low + high) / 2
+    slope = float(np.arcsin(np.interp(middle[0], line.station, line.grade))) if kind == "car" else 0.0
     return StreetObject(
         number=number,
         kind=kind,
         centre=line.to_world(middle[None])[0],
         size=high - low,
         heading=float(line.heading_at(middle[0])) + (np.pi if facing < 0 else 0.0),
+        pitch=-facing * slope,
     )

@@ -12,7 +12,7 @@ from tasks.scene.street.noise import fractal_noise, named_generator
 from tasks.scene.street.plan import Tree
 from tasks.scene.street.surfels import Surfels, join_surfels, tile_surface
 
-_CELL = 6.5
+_CELL = 4.5
 """Width of a paving cell where it is seen closest [px]."""
 _SLAB = np.array([0.23, 0.215, 0.195])
 _GRANITE = np.array([0.26, 0.255, 0.25])
@@ -58,7 +58,7 @@ def _build_kerb(layout: StreetLayout, seed: int, side: int) -> Surfels:
     rng = named_generator(seed, f"kerb {side}")
     first, last = layout.station_range
     face, h = layout.kerb_position(side), layout.kerb_height
-    per_stone = 3
+    per_stone = 6
     step = _KERBSTONE / per_stone
     s = np.arange(first + step / 2, last, step)
     stone = np.floor((s - first) / _KERBSTONE).astype(np.int64)
@@ -101,7 +101,7 @@ def _build_slabs(layout: StreetLayout, seed: int, side: int) -> list[Surfels]:
             middle = inner + side * slab * (row + 0.5)
             depth = float(nearest_depth(layout, start if start >= 0 else min(stop, 0.0) - 1e-9, middle))
             across = int(np.clip(round(slab / (_CELL * PIXEL * depth)), 1, 6))
-            along = int(np.clip(round(slab / (3.0 * _CELL * PIXEL * depth)), 1, 3))
+            along = int(np.clip(round(slab / (2.5 * _CELL * PIXEL * depth)), 1, 4))
             n = max(round((stop - start) / slab), 1)
             length = (stop - start) / n
             i, a, b = np.meshgrid(np.arange(n), np.arange(along), np.arange(across), indexing="ij")

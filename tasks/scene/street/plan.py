@@ -27,6 +27,7 @@ class Building:
     setback : of the front behind the building line [m]
     door : number of the bay with the door [1]
     shop, awnings, balconies, flowers : whether the front has them
+    clad : whether it is of sheet metal
     roof : kind of roof
     beside : height of the houses that adjoin it before and after, 0 for a gap [m]
     """
@@ -43,6 +44,7 @@ class Building:
     awnings: bool
     balconies: bool
     flowers: bool
+    clad: bool
     roof: Roof
     beside: tuple[float, float] = (0.0, 0.0)
 
@@ -111,7 +113,7 @@ class Plan:
 
 CROWN_BALLS = 26
 """Balls of leaves of a crown."""
-MODELS = ("hatchback", "saloon", "estate", "van")
+MODELS = ("hatchback", "saloon", "estate", "suv", "van")
 """Shapes of car."""
 
 
@@ -138,6 +140,7 @@ def plan_street(layout: StreetLayout, seed: int) -> Plan:
     )
     buildings = tuple(b for side in (-1, 1) for b in _row_of_houses(layout, seed, side))
     trees = tuple(t for side in (-1, 1) for t in _row_of_trees(layout, seed, side, lamps))
+    trees += tuple(t for side in (-1, 1) for t in _scatter_trees(layout, seed, side, buildings))
     cars = tuple(c for side in (-1, 1) for c in _park_cars(layout, seed, side))
     return Plan(buildings=buildings, trees=trees, cars=cars, lamps=lamps)
 
@@ -145,6 +148,7 @@ def plan_street(layout: StreetLayout, seed: int) -> Plan:
 def _row_of_houses(layout: StreetLayout, seed: int, side: int) -> list[Building]:
     rng = named_generator(seed, f"houses {side}")
     first, last = layout.station_range
+    sheets = named_generator(seed, f"cladding {side}")
     houses: list[Building] = []
     fewest, most = round(layout.fewest_storeys), round(layout.most_storeys)
     station, storeys = first - rng.uniform(0, 8), (fewest + most) // 2
@@ -167,11 +171,16 @@ def _row_of_houses(layout: StreetLayout, seed: int, side: int) -> list[Building]
                 awnings=bool(rng.random() < 0.6),
                 balconies=bool(rng.random() < 0.4),
                 flowers=bool(rng.random() < 0.4),
+                clad=bool(sheets.random() < layout.cladding_share),
                 roof=("flat", "pitched", "mansard")[rng.choice(3, p=[flat, 1 - flat - mansard, mansard])],
             )
         )
         gap = rng.uniform(layout.shortest_gap, layout.longest_gap) if rng.random() < layout.gap_share else 0.0
         station += bay * bays + gap
+    built = named_generator(seed, f"lots {side}")
+    houses = [house for house in houses if built.random() < layout.built_share]
+    if not houses:
+        return []
     touching = [0.0 if b.start - a.start - a.width > 0.5 else 1.0 for a, b in pairwise(houses)]
     before = [
         0.0,
@@ -211,6 +220,36 @@ def _row_of_trees(
     return trees
 
 
+def _scatter_trees(layout: StreetLayout, seed: int, side: int, buildings: tuple[Building, ...]) -> list[Tree]:
+    """Draw trees on the open ground, in groups, where no house stands."""
+    rng = named_generator(seed, f"ground trees {side}")
+    first, last = layout.station_range
+    edge = layout.pavement_end(side)
+    trees: list[Tree] = []
+    count = round(layout.ground_trees_scale * (last - first) / 100)
+    while count > 0:
+        group = int(min(rng.integers(1, 7), count))
+        count -= group
+        # most stand near the road
+        middle, away = rng.uniform(first, last), 5.0 + 0.8 * layout.open_ground * rng.random() ** 1.7
+        for _ in range(group):
+            station = float(middle + rng.normal(0, 6.0))
+            back = float(max(away + rng.normal(0, 3.0), 4.2))
+            lateral = edge + side * back
+            crown = _draw_crown(rng, station, lateral, layout)
+            near = any(
+                b.side == side
+                and b.start - 3 < station < b.start + b.width + 3
+                and -3.0 < back - layout.front_garden - b.setback < 13.0
+                for b in buildings
+            )
+            if not near and first < station < last:
+                number = 10_000 + 2 * len(trees) + (side > 0)
+                girth = float(rng.uniform(0.11, 0.17))
+                trees.append(Tree(number=number, station=station, lateral=lateral, girth=girth, balls=crown))
+    return trees
+
+
 def _draw_crown(
     rng: np.random.Generator, station: float, lateral: float, layout: StreetLayout
 ) -> NDArray[np.float64]:
@@ -240,7 +279,7 @@ def _park_cars(layout: StreetLayout, seed: int, side: int) -> list[Car]:
             station=float(station),
             lateral=float(lateral + rng.uniform(-0.08, 0.08)),
             facing=-side,
-            model=str(rng.choice(MODELS, p=[0.4, 0.25, 0.22, 0.13])),
+            model=str(rng.choice(MODELS, p=[0.33, 0.2, 0.17, 0.18, 0.12])),
         )
         beyond = station - layout.crossing_station
         crossing = layout.has_crossing and -8.5 < beyond < layout.crossing_length + 5.5

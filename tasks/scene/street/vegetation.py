@@ -44,14 +44,34 @@ def build_trees(layout: StreetLayout, planted: tuple[Tree, ...], seed: int) -> S
         rng = named_generator(seed, f"tree {tree.number}")
         depth = float(nearest_depth(layout, tree.station, tree.lateral, 3.5))
         colour = palette.FOLIAGE[rng.integers(len(palette.FOLIAGE))]
-        parts += [
-            build_leaves(tree.balls, colour, _LEAF * PIXEL * depth, rng),
-            *_build_wood(tree, layout.kerb_height, rng),
-        ]
+        size = _LEAF * PIXEL * depth
+        if layout.leaf_share > 0:
+            tinted = tint_leaves(colour, layout.autumn_share, rng)
+            parts.append(build_leaves(tree.balls, tinted, size, rng, layout.leaf_share))
+        parts += _build_wood(tree, layout.kerb_height, rng)
+        if layout.leaf_share < 0.9:
+            parts.append(_build_twigs(tree, size, rng))
     return join_surfels(parts)
 
 
-def build_leaves(balls: Floats, colour: Floats, size: float, rng: np.random.Generator) -> Surfels:
+def tint_leaves(colour: Floats, autumn_share: float, rng: np.random.Generator) -> Floats:
+    """Return the reflectance of leaves of which a share has turned, [3] [1].
+
+    Parameters
+    ----------
+    colour : of green leaves [3] [1]
+    autumn_share : that has turned [1]
+    rng : draws the colour of autumn, if any has turned
+    """
+    if autumn_share == 0:
+        return colour
+    turned = palette.AUTUMN[rng.integers(len(palette.AUTUMN))]
+    return colour + (turned - colour) * np.clip(autumn_share * rng.uniform(0.6, 1.2), 0, 1)
+
+
+def build_leaves(
+    balls: Floats, colour: Floats, size: float, rng: np.random.Generator, leaf_share: float = 1.0
+) -> Surfels:
     """Build tufts of leaves over the outer surface of a group of balls.
 
     Parameters
@@ -60,9 +80,10 @@ def build_leaves(balls: Floats, colour: Floats, size: float, rng: np.random.Gene
     colour : [3] reflectance [1]
     size : length of a tuft [m]
     rng : draws places, tilts and tones
+    leaf_share : share of the tufts that are there [1]
     """
     skin = balls[:, 3] ** 2
-    n = int(_LAYERS * 4 * np.pi * skin.sum() / size**2 / 3.2)
+    n = int(leaf_share * _LAYERS * 4 * np.pi * skin.sum() / size**2 / 3.2)
     which = rng.choice(len(balls), n, p=skin / skin.sum())
     out = rng.standard_normal((n, 3))
     out /= np.linalg.norm(out, axis=1, keepdims=True)
@@ -109,6 +130,35 @@ def _build_wood(tree: Tree, ground: float, rng: np.random.Generator) -> list[Sur
         thin = 0.55 * tree.girth * (1 - 0.75 * t[:, 0])
         parts.append(build_tube(path - [0, 0, 0.15], thin, 5, SemanticClass.VEGETATION, 0.8 * palette.BARK))
     return parts
+
+
+def _build_twigs(tree: Tree, size: float, rng: np.random.Generator) -> Surfels:
+    """Build the thin branches of a crown without leaves: from the fork to each ball, and out to its surface."""
+    fork = np.array([tree.station, tree.lateral, tree.balls[:, 2].min() - 0.3])
+    parts = []
+    t = np.linspace(0, 1, 8)[:, None]
+    for ball in tree.balls:
+        path = fork + t * (ball[:3] - fork) - [0, 0, 0.25] * (t * (1 - t))
+        parts.append(
+            build_tube(path, 0.03 - 0.018 * t[:, 0], 3, SemanticClass.VEGETATION, 0.8 * palette.BARK)
+        )
+    twigs = 16
+    which = np.repeat(np.arange(len(tree.balls)), twigs)
+    out = rng.standard_normal((len(which), 3)) + np.array([0, 0, 0.5])
+    out /= np.linalg.norm(out, axis=1, keepdims=True)
+    reach = tree.balls[which, 3:] * 1.3
+    begin, along = tree.balls[which, :3], out * reach
+    side = np.cross(out, rng.standard_normal(out.shape))
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    width, cover = max(0.02, 0.16 * size), Cover(0.55, 0.85)
+    pieces = [
+        tile_surface(
+            begin + (k + 0.5) / 3 * along, along / 3, side * width, SemanticClass.VEGETATION, 0.75 * palette.BARK,
+            cover=cover,
+        )
+        for k in range(3)
+    ]  # fmt: skip
+    return join_surfels([*parts, *pieces])
 
 
 def build_gardens(layout: StreetLayout, buildings: tuple[Building, ...], seed: int) -> Surfels:

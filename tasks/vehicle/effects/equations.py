@@ -4,7 +4,10 @@ from math import exp
 
 from numba.extending import register_jitable
 
+from tasks.surface.wet_friction import WetGrip, compute_wet_share
 from tasks.vehicle.effects.table import EffectValues
+
+register_jitable(cache=True, error_model="numpy", forceinline=True)(compute_wet_share)
 
 AIR_DENSITY = 1.2
 """Air at 20 degrees and sea level [kg/m^3]."""
@@ -75,7 +78,7 @@ def compute_brake_factor(effects: EffectValues, pressure: float, speed: float, d
 
 @register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_friction_factor(
-    effects: EffectValues, speed: float, load_ratio: float, slip_energy: float, wet: float
+    effects: EffectValues, speed: float, load_ratio: float, slip_energy: float, wet: float, grip: WetGrip
 ) -> float:
     """Return the factor of load, heat of sliding, water film and speed on the tyre's friction [1].
 
@@ -86,11 +89,14 @@ def compute_friction_factor(
     load_ratio : contact load over that at rest [1]
     slip_energy : energy of sliding since the start [J]
     wet : 1 on a wet road, else 0 [1]
+    grip : of the film on it
     """
     factor = 1.0 - effects.load_sensitivity * (load_ratio - 1.0)
     factor *= 1.0 - effects.tyre_heating * slip_energy / 1e5
     if wet > 0.0:
         factor *= 1.0 - effects.wet_speed * max(speed - effects.wet_threshold, 0.0)
+        if grip.decay > 0.0:
+            factor *= compute_wet_share(speed, grip) / grip.reference
     factor *= 1.0 - effects.friction_speed * speed
     return max(factor, 0.0)
 

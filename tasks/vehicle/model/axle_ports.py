@@ -172,7 +172,7 @@ def compute_rolling_axle(
     slip = compute_signed_slip(speed, wheels.radius * omega, wheels.speed_floor)
     force_slip = memory.slip if effects.relaxation_length > 0.0 else slip
     load_ratio = ground.load / static_load
-    grip = compute_friction_factor(effects, speed, load_ratio, memory.slip_heat, chassis.wet)
+    grip = compute_friction_factor(effects, speed, load_ratio, memory.slip_heat, chassis.wet, chassis.grip)
     grip *= max(1.0 + forms.friction, 0.0)
     pressure = compute_acting_pressure(instant.pressure, speed, memory.disc_rise, effects)
     pressure *= max(1.0 + forms.brake_torque, 0.0)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from tasks.surface.road_profile import FLAT_ROAD, LEVEL_ROAD, RoadGrade, RoadHazard
+from tasks.surface.wet_friction import ANY_SPEED, WetGrip
 from tasks.vehicle.effects.table import EffectValues, pack_effect_values
 from tasks.vehicle.half_car import HalfCar, build_half_car
 from tasks.vehicle.paper.wheels import Wheels, build_wheels
@@ -21,6 +22,7 @@ class Conditions:
     grade : rise of the road along the route, over the stations of the run
     direction : +1 along the route, -1 against it
     disc_rise : temperature of the discs above ambient at the start [K]
+    grip : how friction depends on speed
     """
 
     hazard: RoadHazard = FLAT_ROAD
@@ -28,6 +30,7 @@ class Conditions:
     grade: RoadGrade = LEVEL_ROAD
     direction: int = 1
     disc_rise: float = 0.0
+    grip: WetGrip = ANY_SPEED
 
 
 class Chassis(NamedTuple):
@@ -44,6 +47,7 @@ class Chassis(NamedTuple):
     wet : 1 on a wet road, else 0 [1]
     snow_depth_mm : depth of the snow on the road [mm]
     direction : +1 along the route, -1 against it; the wind blows along the route [1]
+    grip : how the friction of a wet road depends on speed
     """
 
     body: HalfCar
@@ -55,6 +59,7 @@ class Chassis(NamedTuple):
     wet: float
     snow_depth_mm: float
     direction: float
+    grip: WetGrip
 
 
 def build_chassis(vehicle: Vehicle, response: SurfaceResponse, conditions: Conditions) -> Chassis:
@@ -80,4 +85,5 @@ def build_chassis(vehicle: Vehicle, response: SurfaceResponse, conditions: Condi
         wet=float(response.wet),
         snow_depth_mm=float(conditions.snow_depth_mm),
         direction=float(conditions.direction),
+        grip=WetGrip(*map(float, conditions.grip)),
     )

@@ -13,9 +13,12 @@ from typing import Any
 
 import numpy as np
 from numba import carray, cfunc, njit, types
+from numba.extending import register_jitable
 from numpy.typing import NDArray
 
+from tasks.surface.state import SurfaceParameters
 from tasks.surface.weather import WEATHERS, list_by_code
+from tasks.surface.wet_friction import WetGrip, make_wet_grip
 from tasks.vehicle.effects.slots import pack_slots
 from tasks.vehicle.model.brake_input import NO_COMMAND, BrakeInput
 from tasks.vehicle.model.chassis import Chassis, Conditions, build_chassis
@@ -33,12 +36,12 @@ START = -1
 DONE, NO_TYRE = 1, 2
 """Value that the function returns: it has done its steps, or the vehicle has no tyre family in this weather."""
 
+register_jitable(error_model="numpy")(make_wet_grip)
 _SUBSTEPS = np.int64(1)
 """Steps between samples; of this type, Numba takes the loop that it has compiled for every other run."""
-_SPEED, _DISC_RISE, _CENTER, _LENGTH, _HEIGHT, _PRESSURE, _ENGINE, _HOLD, _WEATHER, _FRICTION, _SNOW = range(
-    11
-)
-_FRONT_HEIGHT, _FRONT_SLOPE, _REAR_HEIGHT, _REAR_SLOPE = range(11, 15)
+_SPEED, _DISC_RISE, _CENTER, _LENGTH, _HEIGHT, _BY_SPEED = range(6)
+_PRESSURE, _ENGINE, _HOLD, _WEATHER, _FRICTION, _SNOW, _FILM = range(6, 13)
+_FRONT_HEIGHT, _FRONT_SLOPE, _REAR_HEIGHT, _REAR_SLOPE = range(13, 17)
 _OUTPUTS, _COLUMNS = len(INPUTS), len(OUTPUTS)
 _STATE = _OUTPUTS + _COLUMNS
 _PRESSURES = _STATE + STATE_WIDTH
@@ -64,12 +67,13 @@ def measure_block(vehicle: Vehicle) -> int:
     return _PRESSURES + 2 * count_held_samples(vehicle)
 
 
-def compile_advance(vehicle: Vehicle) -> Any:
+def compile_advance(vehicle: Vehicle, surface: SurfaceParameters) -> Any:
     """Compile the model of a vehicle, as a C function of a block and a number of steps.
 
     Parameters
     ----------
     vehicle : the vehicle; its numbers are constants of the compiled function
+    surface : pavement that grips by speed where the block asks for it; its numbers are constants too
 
     Returns
     -------
@@ -83,6 +87,7 @@ def compile_advance(vehicle: Vehicle) -> Any:
     tables = [form.slot for form in vehicle.forms]
     slots = pack_slots(tables) if tables else None
     make_tyre = _compile_tyre(vehicle)
+    film_law = _compile_wet_grip(surface)
     has_tyre = np.array([name in known for name in names])
     held, width = count_held_samples(vehicle), measure_block(vehicle)
 
@@ -94,9 +99,10 @@ def compile_advance(vehicle: Vehicle) -> Any:
         if not has_tyre[weather]:
             return NO_TYRE
         tyre = make_tyre(weather, block[_FRICTION])
+        by_speed = wet[weather] != 0.0 and block[_BY_SPEED] != 0.0
         chassis = Chassis(
             fixed.body, fixed.wheels, fixed.lever, fixed.lock_speed, fixed.transfer, fixed.effects, wet[weather],
-            block[_SNOW], fixed.direction,
+            block[_SNOW], fixed.direction, film_law(block[_FILM]) if by_speed else fixed.grip,
         )  # fmt: skip
         if steps < 0:
             state = make_rolling_state(block[_SPEED], fixed.wheels.radius, block[_DISC_RISE], np.inf)
@@ -144,6 +150,23 @@ def push_sample(samples: NDArray[np.float64], value: float) -> None:
     for i in range(len(samples) - 1):
         samples[i] = samples[i + 1]
     samples[len(samples) - 1] = value
+
+
+def _compile_wet_grip(surface: SurfaceParameters) -> Callable[[float], WetGrip]:
+    """Return a kernel that gives the grip of a film [mm], as `tasks.surface.weather.find_wet_grip` does."""
+    numbers = (
+        surface.wet_friction, surface.wet_decay_speed, surface.wet_planing_film_mm,
+        surface.wet_planing_exponent, surface.wet_tyre_pressure_kpa, surface.wet_planing_friction,
+        surface.wet_reference_speed,
+    )  # fmt: skip
+    texture = surface.texture_depth_mm
+
+    @njit(error_model="numpy")
+    def find_grip(film_mm: float) -> WetGrip:
+        grip: WetGrip = make_wet_grip(film_mm - texture, *numbers)
+        return grip
+
+    return find_grip
 
 
 def _compile_tyre(vehicle: Vehicle) -> Callable[[int, float], Tyre]:

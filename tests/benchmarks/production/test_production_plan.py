@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.production.plan import ClipCosts, Prices, plan_production
-from benchmarks.production.scheduling import measure_scheduling
+from benchmarks.production.plan import ClipCosts, Prices, measure_scheduling, plan_production
 from flows.store.layout import Layout
 from tasks.errors import InputError
 

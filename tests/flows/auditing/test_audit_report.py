@@ -17,7 +17,7 @@ from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
 
 import manifests.explain
 from flows.auditing.audit import audit_dataset
-from flows.auditing.audit_report import format_text, tell_verdict, write_audit_page
+from flows.auditing.audit_report import describe_verdict, format_text, write_audit_page
 from flows.auditing.signing import sign_dataset
 from flows.auditing.verify import describe_files, verify_dataset
 from flows.store.layout import Layout
@@ -85,7 +85,7 @@ def test_verify_and_audit_count_the_same_files_and_say_so_positively(audit):
     told = f"all {result['files']} files are those recorded"
     assert told in result["verdict"] and told in verified["verdict"]
     assert [result["not_checked"], result["verdict"]] == format_text(result).splitlines()[:2]
-    assert result["verdict"] == tell_verdict(result)
+    assert result["verdict"] == describe_verdict(result)
     assert result["verdict"].startswith("Verified: ") and "1 of 4 clips, made again" in result["verdict"]
 
 
@@ -156,10 +156,10 @@ def test_words_of_a_stranger_are_text_and_a_difference_is_marked(audit):
         "contradictions": ["plan.json: clips.0.label must be <b>x</b>, as in manifest.json"],
         "verified": False,
     }
-    page = write_audit_page(result | {"verdict": tell_verdict(result)})
+    page = write_audit_page(result | {"verdict": describe_verdict(result)})
     assert "<b>x" not in page and "&lt;b&gt;x" in page
     assert "Records that contradict each other: plan.json: clips.0.label must be &lt;b&gt;x" in page
-    assert "; its records contradict each other; " in tell_verdict(result)
+    assert "; its records contradict each other; " in describe_verdict(result)
     assert "Not verified: " in page and "0 came out as recorded and 1 did not" in page
     assert (
         "vehicle, speed, tick 3: 1.0 recorded, 2.0 made again. Can come from: no input that is recorded"

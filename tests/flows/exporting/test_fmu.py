@@ -16,6 +16,7 @@ from reference_pages.fmu import write_input_table
 from tasks.errors import InputError
 from tasks.surface.road_profile import FLAT_ROAD, RoadHazard, road_elevation, road_slope
 from tasks.surface.state import SurfaceState
+from tasks.surface.weather import Weather, surface_state
 from tasks.vehicle.brake import BrakeCommand, compute_brake_pressure
 from tasks.vehicle.model.brake_input import make_trace_input
 from tasks.vehicle.model.chassis import Conditions
@@ -127,6 +128,29 @@ def test_a_stop_on_snow_is_the_own_rollout(drive, vehicle, hazard):
             np.testing.assert_allclose(
                 column, np.delete(own.columns[name], 200), rtol=1e-6, atol=1e-6, err_msg=name
             )
+
+
+def test_a_storm_that_grips_by_speed_is_the_own_rollout(drive, vehicle):
+    storm = surface_state(
+        Weather(kind="rain", precipitation_mm_h=50.0),
+        load("wet friction").apply(load("surface", "dense-asphalt")),
+    )
+    command = BrakeCommand(
+        peak_pressure_mpa=4.0, ramp_s=0.2, onset_s=0.0, onset_station_m=None, hold_s=None, release_s=0.5
+    )
+    own = simulate_scenario(
+        vehicle, storm, Controls(initial_speed=28.0, brake=command, hold_speed_until_brake=False), FLAT_ROAD,
+        mode="coupled", duration_s=1.0,
+    )  # fmt: skip
+    wet = {"weather": 2, "road_friction": storm.friction, "film_depth": storm.film_depth_mm}
+    ends = []
+    for by_speed in (1, 0):
+        car = drive(initial_speed=28.0, wet_friction_by_speed=by_speed, **wet)
+        for n in range(2000):
+            car.set_inputs(brake_pressure=compute_brake_pressure((n + 1) * STEP, command.profile))
+            car.take_step(STEP)
+        ends.append(car.read_row()[COLUMNS.index("speed")])
+    assert ends[0] == pytest.approx(own.columns["speed"][-1], abs=1e-6) and ends[1] < ends[0] - 0.3
 
 
 def test_held_inputs_give_the_same_at_any_step_and_equal_a_trace_that_holds_them(drive, vehicle):

@@ -16,8 +16,7 @@ import pytest
 from benchmarks.synthetic_street import Clip, drive_clip
 from catalogs.entries import load
 from flows.judging import foreign_sources
-from flows.judging.claims import read_claim
-from flows.judging.foreign import judge_video, measure_retention
+from flows.judging.foreign import judge_video, measure_retention, read_claim
 from flows.judging.foreign_sources import (
     LEVEL,
     MOST_PIXELS,

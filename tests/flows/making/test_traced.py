@@ -91,9 +91,9 @@ def test_commands_that_drive_a_clip_again_refuse_it(traced: Path) -> None:
     place = str(traced)
     for name, run in {
         "lab audit-physics": lambda: audit_physics(place),
-        "controls": lambda: run_controls(place),
+        "lab controls": lambda: run_controls(place),
         "explain": lambda: explain_frame(place, "hump", 0),
-        "lineage": lambda: trace_lineage(place, "hump"),
+        "lab lineage": lambda: trace_lineage(place, "hump"),
     }.items():
         with pytest.raises(InputError, match=f"no vehicle model made; musync {name} needs"):
             run()

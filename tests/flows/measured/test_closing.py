@@ -20,7 +20,7 @@ from flows.making.plan import make_plan
 from flows.measured import closing
 from flows.measured.closing import close_loop, find_unused_tolerances, verdict_json
 from flows.measured.closing_ledger import record_reading
-from flows.measured.friction_pulls import find_pulled_runs, tell_friction_pulls
+from flows.measured.friction_pulls import describe_friction_pulls, find_pulled_runs
 from flows.measured.grown_vehicle import grown_vehicle
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS, SESSION, Campaign
 from tasks.campaign.planned_runs import RunPlan
@@ -140,7 +140,7 @@ def test_runs_that_grip_less_than_the_mapping_says_are_told_beside_the_verdict(
 ) -> None:
     result = {"verdict": kind, "sentence": "So it is.", "reasons": ["because"]}
     result["friction_pulls_sigma"] = {"run-1": -2.4, "run-2": -3.8, "run-3": 2.6}
-    told = tell_friction_pulls(result, 0.03)
+    told = describe_friction_pulls(result, 0.03)
     lead = "So it is. But in run-2 and run-3 the tyres do not grip as the surface mapping says."
     assert told["sentence"] == (lead if in_the_lead else "So it is.")
     assert (
@@ -148,7 +148,7 @@ def test_runs_that_grip_less_than_the_mapping_says_are_told_beside_the_verdict(
         and "(3.0% each): run-2 by -3.8 and run-3 by +2.6;" in told["reasons"][1]
     )
     gripping = {"verdict": kind, "friction_pulls_sigma": {"run-1": 2.4}}
-    assert tell_friction_pulls(gripping, 0.03) == gripping
+    assert describe_friction_pulls(gripping, 0.03) == gripping
 
 
 def test_a_lag_leaves_a_residual_that_goes_with_the_pressure_until_it_is_named(closed: Path) -> None:

@@ -9,9 +9,9 @@ import pytest
 import yaml
 
 from catalogs.campaigns import read_campaign
-from catalogs.channel_maps.tolerances import RunTolerances, Tolerances, load_assumed_tolerances
+from catalogs.channel_maps.tolerances import RunTolerances, Tolerances
 from catalogs.entries import entry_names, load
-from flows.commands.measured_results import shorten_import
+from flows.commands.measured import shorten_import
 from flows.measured.importing import import_measurements
 from tasks.campaign.campaign import CHANNELS
 from tasks.errors import InputError
@@ -222,7 +222,7 @@ def test_tolerances_that_a_map_leaves_open_are_assumed_and_told(
 
 def test_a_tolerance_is_assumed_of_every_number_of_a_session() -> None:
     numbers = {*Tolerances.model_fields, *RunTolerances.model_fields} - {"run"}
-    assert set(load_assumed_tolerances()) == numbers
+    assert set(load("set of assumed tolerances")) == numbers
 
 
 def test_the_terminal_tells_what_was_assumed_in_one_line() -> None:

@@ -3,7 +3,7 @@
 from types import SimpleNamespace
 
 from catalogs.effects import load_effects
-from flows.measured.closing import _say_own_numbers
+from flows.measured.closing import _describe_own_numbers
 from tasks.identification.decision.answer import NamedEffect, Parameter, make_estimate
 
 
@@ -25,7 +25,7 @@ def test_a_number_that_stands_as_a_rival_is_not_told_again_among_the_vehicles_ow
     told = SimpleNamespace(rivals=[("pressure_nonlinearity", grip)], effects=[grip], experiment=None)
     outcome = SimpleNamespace(verdict=told, calibrated=(gain, grip))
     assert (
-        _say_own_numbers(outcome, load_effects())
+        _describe_own_numbers(outcome, load_effects())
         == "the brakes give 51 % [0, 100] above the torque of the vehicle file"
     )
-    assert _say_own_numbers(SimpleNamespace(verdict=told, calibrated=(grip,)), load_effects()) == ""
+    assert _describe_own_numbers(SimpleNamespace(verdict=told, calibrated=(grip,)), load_effects()) == ""

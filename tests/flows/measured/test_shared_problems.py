@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from flows.measured.importing import import_measurements
-from flows.measured.shared_problems import PlacedProblem, join_shared_problems
+from flows.measured.readable_recordings import PlacedProblem, join_shared_problems
 from tasks.errors import InputError
 from tests.campaign.recorded import braking_columns, log_signal
 from tests.flows.measured.recordings import map_beside, write_csv

@@ -8,7 +8,7 @@ import pytest
 
 from catalogs.entries import entry_names, load
 from catalogs.vehicles import open_vehicle
-from flows.measured.vehicle_template import DATA_SHEET
+from flows.measured.vehicle_check import DATA_SHEET
 from tests.flows.shell import run_command
 
 

@@ -12,7 +12,7 @@ import pytest
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from catalogs.entries import load
-from flows.measured.closing import tell_search, verdict_json
+from flows.measured.closing import describe_search, verdict_json
 from flows.measured.residuals import predict_runs
 from flows.measured.verdict_figures import format_plain_unit, make_brake_curve
 from flows.measured.verdict_report import MISSED, find_next_steps, write_verdict_page
@@ -59,7 +59,7 @@ def facts(outcome: Outcome, **more: Any) -> dict[str, Any]:
         "vehicle_file": "out/car-grown.yaml",
         "not_carried_by_coupled_mode": [],
     }
-    return verdict_json(outcome.verdict) | tell_search(outcome) | told | more
+    return verdict_json(outcome.verdict) | describe_search(outcome) | told | more
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +92,7 @@ def test_where_nothing_is_named_the_verdict_says_whether_the_model_misses_the_ru
 ) -> None:
     nothing = replace(judged[0].verdict, effects=(), rivals=())
     sentences = [
-        tell_search(replace(judged[0], verdict=replace(nothing, disagreement=why)))["sentence"]
+        describe_search(replace(judged[0], verdict=replace(nothing, disagreement=why)))["sentence"]
         for why in ("", "the runs disagree")
     ]
     assert sentences[0].startswith("These runs show nothing that the model lacks. Its own numbers, fitted to")
@@ -109,7 +109,7 @@ def test_the_first_sentence_says_whether_stops_are_missed_beside_what_is_named(
     rest = "The speed is still missed by more than its noise: more is lacking than that."
     for misses in (False, True):
         outcome = replace(judged[0], verdict=replace(judged[0].verdict, misses=misses))
-        assert tell_search(outcome)["sentence"].endswith(rest) is misses
+        assert describe_search(outcome)["sentence"].endswith(rest) is misses
 
 
 def test_the_page_says_the_verdict_its_numbers_rivals_and_what_to_do_next(

@@ -18,9 +18,9 @@ from flows.running.runner import (
     SPAWNED,
     WATCH,
     choose_runner,
+    log_dashboard,
     open_executor,
     run_unordered,
-    tell_dashboard,
 )
 from manifests.provenance import SOURCE_ROOT
 from tasks.errors import InputError
@@ -199,7 +199,7 @@ def test_the_dashboard_is_told_where_its_pages_can_be_drawn(monkeypatch, capsys)
     client = SimpleNamespace(dashboard_link="http://127.0.0.1:8787/status")
     for found, said in ((None, ""), (object(), "Dask's dashboard: http://127.0.0.1:8787/status\n")):
         monkeypatch.setattr("flows.running.runner.find_spec", lambda _, found=found: found)
-        tell_dashboard(client)
+        log_dashboard(client)
         assert capsys.readouterr().err == said
 
 

@@ -12,8 +12,8 @@ import flows.making.generate
 from flows.making.clip import make_clip
 from flows.running.failures import ClipsFailed
 from flows.scheduled.failure_report import report_failure
-from flows.scheduled.lateness import watch_lateness
 from flows.scheduled.notification import notify_problem
+from flows.scheduled.prefect_schedule import watch_lateness
 from flows.scheduled.scheduling import checked_parameters, dataset_place, scheduled_run
 from flows.store.layout import Layout
 from tasks.errors import InputError

@@ -6,9 +6,8 @@ import pytest
 import zarr
 
 from flows.store.frame_metadata import check_array, read_local_metadata
-from flows.store.frames import COMPRESSIONS, create_arrays, read_clip, read_frames, write_clip
+from flows.store.frames import COMPRESSIONS, create_arrays, read_chunks, read_clip, read_frames, write_clip
 from flows.store.layout import Layout
-from flows.store.shards import read_chunks
 from tasks.errors import InputError
 
 SHAPE = (5, 16, 24)

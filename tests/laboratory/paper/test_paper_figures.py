@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from catalogs.entries import load
-from flows.measured.trajectory_figure import draw_trajectories
+from flows.measured.agreement import draw_trajectories
 from studies.measured_drives.dive_figure import draw_dives
 from studies.paper.sensitivity import draw_sensitivity
 from tasks.surface.road_profile import FLAT_ROAD

@@ -18,7 +18,7 @@ from benchmarks.synthetic_street import (
     rig_poses,
 )
 from catalogs.learned_judges import LoadedJudge
-from flows.judging.claims import read_claim
+from flows.judging.foreign import read_claim
 from flows.judging.foreign_sources import read_camera
 from flows.judging.learned_rows import score_pictures
 from studies.video_sets.files import SetClip, find_set

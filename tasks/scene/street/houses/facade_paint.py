@@ -83,7 +83,7 @@ def draw_look(house: Building, seed: int) -> Look:
     """
     rng = named_generator(seed, f"look {house.number}")
     brick = rng.random() < 0.25
-    walls = palette.BRICK if brick else palette.PLASTER
+    walls = palette.CLADDING if house.clad else palette.BRICK if brick else palette.PLASTER
     wall = walls[rng.integers(len(walls))]
     plinth = palette.PLINTH if rng.random() < 0.6 else 0.6 * wall
     trim = palette.TRIM[rng.integers(len(palette.TRIM))]
@@ -92,7 +92,7 @@ def draw_look(house: Building, seed: int) -> Look:
     return Look(
         colours=np.stack([wall, trim, frame, palette.DARK_ROOM, trim, sign, plinth]),
         door=palette.DOORS[rng.integers(len(palette.DOORS))],
-        grain=0.10 if brick else 0.025,
+        grain=0.10 if brick and not house.clad else 0.025,
         window=(float(rng.uniform(1.1, 1.35)), float(rng.uniform(1.65, 1.95))),
         banded=bool(rng.random() < 0.6),
     )

@@ -1,0 +1,163 @@
+"""``musync.Simulator``: one drive, step by step, with what a controller sees at each."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from catalogs.entries import load
+from catalogs.scenario import Scenario, find_scenario_problems
+from catalogs.sentences import shorten_value
+from flows.making.driving import hazard_of, surface_of
+from flows.making.grid_inputs import grade_of
+from tasks.driving.stepped import SteppedDrive
+from tasks.driving.targets import Target, TargetTrack
+from tasks.errors import InputError
+from tasks.surface.road_profile import LEVEL_ROAD, RoadGrade
+from tasks.surface.state import SurfaceParameters
+from tasks.vehicle.model.simulation import COLUMNS
+from tasks.vehicle.parameters import Vehicle
+from tasks.vehicle.rollout import Rollout
+
+UNBRAKED = ("peak_pressure_mpa", "brake_onset_s", "brake_onset_m", "hold_speed")
+"""Fields of a scenario that a drive by steps has no use for: who steps brakes."""
+LEVEL_SCENES = (None, "street")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Observation:
+    """What a controller sees when a step begins.
+
+    Parameters
+    ----------
+    time : since the start [s]
+    station : way of the front axle since the start [m]
+    speed : [m/s]
+    acceleration : [m/s2]
+    wheel_speed_f, wheel_speed_r : of the axles [rad/s]
+    stands : whether the car has come to rest
+    ends : whether the drive is over
+    targets : road users ahead, in the order in which they were given
+    frame : uint8 [H, W, 3] sRGB picture, where frames are asked for
+    truth : every column of the model and the friction that the road has, where the truth is asked for [their units]
+    """
+
+    time: float
+    station: float
+    speed: float
+    acceleration: float
+    wheel_speed_f: float
+    wheel_speed_r: float
+    stands: bool
+    ends: bool
+    targets: tuple[Target, ...] = ()
+    frame: NDArray[np.uint8] | None = None
+    truth: Mapping[str, float] | None = None
+
+
+class Simulator:
+    """One drive of the coupled model, step by step: the same steps give the same bits, on any machine of one kind.
+
+    Parameters
+    ----------
+    scenario : a `Scenario`, or its fields by name; the brake's are left out
+    vehicle, surface : names of the catalogue, or files
+    rate_hz : of the steps, whole milliseconds each [Hz]
+    duration_s : longest drive, whole steps [s]
+    targets : tracks of road users ahead
+    truth : whether observations have the truth
+    grade : of the road; None takes that of the scenario's scene, level where it names none
+
+    Raises
+    ------
+    InputError
+        Listing every argument that breaks a rule.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario | Mapping[str, Any],
+        *,
+        vehicle: str | Vehicle = "bmw-320i",
+        surface: str | SurfaceParameters = "dense-asphalt",
+        rate_hz: float = 20.0,
+        duration_s: float = 10.0,
+        targets: Sequence[TargetTrack] = (),
+        truth: bool = False,
+        grade: RoadGrade | None = None,
+    ) -> None:
+        self.scenario = asked = _check_scenario(scenario)
+        car = vehicle if isinstance(vehicle, Vehicle) else load("vehicle", vehicle)
+        if not isinstance(surface, SurfaceParameters):
+            surface = load("wet friction").apply(load("surface", surface))
+        self.state = surface_of(asked, surface)
+        if grade is None:
+            grade = LEVEL_ROAD if asked.scene in LEVEL_SCENES else grade_of(str(asked.scene))
+        self.rate_hz, self._targets, self._truth = float(rate_hz), tuple(targets), truth
+        self._drive = SteppedDrive(
+            car, self.state, initial_speed=asked.initial_speed_km_h / 3.6, duration_s=duration_s, rate_hz=rate_hz,
+            hazard=hazard_of(asked), grade=grade,
+        )  # fmt: skip
+
+    def reset(self) -> Observation:
+        """Begin anew."""
+        self._drive.begin()
+        return self._observe()
+
+    def step(self, pressure_mpa: float) -> Observation:
+        """Drive one step.
+
+        Parameters
+        ----------
+        pressure_mpa : of the brake from the beginning of the step on [MPa]
+
+        Raises
+        ------
+        InputError
+            For a pressure that no brake has, or a drive that has ended.
+        """
+        self._drive.advance(float(pressure_mpa))
+        return self._observe()
+
+    def describe(self) -> Rollout:
+        """Return the telemetry of the drive, which has ended, at 1 kHz."""
+        return self._drive.describe()
+
+    def read_column(self, name: str) -> NDArray[np.float64]:
+        """Return a column of the model at every millisecond so far [its unit]."""
+        return self._drive.read_column(name)
+
+    def _observe(self) -> Observation:
+        drive = self._drive
+        read, time = drive.read, drive.time
+        return Observation(
+            time=time, station=read("station"), speed=read("speed"), acceleration=read("longitudinal_acceleration"),
+            wheel_speed_f=read("wheel_speed_f"), wheel_speed_r=read("wheel_speed_r"), stands=drive.stop_time <= time,
+            ends=drive.step_count == drive.steps, targets=tuple(track.find(time) for track in self._targets),
+            truth=self._read_truth() if self._truth else None,
+        )  # fmt: skip
+
+    def _read_truth(self) -> dict[str, float]:
+        values = {name: self._drive.read(name) for name in COLUMNS}
+        return values | {"surface_friction": self.state.friction, "film_depth_mm": self.state.film_depth_mm}
+
+
+def _check_scenario(scenario: Scenario | Mapping[str, Any]) -> Scenario:
+    if not isinstance(scenario, Scenario):
+        known = [field.name for field in fields(Scenario)]
+        if unknown := [name for name in scenario if name not in known]:
+            raise InputError(
+                f"scenario: there is no field {', '.join(map(shorten_value, unknown))}; there are {', '.join(known)}"
+            )
+        scenario = Scenario(**scenario)
+    plain = Scenario()
+    problems = [
+        f"scenario: {name} is the controller's, who brakes step by step; it is {getattr(scenario, name)}: leave it out"
+        for name in UNBRAKED
+        if getattr(scenario, name) != getattr(plain, name)
+    ]
+    if problems := problems + [f"scenario: {one}" for one in find_scenario_problems(scenario)]:
+        raise InputError(problems)
+    return scenario

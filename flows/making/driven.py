@@ -1,0 +1,80 @@
+"""Clips that a policy braked: the motion that its pressures give, and what they would give on other surfaces."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from catalogs.driven import PRESSURES
+from catalogs.scenario import Scenario
+from flows.making.catalogue import Catalogue
+from flows.making.driving import hazard_of, surface_of, weather_of
+from manifests.manifest import is_driven
+from tasks.driving.stepped import simulate_pressures
+from tasks.errors import InputError
+from tasks.studies.label_ranges import label_ranges, sampled_friction
+from tasks.surface.state import SurfaceState
+from tasks.vehicle.rollout import Rollout
+
+
+def drive_by_pressures(
+    scenario: Scenario, label: str, catalogue: Catalogue, duration_s: float, state: SurfaceState | None = None
+) -> Rollout:
+    """Return the motion of a clip that a policy braked.
+
+    Parameters
+    ----------
+    scenario, label : of the clip
+    catalogue : entries of the dataset, with what the policy asked for
+    duration_s : length of the telemetry [s]
+    state : surface that is driven on; None takes the scenario's
+
+    Raises
+    ------
+    InputError
+        If the policy drove no such clip.
+    """
+    driven = catalogue.driven
+    if driven is None or label not in driven.pressures:
+        raise InputError(f"inputs/{PRESSURES}: must have the pressures of clip {label}; it has none")
+    return simulate_pressures(
+        catalogue.vehicle, state or surface_of(scenario, catalogue.surface), driven.pressures[label],
+        initial_speed=scenario.initial_speed_km_h / 3.6, duration_s=duration_s, rate_hz=driven.entry.rate_hz,
+        hazard=hazard_of(scenario), grade=catalogue.grade,
+    )  # fmt: skip
+
+
+def driven_ranges_of(
+    scenario: Scenario, label: str, catalogue: Catalogue, duration_s: float
+) -> dict[str, float]:
+    """Percentiles of the clip's labels under the bounds of the surface parameters; the pressures stay the policy's.
+
+    Parameters
+    ----------
+    scenario, label, catalogue, duration_s : as of `drive_by_pressures`
+    """
+    state = surface_of(scenario, catalogue.surface)
+
+    def again(friction: float) -> tuple[float, float]:
+        ride = drive_by_pressures(scenario, label, catalogue, duration_s, replace(state, friction=friction))
+        return ride.stopping_distance, float(ride.columns["pitch"].max())
+
+    return label_ranges(sampled_friction(weather_of(scenario), catalogue.surface, catalogue.study), again)
+
+
+def refuse_driven(inputs: Iterable[str], place: object, command: str) -> None:
+    """Refuse a dataset whose brake follows from no scenario.
+
+    Parameters
+    ----------
+    inputs : names of its frozen inputs
+    place : what messages call the dataset
+    command : that needs the scenario's brake
+
+    Raises
+    ------
+    InputError
+        If a policy braked.
+    """
+    if is_driven(inputs):
+        raise InputError(
+            f"{place}: a policy braked its clips (musync drive); musync {command} needs a dataset whose scenarios brake"
+        )

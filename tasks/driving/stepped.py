@@ -1,0 +1,228 @@
+"""The coupled model driven step by step: the pressure of each step is told when the step begins.
+
+The brake has the pressure a millisecond after it is told, and goes to it in the second half of that. `trace_pressures`
+writes this down, and the rollout of that trace is the stepped drive bit for bit.
+"""
+
+from collections.abc import Sequence
+from math import inf, isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.errors import InputError
+from tasks.surface.road_profile import FLAT_ROAD, LEVEL_ROAD, RoadGrade, RoadHazard
+from tasks.surface.state import SurfaceState
+from tasks.vehicle.history import History
+from tasks.vehicle.model.brake_input import make_trace_input
+from tasks.vehicle.model.chassis import Conditions
+from tasks.vehicle.model.simulation import COLUMN, COLUMNS, Recording, simulate
+from tasks.vehicle.parameters import Vehicle, compute_surface_response
+from tasks.vehicle.rollout import INTERNAL_STEP_S, Rollout, describe_rollout
+
+TICKS_PER_S = 1000
+PER_TICK = 2
+"""Internal steps of a tick [1]."""
+LATE = 2
+"""Internal steps after which the brake has the pressure that is told [1]."""
+HIGHEST_PRESSURE_MPA = 50.0
+
+
+def count_ticks(rate_hz: float) -> int:
+    """Return the ticks of a step [1].
+
+    Parameters
+    ----------
+    rate_hz : of the steps [Hz]
+
+    Raises
+    ------
+    InputError
+        If a step would not be whole milliseconds, 1 to 1000 of them.
+    """
+    ticks = round(TICKS_PER_S / rate_hz) if isfinite(rate_hz) and 1 <= rate_hz <= TICKS_PER_S else 0
+    if ticks == 0 or abs(ticks * rate_hz - TICKS_PER_S) > 1e-9:
+        raise InputError(
+            f"rate_hz must give steps of whole milliseconds, such as 20, 25, 50 or 100; it is {rate_hz:g}"
+        )
+    return ticks
+
+
+def trace_pressures(pressures: Sequence[float], ticks_per_step: int) -> NDArray[np.float64]:
+    """Return the pressure at the internal steps of a drive, float64 [N] [MPa].
+
+    Parameters
+    ----------
+    pressures : of the steps [MPa]
+    ticks_per_step : ticks of a step [1]
+    """
+    told = np.repeat(np.asarray(pressures, np.float64), PER_TICK * ticks_per_step)
+    return np.concatenate([np.zeros(LATE), told])
+
+
+class SteppedDrive:
+    """A drive of the coupled model whose brake is told step by step.
+
+    Parameters
+    ----------
+    vehicle : the vehicle
+    surface : kind of weather, friction and how it depends on speed, snow
+    initial_speed : [m/s]
+    duration_s : length of the drive, whole steps [s]
+    rate_hz : of the steps [Hz]
+    hazard : road feature
+    grade : of the road
+
+    Raises
+    ------
+    InputError
+        For a rate, a duration or a speed that is none.
+    """
+
+    def __init__(
+        self, vehicle: Vehicle, surface: SurfaceState, *, initial_speed: float, duration_s: float, rate_hz: float,
+        hazard: RoadHazard = FLAT_ROAD, grade: RoadGrade = LEVEL_ROAD,
+    ) -> None:  # fmt: skip
+        self.ticks_per_step = count_ticks(rate_hz)
+        ticks = round(duration_s * TICKS_PER_S) if isfinite(duration_s) else 0
+        problems = []
+        if ticks <= 0 or ticks % self.ticks_per_step or abs(ticks - duration_s * TICKS_PER_S) > 1e-6:
+            problems.append(
+                f"duration_s must be whole steps of {self.ticks_per_step / TICKS_PER_S:g} s; it is {duration_s:g}"
+            )
+        if not (isfinite(initial_speed) and initial_speed > 0):
+            problems.append(f"initial_speed must be a positive number of m/s; it is {initial_speed}")
+        if problems:
+            raise InputError(problems)
+        self.steps = ticks // self.ticks_per_step
+        self._vehicle, self._surface, self._grade = vehicle, surface, grade
+        self._speed, self._duration = initial_speed, duration_s
+        self._response = compute_surface_response(vehicle, surface.kind, surface.friction)
+        self._conditions = Conditions(
+            hazard=hazard, snow_depth_mm=surface.snow_depth_mm, grade=grade, grip=surface.grip
+        )
+        self._trace = np.empty(LATE + PER_TICK * ticks)
+        self._history = np.empty((ticks + 1, len(COLUMNS)))
+        self.begin()
+
+    def begin(self) -> None:
+        """Put the car to the start: its wheels roll and its body is at rest."""
+        self.step_count, self._stop = 0, inf
+        self._trace[:LATE] = 0.0
+        run = simulate(
+            self._vehicle, self._response, make_trace_input(self._trace[:LATE], INTERNAL_STEP_S), self._conditions,
+            Recording(samples=1, interval=1 / TICKS_PER_S, substeps=PER_TICK, keep_states=True),
+            initial_speed=self._speed,
+        )  # fmt: skip
+        self._state, self._history[0] = run.states[0], run.history[0]
+
+    def advance(self, pressure_mpa: float) -> None:
+        """Drive one step.
+
+        Parameters
+        ----------
+        pressure_mpa : that the brake is told when the step begins [MPa]
+
+        Raises
+        ------
+        InputError
+            For a pressure that no brake has, or a drive that has ended.
+        """
+        if self.step_count == self.steps:
+            raise InputError(f"the drive has ended after {self._duration:g} s: begin anew")
+        if not 0.0 <= pressure_mpa <= HIGHEST_PRESSURE_MPA:  # a NaN too
+            raise InputError(
+                f"brake pressure must be a number within 0 to {HIGHEST_PRESSURE_MPA:g} MPa; it is {pressure_mpa}"
+            )
+        first = self.step_count * self.ticks_per_step
+        known = LATE + PER_TICK * (first + self.ticks_per_step)
+        self._trace[known - PER_TICK * self.ticks_per_step : known] = pressure_mpa
+        run = simulate(
+            self._vehicle, self._response, make_trace_input(self._trace[:known], INTERNAL_STEP_S), self._conditions,
+            Recording(
+                samples=self.ticks_per_step + 1, interval=1 / TICKS_PER_S, substeps=PER_TICK, keep_states=True
+            ),
+            start=self._state,
+        )  # fmt: skip
+        self._history[first : first + self.ticks_per_step + 1] = run.history
+        self._state, self._stop = run.states[-1], run.stop
+        self.step_count += 1
+
+    @property
+    def time(self) -> float:
+        """Time since the start [s]."""
+        return self.step_count * self.ticks_per_step / TICKS_PER_S
+
+    @property
+    def stop_time(self) -> float:
+        """When the car came to rest; infinite before [s]."""
+        return self._stop
+
+    def read(self, name: str) -> float:
+        """Return the present value of one of `COLUMNS` [its unit]."""
+        return float(self._history[self.step_count * self.ticks_per_step, COLUMN[name]])
+
+    def read_column(self, name: str) -> NDArray[np.float64]:
+        """Return the values of one of `COLUMNS` at all ticks so far [its unit]."""
+        return self._history[: self.step_count * self.ticks_per_step + 1, COLUMN[name]]
+
+    def describe(self) -> Rollout:
+        """Return the telemetry of a drive that has ended."""
+        columns = {name: self._history[:, i].copy() for name, i in COLUMN.items()}
+        return describe_trace_drive(
+            self._vehicle, self._surface, columns, self._stop, duration_s=self._duration, grade=self._grade
+        )
+
+
+def simulate_pressures(
+    vehicle: Vehicle,
+    surface: SurfaceState,
+    pressures: Sequence[float],
+    *,
+    initial_speed: float,
+    duration_s: float,
+    rate_hz: float,
+    hazard: RoadHazard = FLAT_ROAD,
+    grade: RoadGrade = LEVEL_ROAD,
+) -> Rollout:
+    """Simulate the drive in which each step has its pressure: that of `SteppedDrive`, in one call.
+
+    Parameters
+    ----------
+    vehicle, surface, initial_speed, duration_s, rate_hz, hazard, grade : as of `SteppedDrive`
+    pressures : of the steps [MPa]
+    """
+    ticks = round(duration_s * TICKS_PER_S)
+    response = compute_surface_response(vehicle, surface.kind, surface.friction)
+    run = simulate(
+        vehicle, response, make_trace_input(trace_pressures(pressures, count_ticks(rate_hz)), INTERNAL_STEP_S),
+        Conditions(hazard=hazard, snow_depth_mm=surface.snow_depth_mm, grade=grade, grip=surface.grip),
+        Recording(samples=ticks + 1, interval=1 / TICKS_PER_S, substeps=PER_TICK), initial_speed=initial_speed,
+    )  # fmt: skip
+    columns = dict(zip(COLUMNS, run.history.T.copy(), strict=True))
+    return describe_trace_drive(vehicle, surface, columns, run.stop, duration_s=duration_s, grade=grade)
+
+
+def describe_trace_drive(
+    vehicle: Vehicle, surface: SurfaceState, columns: dict[str, NDArray[np.float64]], stop: float, *,
+    duration_s: float, grade: RoadGrade,
+) -> Rollout:  # fmt: skip
+    """Return the telemetry of a drive by pressures; the brake's onset is the last tick before there is any.
+
+    Parameters
+    ----------
+    vehicle, surface, grade : as of `SteppedDrive`
+    columns : history by name, [N] each [its unit]
+    stop : when the car came to rest [s]
+    duration_s : of the drive [s]
+    """
+    pressed = np.flatnonzero(columns["brake_pressure_mpa"] > 0)
+    first = max(int(pressed[0]) - 1, 0) if pressed.size else 0
+    onset = first / TICKS_PER_S if pressed.size else inf
+    history = History(
+        columns=columns, onset=onset, onset_station=float(columns["station"][first]), stop_time=stop
+    )
+    return describe_rollout(
+        history, vehicle, compute_surface_response(vehicle, surface.kind, surface.friction), surface.friction,
+        mode="coupled", duration_s=duration_s, grade=grade,
+    )  # fmt: skip

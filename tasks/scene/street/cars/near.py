@@ -1,0 +1,138 @@
+"""Parked cars that a clip comes near: as fine as its camera resolves, in the light of the coarse ones."""
+
+from dataclasses import fields, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from tasks.scene.bodies.vehicles import build_vehicle
+from tasks.scene.gaussians import Gaussians
+from tasks.scene.spherical_harmonics import C0
+from tasks.scene.street.bend import integrate_course
+from tasks.scene.street.cars.parked import COARSE, build_parked, draw_look, place_body
+from tasks.scene.street.layout import StreetLayout
+from tasks.scene.street.objects import list_objects, own_gaussians
+from tasks.scene.street.plan import Car, plan_street
+from tasks.scene.surroundings import add_surroundings
+
+Floats = NDArray[np.float64]
+
+LEVELS = (0.045, 0.06, 0.08, 0.11, 0.15, 0.2)
+"""Spacings of a car's discs: 25,000 to 1,500 discs a car [m]."""
+CELL_PX = 4.0
+"""Spacing where the clip comes nearest, with the focal length that its camera has [px]."""
+_IN_VIEW = 0.8
+"""Cosine of the angle from the camera's axis up to which a car counts as in view [1]."""
+_NORMAL_M = 0.4
+"""Way that counts as much as a turn of the surface by a radian, for the light of the nearest coarse disc [m]."""
+_ALIKE = 4
+"""Coarse discs whose light is averaged [1]."""
+
+
+def detail_cars(
+    gaussians: Gaussians, layout: StreetLayout, seed: int, T_world_camera: Floats, focal_px: float
+) -> Gaussians:
+    """Return the street with fine cars in place of the coarse ones that a clip comes near; these come last.
+
+    Parameters
+    ----------
+    gaussians : of the street with this layout and seed
+    layout, seed : of the street
+    T_world_camera : float64 [F, 4, 4] poses of the clip's camera [m]
+    focal_px : its focal length [px]
+
+    Returns
+    -------
+    Gaussians
+        The same for the same arguments; the other Gaussians are bitwise unchanged and in their order.
+    """
+    cars, owners, classes = _list_owners(layout, seed)
+    first = len(gaussians) - len(owners)
+    own_gaussians(gaussians, owners, classes)
+    line = integrate_course(layout)
+    gone, parts = [], []
+    for number, car in enumerate(cars, start=1):
+        middle = line.to_world(np.array([[car.station, car.lateral, 0.7]]))[0]
+        spacing = CELL_PX * measure_approach(middle, T_world_camera) / focal_px
+        if spacing > LEVELS[-1]:
+            continue
+        cell = next(level for level in LEVELS if level >= spacing)
+        rows = first + np.flatnonzero(owners == number)
+        gone.append(rows)
+        coarse = {
+            member.name: value[rows]
+            for member in fields(Gaussians)
+            if isinstance(value := getattr(gaussians, member.name), np.ndarray)
+        }
+        parts.append(_make_fine(car, seed, cell, replace(gaussians, **coarse), layout))
+    if not parts:
+        return gaussians
+    index = np.concatenate(gone)
+    joined: dict[str, Any] = {
+        name: np.concatenate([np.delete(getattr(gaussians, name), index, axis=0), *(p[name] for p in parts)])
+        for name in parts[0]
+    }
+    return replace(gaussians, **joined)
+
+
+def measure_approach(point: Floats, T_world_camera: Floats) -> float:
+    """Return how near a camera comes to a point that it has in view; infinite where it never has [m].
+
+    Parameters
+    ----------
+    point : float64 [3] world [m]
+    T_world_camera : float64 [F, 4, 4] its poses [m]
+    """
+    away = point - T_world_camera[:, :3, 3]
+    ahead = np.einsum("fk,fk->f", away, T_world_camera[:, :3, 2])
+    distance = np.linalg.norm(away, axis=1)
+    seen = ahead > _IN_VIEW * distance
+    return float(distance[seen].min()) if seen.any() else float("inf")
+
+
+def _make_fine(car: Car, seed: int, cell: float, coarse: Gaussians, layout: StreetLayout) -> dict[str, Any]:
+    line = integrate_course(layout)
+    old, new = (place_body(build_parked(car, seed, spacing), car) for spacing in (COARSE, cell))
+    radiance = np.maximum(coarse.sh[:, 0].astype(np.float64) * C0 + 0.5, 0)
+    light = np.maximum(radiance - old.glow, 0) / old.albedo
+    places = [np.concatenate([s.centre, _NORMAL_M * s.axes[:, 2]], axis=1) for s in (old, new)]
+    away, nearest = cKDTree(places[0]).query(places[1], k=_ALIKE)
+    weight = 1 / (away + 0.02) ** 2
+    weight /= weight.sum(axis=1, keepdims=True)
+    lit = np.einsum("nk,nkc->nc", weight, light[nearest])
+    colour = new.albedo * lit + new.glow
+    station = new.centre[:, 0]
+    body = build_parked(car, seed, cell)
+    out: dict[str, Any] = {
+        "means": line.to_world(new.centre).astype(np.float32),
+        "quats_wxyz": line.to_world_quaternions(station, new.axes).astype(np.float32),
+        "scales": body.gaussians.scales,
+        "opacities": body.gaussians.opacities,
+        "sh": ((colour - 0.5) / C0).astype(np.float32)[:, None],
+        "normals": line.to_world_directions(station, new.axes[:, 2]).astype(np.float32),
+        "class_id": body.gaussians.class_id,
+    }
+    if coarse.surroundings is not None:
+        out["surroundings"] = _count_surroundings(car.model, draw_look(car, seed)[1], cell)
+    if coarse.light is not None:
+        shares = np.einsum("nk,nkc->nc", weight, coarse.light[nearest].astype(np.float64))
+        shares[:, 3] = new.glow.sum(axis=1) / np.maximum(colour.sum(axis=1), 1e-9)
+        out["light"] = np.clip(shares, 0, 1).astype(np.float32)
+    return out
+
+
+@lru_cache(maxsize=4)
+def _list_owners(
+    layout: StreetLayout, seed: int
+) -> tuple[tuple[Car, ...], NDArray[np.int32], NDArray[np.uint8]]:
+    """Return the cars of a street, and the owner and the class of each of its last Gaussians."""
+    _, owners, classes = list_objects(layout, seed)
+    return plan_street(layout, seed).cars, owners, classes
+
+
+@lru_cache(maxsize=128)
+def _count_surroundings(model: str, plate: int, cell: float) -> NDArray[np.float32] | None:
+    return add_surroundings(build_vehicle(model, cell=cell, seed=plate).gaussians).surroundings
