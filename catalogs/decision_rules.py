@@ -49,7 +49,7 @@ class DecisionRulesEntry(CatalogueEntry):
         """Return the rules; counts are integers."""
         counts = {name for name, kind in DecisionRules.__annotations__.items() if kind is int}
         return DecisionRules(
-            **{name: int(value) if name in counts else value for name, value in self.values().items()}
+            **{name: int(value) if name in counts else value for name, value in self.numbers().items()}
         )
 
 

@@ -15,7 +15,7 @@ from tasks.scene.street.houses.openings import (
 )
 from tasks.scene.street.layout import PIXEL, StreetLayout, nearest_depth
 from tasks.scene.street.plan import Building
-from tasks.scene.street.surfels import Surfels, graded_cells, tile_surface
+from tasks.scene.street.surfels import Surfels, graded_cells, join_surfels, tile_surface
 
 Floats = NDArray[np.float64]
 
@@ -34,6 +34,8 @@ def build_facades(layout: StreetLayout, buildings: tuple[Building, ...], seed: i
     buildings : the houses
     seed : the street's seed [1]
     """
+    if not buildings:
+        return join_surfels([])
     looks = [draw_look(house, seed) for house in buildings]
     grids = [
         grid
