@@ -27,7 +27,7 @@ from tasks.identification.decision.answer import ChannelError, NamedEffect, Para
 from tasks.identification.decision.excitation import find_reached_range
 from tasks.identification.decision.naming import measure_force
 from tasks.identification.decision.verdict import Outcome, judge_runs
-from tasks.identification.decision.words import join_phrases, list_unshared, say_effect, tell_verdict
+from tasks.identification.decision.words import describe_effect, describe_verdict, join_phrases, list_unshared
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.table import PARAMETERS
 
@@ -144,7 +144,7 @@ def describe_search(outcome: Outcome) -> dict[str, Any]:
     if len(verdict.odds) > 1:
         apart = [effect.name for effect in list_unshared(verdict.effects, verdict.odds)]
         force = measure_force(outcome.finding, outcome.fitted, apart)
-    sentence = tell_verdict(verdict, library, suggested, _describe_own_numbers(outcome, library), force)
+    sentence = describe_verdict(verdict, library, suggested, _describe_own_numbers(outcome, library), force)
     return {
         "channels": [CHANNELS[c] for c in train[0].channels],
         "sentence": sentence,
@@ -169,7 +169,7 @@ def _describe_own_numbers(outcome: Outcome, library: Sequence[Effect]) -> str:
     """Return what the numbers that the file hardly knew say of the car, else the one pulled most beside no name."""
     rivals = {rival.name for _, rival in outcome.verdict.rivals}
     if own := [effect for effect in outcome.calibrated if effect.name not in rivals]:
-        return join_phrases(say_effect(effect, library) for effect in own)
+        return join_phrases(describe_effect(effect, library) for effect in own)
     if outcome.verdict.effects or outcome.verdict.experiment is not None:
         return ""
     base = outcome.fitted
@@ -252,7 +252,7 @@ def effect_json(effect: NamedEffect, library: Sequence[Effect]) -> dict[str, Any
     """Return a named effect as plain values."""
     return {
         "name": effect.name,
-        "says": say_effect(effect, library),
+        "says": describe_effect(effect, library),
         "class": effect.effect_class,
         "port": effect.port,
         "variable": effect.variable,

@@ -9,7 +9,7 @@ import pytest
 from catalogs.decision_rules import load_decision_rules
 from catalogs.effects import load_effects
 from tasks.campaign.campaign import CHANNELS, FILE_NUMBERS, SESSION, Campaign
-from tasks.identification.decision.candidates import tell_curve
+from tasks.identification.decision.candidates import determines_curve
 from tasks.identification.decision.verdict import Outcome, judge_runs
 from tasks.identification.inference.driver import leave_out_driving
 from tasks.identification.inference.forward import prepare_run
@@ -119,7 +119,9 @@ def test_a_run_begins_where_its_throttle_closes_and_starts_with_the_speed_before
 def test_one_stop_shows_no_curve_of_the_brake() -> None:
     models = [prepare_run(run, VEHICLE, SURFACE) for run in campaign_of({}).train]
     curve, lag = (next(e for e in LIBRARY if e.name == n) for n in ("push_out_pressure", "brake_lag"))
-    assert [tell_curve(curve, models[:n]) for n in (1, 2)] == [False, True] and tell_curve(lag, models[:1])
+    assert [determines_curve(curve, models[:n]) for n in (1, 2)] == [False, True] and determines_curve(
+        lag, models[:1]
+    )
 
 
 def test_no_sensor_is_quieter_than_a_model_is_right_and_one_signal_for_both_axles_counts_once() -> None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from catalogs.decision_rules import load_decision_rules
 from tasks.identification.decision.candidates import Candidate
 from tasks.identification.decision.odds import RunGrams, search_explanations
-from tasks.identification.decision.told import OpenExplanation, list_open_explanations
+from tasks.identification.decision.open_explanations import OpenExplanation, list_open_explanations
 from tasks.identification.rules import DecisionRules
 from tests.identification.explained import effect_of, form_of, grams_of
 

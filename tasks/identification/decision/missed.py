@@ -5,7 +5,7 @@ from dataclasses import replace
 from tasks.identification.decision.answer import Verdict
 
 
-def tell_miss(verdict: Verdict, limit: float) -> Verdict:
+def report_miss(verdict: Verdict, limit: float) -> Verdict:
     """Return a verdict that says by how much the speed of held-out runs is missed, where that is more than noise.
 
     Parameters
