@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catalogs.campaigns import read_campaign
-from catalogs.decision_rules import load_decision_rules
-from catalogs.effects import LIBRARY_FILE, load_effects
-from catalogs.entries import load
+from catalogs.entries import find_entry, load
 from catalogs.vehicles import open_vehicle
 from flows.measured.closing_ledger import count_readings, record_reading
 from flows.measured.friction_pulls import compute_friction_pulls, describe_friction_pulls
@@ -65,7 +63,7 @@ def close_loop(
     results.write_json("split.json", split_of(measured))
     count_readings(measured)  # a faulty ledger is reported before the fit
     measured = replace(measured, tolerances=measured.tolerances.with_session(session_tolerances(name)))
-    outcome = judge_runs(measured, model, road, load_effects(), load_decision_rules())
+    outcome = judge_runs(measured, model, road, load("library of effects"), load("set of decision rules"))
     earlier = record_reading(measured, sha256_of([open_vehicle(name).content]))
     result = verdict_json(outcome.verdict) | describe_search(outcome)
     result = describe_friction_pulls(result, measured.tolerances.friction)
@@ -136,7 +134,7 @@ def describe_search(outcome: Outcome) -> dict[str, Any]:
     ----------
     outcome : the verdict and what it stands on
     """
-    library, verdict = load_effects(), outcome.verdict
+    library, verdict = load("library of effects"), outcome.verdict
     train, held_out = predict_runs(outcome)
     planned_for = verdict.experiment.between[0] if verdict.experiment else None
     suggested = next((effect for effect in verdict.tried if effect.name == planned_for), None)
@@ -191,7 +189,7 @@ def split_of(campaign: Campaign) -> dict[str, Any]:
 
 def verdict_json(verdict: Verdict) -> dict[str, Any]:
     """Return a verdict as plain values."""
-    experiment, library = verdict.experiment, load_effects()
+    experiment, library = verdict.experiment, load("library of effects")
     return {
         "campaign": verdict.campaign,
         "verdict": verdict.verdict,
@@ -233,7 +231,7 @@ def verdict_json(verdict: Verdict) -> dict[str, Any]:
         },
         "content_sha256": verdict.content_hash,
         "split_sha256": verdict.split_hash,
-        "library_sha256": sha256_of_file(LIBRARY_FILE),
+        "library_sha256": sha256_of_file(find_entry("library of effects")),
         "made_with": code_version(),
     }
 

@@ -6,8 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from catalogs.decision_rules import load_decision_rules
-from catalogs.effects import load_effects
+from catalogs.entries import load
 from tasks.campaign.campaign import CHANNELS, FILE_NUMBERS, SESSION, Campaign
 from tasks.identification.decision.candidates import determines_curve
 from tasks.identification.decision.verdict import Outcome, judge_runs
@@ -19,9 +18,9 @@ from tasks.vehicle.effects.table import build_parameter_vector
 from tasks.vehicle.parameters import Vehicle
 from tests.identification.synthetic import SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
-RULES = load_decision_rules()
+RULES = load("set of decision rules")
 FEW = ("brake_lag", "brake_dead_time", "push_out_pressure", "aerodynamic_drag", "retuned_pressure_gain")
-LIBRARY = tuple(e for e in load_effects() if e.name in FEW)
+LIBRARY = tuple(e for e in load("library of effects") if e.name in FEW)
 STOPS = ((29.0, 0.9), (17.0, 2.0), (22.0, 2.0))
 """Speed [m/s] and brake pressure [MPa] of the runs; the last is held out."""
 SEEN = np.isin(CHANNELS, ("speed", "longitudinal_acceleration"))

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import pytest
 
-from catalogs.effects import load_effects
+from catalogs.entries import load
 from tasks.identification.decision.answer import ChannelError, Verdict
 from tasks.identification.decision.missed import report_miss
 from tests.flows.measured.findings import found_effect, verdict_of
 
-LAG = found_effect(next(e for e in load_effects() if e.name == "brake_lag"), {"lag": 0.08})
+LAG = found_effect(next(e for e in load("library of effects") if e.name == "brake_lag"), {"lag": 0.08})
 
 
 def missing(error: float, verdict: Verdict) -> Verdict:

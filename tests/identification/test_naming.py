@@ -5,14 +5,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from catalogs.decision_rules import load_decision_rules
+from catalogs.entries import load
 from tasks.campaign.campaign import SESSION
 from tasks.identification.decision import naming
 from tasks.identification.decision.odds import search_explanations
 from tasks.identification.decision.open_explanations import list_open_explanations
 from tests.identification.explained import effect_of, form_of, grams_of
 
-RULES = load_decision_rules()
+RULES = load("set of decision rules")
 
 
 def settle(monkeypatch, grams, most=1, **fit):

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from catalogs.decision_rules import load_decision_rules
-from catalogs.effects import load_effects
+from catalogs.entries import load
 from tasks.identification.decision import words
 from tasks.identification.decision.answer import (
     ChannelError,
@@ -25,7 +24,7 @@ from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.tyres.burckhardt import compute_burckhardt_friction, scale_burckhardt
 from tests.identification.explained import effect_of, grams_of
 
-RULES = load_decision_rules()
+RULES = load("set of decision rules")
 FORM = NamedEffect(
     name="pitch_form", effect_class="form", port="pitch_moment", variable="speed", parameters=(),
     score=45.6, gain=89.0,
@@ -141,7 +140,7 @@ def test_own_numbers_are_told_with_a_stop_that_they_miss_by_more() -> None:
 
 def test_a_name_is_not_credited_with_what_the_vehicles_own_numbers_do() -> None:
     """Brakes 21 ms late were said to take a stop's error from 7.3 to 1.1 m, which a gain 10 % off did."""
-    effect = next(e for e in load_effects() if e.name == "brake_dead_time")
+    effect = next(e for e in load("library of effects") if e.name == "brake_dead_time")
     late = replace(FORM, name=effect.name, effect_class="effect", parameters=(LATE,))
     error = replace(ERROR, frozen=0.86, retuned=1.04, after=0.092)
     told = describe_verdict((late,), (effect,), {"speed": error}, {}, own="the brakes give 9.9 % below")
@@ -154,7 +153,7 @@ def test_a_name_is_not_credited_with_what_the_vehicles_own_numbers_do() -> None:
 
 def name(effect: str, *numbers: tuple[float, float, float]) -> NamedEffect:
     """An effect of the library with the values and intervals of its numbers."""
-    known = next(e for e in load_effects() if e.name == effect)
+    known = next(e for e in load("library of effects") if e.name == effect)
     parameters = tuple(
         replace(LATE, name=p.name, value=value, ci_low=low, ci_high=high, unit=p.unit)
         for p, (value, low, high) in zip(known.parameters, numbers, strict=True)
@@ -174,7 +173,7 @@ def test_a_set_says_first_what_its_explanations_share_and_then_each_with_its_odd
     ]
     error = {"speed": replace(ERROR, after=0.1)}
     told = describe_verdict(
-        (lag, pads), load_effects(), error, {}, rivals=[rolling], opened=opened, force=0.1
+        (lag, pads), load("library of effects"), error, {}, rivals=[rolling], opened=opened, force=0.1
     )
     first, apart, *_ = told.split(". ")
     assert first == (
@@ -186,13 +185,13 @@ def test_a_set_says_first_what_its_explanations_share_and_then_each_with_its_odd
         " with a further resistance of 1.1 % [1, 1.2] of the weight (0.49 : 1)"
     )
     late = describe_verdict(
-        (lag,), load_effects(), error, {}, rivals=[name("brake_dead_time", (0.08, 0.07, 0.09))]
+        (lag,), load("library of effects"), error, {}, rivals=[name("brake_dead_time", (0.08, 0.07, 0.09))]
     )
     assert late.startswith(
         "The brakes answer late, whatever the law. They cannot tell apart: the brakes follow"
     )
     mass = name("retuned_mass", (-0.1, -0.12, -0.08))
-    told = describe_verdict((lag,), load_effects(), error, {}, rivals=[mass])
+    told = describe_verdict((lag,), load("library of effects"), error, {}, rivals=[mass])
     assert told.startswith(
         "These runs show something that the model lacks, and leave 2 explanations open. They"
     )
@@ -204,7 +203,7 @@ def test_a_first_sentence_has_at_most_thirty_words() -> None:
         name("brake_lag", (0.079, 0.077, 0.081)), name("anti_dive", (0.2, 0.1, 0.3)),
         name("rolling_resistance", (0.011, 0.01, 0.012)),
     ]  # fmt: skip
-    told = describe_verdict(three, load_effects(), {"speed": replace(ERROR, after=0.1)}, {})
+    told = describe_verdict(three, load("library of effects"), {"speed": replace(ERROR, after=0.1)}, {})
     first, second, third = told.split(". ")
     assert len(first.split()) <= words.MOST_WORDS and "lag" in first
     assert "resistance" in second and third.startswith("That lowers")
@@ -277,7 +276,7 @@ def test_a_form_of_another_shape_is_not_told_as_the_same_words_again() -> None:
 
 
 def test_a_lower_slip_stiffness_is_told_as_a_softer_tyre_that_reaches_its_peak_at_a_higher_slip() -> None:
-    effect = next(e for e in load_effects() if e.name == "retuned_slip_stiffness")
+    effect = next(e for e in load("library of effects") if e.name == "retuned_slip_stiffness")
     curve = (1.2801, 23.99, 0.52)
     stiff, soft = (scale_burckhardt(curve, 1.0, 1.0 + change) for change in (0.0, -0.33))
     assert compute_burckhardt_friction(0.01, 4000.0, soft) < compute_burckhardt_friction(0.01, 4000.0, stiff)
@@ -290,7 +289,11 @@ def test_a_lower_slip_stiffness_is_told_as_a_softer_tyre_that_reaches_its_peak_a
 
 def test_anti_dive_is_told_as_a_share_of_the_load_transfer_and_not_of_the_brake_force() -> None:
     # the link carries anti_dive x brake force x h/L, some fifth of the share of the brake force itself
-    said = {e.name: e.say({e.parameters[0].name: 0.46}) for e in load_effects() if e.name.startswith("anti_")}
+    said = {
+        e.name: e.say({e.parameters[0].name: 0.46})
+        for e in load("library of effects")
+        if e.name.startswith("anti_")
+    }
     assert said == {
         f"anti_{name}": f"the {axle} suspension's links take 46 % of the load transfer of the {axle} brakes off the"
         " springs"
