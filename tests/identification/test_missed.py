@@ -6,7 +6,7 @@ import pytest
 
 from catalogs.entries import load
 from tasks.identification.decision.answer import ChannelError, Verdict
-from tasks.identification.decision.missed import report_miss
+from tasks.identification.decision.verdict import report_miss
 from tests.flows.measured.findings import found_effect, verdict_of
 
 LAG = found_effect(next(e for e in load("library of effects") if e.name == "brake_lag"), {"lag": 0.08})

@@ -1,7 +1,7 @@
 """The verdict: what the training runs tell, in odds, and what that does to runs that no fit and no choice has read."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,6 @@ from tasks.identification.decision.correlation import correlate_residual_with_pr
 from tasks.identification.decision.experiment import Experiment, plan_next_experiment
 from tasks.identification.decision.held_out import compute_held_out_errors
 from tasks.identification.decision.log_faults import describe_inputs, describe_log_faults
-from tasks.identification.decision.missed import report_miss
 from tasks.identification.decision.naming import (
     estimate_signature_share,
     find_detectable_sizes,
@@ -230,3 +229,28 @@ def _find_suggested(finding: Finding) -> OpenExplanation | None:
         if len(explanation.members) == 1 and explanation.log_odds > 0.0:
             return OpenExplanation(explanation=explanation, named=explanation.members, log_odds=0.0)
     return None
+
+
+def report_miss(verdict: Verdict, limit: float) -> Verdict:
+    """Return a verdict that says by how much the speed of held-out runs is missed, where that is more than noise.
+
+    Parameters
+    ----------
+    verdict : the answer
+    limit : error over noise from which a run is missed [1]
+    """
+    error, (_, noise) = verdict.error["speed"].after, verdict.noise["speed"]
+    # a disagreement says that nothing could be named, and not that what is named is not all
+    if error <= limit * noise or (verdict.disagreement and not verdict.effects):
+        return verdict
+    missed = (
+        f"the speed of the held-out runs is missed by {error:.3g} m/s, {error / noise:.3g} times its noise (at most"
+        f" {limit:g})"
+    )
+    if not verdict.effects:
+        return replace(verdict, misses=True, disagreement=missed, reasons=(missed, *verdict.reasons))
+    return replace(
+        verdict,
+        misses=True,
+        reasons=(*verdict.reasons, f"{missed}: what is named is not all that the model lacks"),
+    )
