@@ -73,8 +73,8 @@ def compare_brakes(
     Returns
     -------
     ``rows[]`` with protocol, approach, ``speed_km_h``, weather, brake, friction, ``collided``, ``impact_km_h`` with
-    ``_p05``, ``_p50`` and ``_p95``, ``min_ttc_s``, ``clearance_m``, ``avoided_km_h`` and ``allowed_km_h``; ``summary[]``
-    by protocol, weather and brake; ``sources`` of the protocols.
+    ``_p05``, ``_p50`` and ``_p95``, ``min_ttc_s``, ``clearance_m``, ``avoided_km_h`` and ``allowed_km_h``;
+    ``summary[]`` by protocol, weather and brake; ``sources`` of the protocols.
 
     Raises
     ------

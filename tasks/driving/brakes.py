@@ -146,17 +146,28 @@ class FrictionTrigger:
         threat : target, whose deceleration is taken to last until it stands
         """
         target, slows = threat.target.speed, -threat.target.acceleration
-        if slows > 0:
-            # both come to rest: the later the car, the more of the target's way is given
-            return max(
-                speed * self._lost + self._look(self._ways, speed) - target * target / (2.0 * slows), 0.0
-            )
+        if slows > 0 and target > 0:
+            return self._find_gap_to_braking(speed, target, slows)
         if threat.closing <= 0:
             return 0.0
         ways, times = (
             self._look(table, speed) - self._look(table, target) for table in (self._ways, self._times)
         )
         return threat.closing * self._lost + ways - target * times
+
+    def _find_gap_to_braking(self, speed: float, target: float, slows: float) -> float:
+        """Return the needed gap to a target that brakes: where both are equally fast, or where both stand [m]."""
+        way = self._look(self._ways, speed)
+        at_rest = speed * self._lost + way - target * target / (2.0 * slows)
+        own = speed * speed / (2.0 * way) if way > 0 else inf
+        # while the car's own brake still rises, the target slows
+        closing = speed - target + slows * self._lost
+        when = closing / (own - slows) if own > slows else inf
+        moving = closing > 0 and own * when <= speed and slows * (when + self._lost) <= target
+        if not moving:
+            return max(at_rest, 0.0)
+        lost = (speed - target) * self._lost + 0.5 * slows * self._lost**2
+        return max(lost + 0.5 * closing * when, 0.0)
 
     def _look(self, table: NDArray[np.float64], speed: float) -> float:
         return float(np.interp(speed, SPEEDS, table))

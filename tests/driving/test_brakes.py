@@ -62,6 +62,17 @@ def test_the_brake_that_knows_friction_stops_a_margin_before_the_target_and_brak
     assert blind.collided and blind.brake_time > outcome.brake_time
 
 
+@pytest.mark.parametrize("slows", [2.0, 6.0])
+@pytest.mark.parametrize("gap", [12.0, 40.0])
+def test_the_brake_that_knows_friction_stops_behind_one_that_brakes(gap, slows):
+    dry, track = road("dry"), TargetTrack(
+        station=OVERHANG + gap, speed=50 / 3.6, change_at=1.0, acceleration=-slows
+    )  # fmt: skip
+    case = Case(protocol="test", name="test", speed=50 / 3.6, track=track, allowed_km_h=None)
+    outcome = drive_approach(CAR, dry, case, *make_brake("friction", CAR, dry, TABLE), TABLE)
+    assert not outcome.collided and outcome.clearance < 4.0 and outcome.brake_time > 1.0
+
+
 def test_nothing_ahead_or_going_away_is_no_threat_and_who_walks_into_the_path_is():
     def threat_of(*targets: Target):
         return find_threat(Approach(time=0.0, bumper=10.0, speed=10.0, width=1.8, targets=targets))
