@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tasks.conventions import ROAD_CLASSES, SemanticClass
+from tasks.render.feature_sign import WarningSign
 from tasks.render.road_edit import RoadRelief
 from tasks.render.weather.ground_grid import read_between
 from tasks.render.weather.scene_light import ground_light, mean_colours, recolour_gaussians
@@ -24,6 +25,7 @@ class HazardMarking:
     patch_margin : of the patch beyond the depression, before and behind [m]
     joint : reflectance of the sealed joints; None has none [1]
     joint_width : of a joint, whose middle is the end of the paint or of the patch [m]
+    sign : that announces the feature; None has none
     """
 
     stripe_width: float
@@ -33,6 +35,7 @@ class HazardMarking:
     patch_margin: float = 0.0
     joint: tuple[float, float, float] | None = None
     joint_width: float = 0.0
+    sign: WarningSign | None = None
 
 
 GRAIN = (0.75, 1.3)
