@@ -15,6 +15,8 @@ PAGES: dict[str, tuple[str, str, tuple[str, ...]]] = {
             "flows.reading.windows.SeededOrder",
             "flows.driving.simulator.Simulator",
             "flows.driving.simulator.Observation",
+            "flows.driving.simulator.Simulator",
+            "flows.driving.simulator.Observation",
             "tasks.errors.InputError",
         ),
     ),
