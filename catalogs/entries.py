@@ -56,6 +56,7 @@ KINDS = {
     "list of sizes": Kind("effects/truths.yaml", "effects.truths:SizeFile"),
     "list of truths": Kind("effects/truths.yaml", "effects.truths:TruthFile"),
     "low-speed rule": Kind("low_speed.yaml", "low_speed:LowSpeedEntry"),
+    "road user sizes": Kind("road_users.yaml", "road_users:RoadUserSizes"),
     "sensitivity study": Kind("studies/surface-sensitivity.yaml", "studies:SensitivityEntry"),
     "set of assumed tolerances": Kind("assumed_tolerances.yaml", "channel_maps.tolerances:AssumedTolerances"),
     "set of decision rules": Kind("decision_rules.yaml", "decision_rules:DecisionRulesEntry"),

@@ -70,7 +70,7 @@ class ExportedClip:
     @property
     def scenario(self) -> Scenario:
         """Weather, controls and road."""
-        return Scenario(**self.record["scenario"])
+        return Scenario.of(self.record["scenario"])
 
     @cached_property
     def ticks(self) -> Columns:
@@ -161,7 +161,7 @@ class ExportedDataset:
     def arrays(self) -> tuple[str, ...]:
         """Names of the arrays of its frames; empty without frames."""
         settings = self.plan.settings
-        return tuple(arrays_of(settings.labels)) if settings.pictures else ()
+        return tuple(arrays_of(settings.labels, settings.has_objects)) if settings.pictures else ()
 
     def __len__(self) -> int:
         return len(self.rows)

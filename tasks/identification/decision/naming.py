@@ -170,6 +170,8 @@ def _list_strained(
         number = candidate.effect.parameters[0].name if candidate.effect else ""
         if number not in SESSION or fitted.pulls[SESSION.index(number)] <= rules.foreign_misfit:
             continue
+        if any(member.effect is None and can_stand_for(member, candidate) for member in first.named):
+            continue  # a form at its port holds it
         explanation = weigh_explanation(grams, [*members, candidate]) if candidate not in members else None
         if explanation is not None:
             odds = min(
