@@ -4,14 +4,17 @@ from functools import partial
 
 PAGES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "musync": (
-        "musync: open a dataset",
-        "`import musync` opens a finished dataset. [Query a dataset](../../how-to/query-a-dataset.md) shows it in use.",
+        "musync: open a dataset, step a car",
+        "`import musync` opens a finished dataset ([query a dataset](../../how-to/query-a-dataset.md)) and drives a car"
+        " [step by step](../../how-to/drive-the-car-in-another-simulator.md#step-by-step-in-python).",
         (
             "flows.reading.opening.open",
             "flows.reading.opening.Dataset",
             "flows.reading.clips.Clip",
             "flows.reading.windows.ClipWindows",
             "flows.reading.windows.SeededOrder",
+            "flows.driving.simulator.Simulator",
+            "flows.driving.simulator.Observation",
             "tasks.errors.InputError",
         ),
     ),
