@@ -65,7 +65,7 @@ def test_paint_in_the_shade_is_as_much_darker_as_the_road_there():
 
 
 def test_paint_where_the_light_is_known_has_the_colour_of_the_light_there():
-    """In the shade a white surface is blue: paint keeps its reflectance by the road, and so its light can be changed."""
+    """In the shade a white surface is blue: paint keeps its reflectance, and its light can be changed."""
     daylight = np.array([[1.9, 1.8, 1.6], [0.2, 0.3, 0.5], [0.2, 0.2, 0.2]])
     flat = road()
     shares = np.zeros((len(flat), 4), np.float32)
