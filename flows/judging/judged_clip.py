@@ -19,11 +19,10 @@ from flows.store.frames import read_clip
 from flows.store.layout import Layout
 from tasks.conventions import ROAD_CLASSES
 from tasks.eval.no_reference import piqe, temporal_error
-from tasks.eval.poses.checks import POSE_CHECKS
+from tasks.eval.poses.checks import POSE_CHECKS, hide_moving
 from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.poses.outside_trajectory import motion_from_trajectory
 from tasks.eval.poses.undistort import undistort_frames
-from tasks.eval.poses.unusable import hide_moving
 from tasks.eval.severity import measure_image, sampled_frames
 from tasks.render.camera import PIXEL_CENTRE
 

@@ -10,9 +10,15 @@ from numpy.typing import NDArray
 from flows.making.catalogue import Catalogue
 from tasks.eval.body_agreement import BodyClaim, pose_body
 from tasks.eval.motion_agreement import PoseVerdict, judge_pose
-from tasks.eval.poses.checks import GATE_CHECK, POSE_CHECKS, CheckedClip, JudgeCamera, prepare_clip
+from tasks.eval.poses.checks import (
+    GATE_CHECK,
+    POSE_CHECKS,
+    CheckedClip,
+    JudgeCamera,
+    hide_moving,
+    prepare_clip,
+)
 from tasks.eval.poses.undistort import undistort_frames
-from tasks.eval.poses.unusable import hide_moving
 from tasks.render.camera import PIXEL_CENTRE
 
 

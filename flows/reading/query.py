@@ -85,7 +85,7 @@ def query_dataset(
 
 def number_repeats(names: Sequence[str]) -> list[str]:
     """Return names of which no two are the same to SQL, which knows no case: a, A and a become a, A_1 and a_2."""
-    names: list[str] = []
+    numbered: list[str] = []
     repeats: dict[str, int] = {}
     for name in names:
         unique, known = name, name.casefold()
@@ -93,8 +93,8 @@ def number_repeats(names: Sequence[str]) -> list[str]:
             repeats[known] += 1
             unique = f"{name}_{repeats[known]}"
         repeats[unique.casefold()] = 0
-        names.append(unique)
-    return names
+        numbered.append(unique)
+    return numbered
 
 
 def refuse_several(connection: duckdb.DuckDBPyConnection, query: str, *, allow_files: bool) -> None:

@@ -4,7 +4,7 @@ import re
 
 import yaml
 
-from catalogs.effects import LIBRARY_FILE
+from catalogs.entries import find_entry
 from catalogs.grids import GridFile
 from catalogs.scenario import SCENARIO_FIELDS, Scenario, find_range_problems, list_ranges
 from flows.registry import COMMANDS
@@ -33,7 +33,7 @@ def test_every_command_stands_in_its_section_with_all_its_options() -> None:
 
 
 def test_every_effect_and_every_number_of_a_fit_has_its_row() -> None:
-    library = yaml.safe_load(LIBRARY_FILE.read_text())
+    library = yaml.safe_load(find_entry("library of effects").read_text())
     assert list(rows_of(effects.write_effect_table())) == [entry["name"] for entry in library]
     rows = rows_of(effects.write_number_table())
     assert list(rows) == list(PARAMETERS)
