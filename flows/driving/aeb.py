@@ -134,9 +134,9 @@ def drive_approach(
             initial_speed=case.speed, duration_s=LONGEST_S, rate_hz=table.car.rate_hz.value, hold_speed=True
         ),
     )  # fmt: skip
-    for _ in range(drive.steps):
+    for target in case.track.follow(np.arange(drive.steps) / table.car.rate_hz.value):
         time, speed = drive.time, drive.read("speed")
-        target, bumper = case.track.find(time), drive.read("station") + overhang
+        bumper = drive.read("station") + overhang
         if bumper >= target.station or drive.stop_time <= time:
             break
         if line.is_demanded and speed <= target.speed and time >= case.track.settles_at:
@@ -272,14 +272,26 @@ def _drive_case(
     ends = sorted(spread) if spread else []
     return {
         "friction": round(state.friction, 4),
+        **tell_outcome(outcome),
+        **{f"impact_km_h_p{p:02d}": round(v, 2) for p, v in zip(PERCENTILES, ends, strict=False)},
+        "allowed_km_h": case.allowed_km_h,
+    }
+
+
+def tell_outcome(outcome: Outcome) -> dict[str, Any]:
+    """Return an outcome in the units that people read; None for what there is not.
+
+    Parameters
+    ----------
+    outcome : of an approach
+    """
+    return {
         "collided": outcome.collided,
         "impact_km_h": round(outcome.impact_speed * KM_H, 2),
-        **{f"impact_km_h_p{p:02d}": round(v, 2) for p, v in zip(PERCENTILES, ends, strict=False)},
         "min_ttc_s": _finite(outcome.min_ttc),
         "clearance_m": _finite(outcome.clearance),
         "avoided_km_h": round(outcome.avoided_speed * KM_H, 2),
         "brake_time_s": _finite(outcome.brake_time),
-        "allowed_km_h": case.allowed_km_h,
     }
 
 

@@ -62,13 +62,13 @@ def test_only_the_clip_with_road_users_has_rows_and_instances(data, rows, masks)
     assert len(rows) == 12 and set(rows.label) == {"lead"}
     assert set(np.unique(masks)) == {0, CAR, ADULT}
     assert not np.asarray(data.frames["instance"][data["alone"].record["index"]]).any()
-    assert data.sql("SELECT count(*) FROM objects WHERE kind = 'adult'").fetchone() == (6,)
+    assert data.sql("SELECT count(*) FROM objects WHERE kind = 'adult'").fetchall() == [(6,)]
 
 
 def test_boxes_are_those_of_the_masks_and_hold_the_projected_body(made, data, rows, masks):
     """The box of a body that nothing hides is within a pixel of the projection of its own 3D box's ends."""
     camera, poses = (
-        data["lead"].camera,
+        load("camera", made.parent / "camera.yaml"),
         np.stack(data["lead"].pandas("frames")["T_world_rig"]).reshape(-1, 4, 4),
     )
     for (frame, number), row in rows.iterrows():
