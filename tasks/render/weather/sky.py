@@ -29,7 +29,7 @@ class SkyParameters:
     clouds : how sky and cloud look
     exposure_compensation : share of the light's loss, in stops, by which the camera opens [1]
     exposure_spread_ev : largest error of the camera's metering, which a clip draws [EV]
-    white_balance_spread : largest error of its red and of its blue gain, which a clip draws [1]
+    white_balance_spread : largest error of its red gain, which a clip draws; that of blue is its opposite [1]
     cloud_transmittance : light under full cloud by light under clear sky, where hardly anything falls [1]
     rain_cloud_transmittance : the same under the thick cloud of heavy precipitation [1]
     thickening_mm_h : rate over which the cloud grows from the one to the other [mm/h]
@@ -224,8 +224,8 @@ def balance_white(sky: SkyLight, parameters: SkyParameters, seed: int) -> SkyLig
     parameters : largest error of the gains
     seed : visual seed of the clip [1]
     """
-    red, blue = (2 * unit_number(seed, f"white balance {one}") - 1 for one in ("red", "blue"))
-    gain = 1 + parameters.white_balance_spread * np.array((red, 0.0, blue))
+    warmer = 2 * unit_number(seed, "white balance") - 1
+    gain = 1 + parameters.white_balance_spread * warmer * np.array((1.0, 0.0, -1.0))
     return replace(
         sky,
         relight=gain[:, None] * sky.relight,
