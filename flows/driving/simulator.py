@@ -12,7 +12,7 @@ from catalogs.scenario import Scenario, find_scenario_problems
 from catalogs.sentences import shorten_value
 from flows.making.driving import hazard_of, surface_of
 from flows.making.grid_inputs import grade_of
-from tasks.driving.stepped import SteppedDrive
+from tasks.driving.stepped import DriveSettings, SteppedDrive
 from tasks.driving.targets import Target, TargetTrack
 from tasks.errors import InputError
 from tasks.surface.road_profile import LEVEL_ROAD, RoadGrade
@@ -21,7 +21,7 @@ from tasks.vehicle.model.simulation import COLUMNS
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Rollout
 
-UNBRAKED = ("peak_pressure_mpa", "brake_onset_s", "brake_onset_m", "hold_speed")
+UNBRAKED = ("peak_pressure_mpa", "brake_onset_s", "brake_onset_m")
 """Fields of a scenario that a drive by steps has no use for: who steps brakes."""
 LEVEL_SCENES = (None, "street")
 
@@ -62,7 +62,7 @@ class Simulator:
 
     Parameters
     ----------
-    scenario : a `Scenario`, or its fields by name; the brake's are left out
+    scenario : a `Scenario`, or its fields by name, without the brake's; ``hold_speed`` lasts until the first pressure
     vehicle, surface : names of the catalogue, or files
     rate_hz : of the steps, whole milliseconds each [Hz]
     duration_s : longest drive, whole steps [s]
@@ -96,10 +96,11 @@ class Simulator:
         if grade is None:
             grade = LEVEL_ROAD if asked.scene in LEVEL_SCENES else grade_of(str(asked.scene))
         self.rate_hz, self._targets, self._truth = float(rate_hz), tuple(targets), truth
-        self._drive = SteppedDrive(
-            car, self.state, initial_speed=asked.initial_speed_km_h / 3.6, duration_s=duration_s, rate_hz=rate_hz,
-            hazard=hazard_of(asked), grade=grade,
+        settings = DriveSettings(
+            initial_speed=asked.initial_speed_km_h / 3.6, duration_s=duration_s, rate_hz=rate_hz,
+            hold_speed=asked.hold_speed, hazard=hazard_of(asked), grade=grade,
         )  # fmt: skip
+        self._drive = SteppedDrive(car, self.state, settings)
 
     def reset(self) -> Observation:
         """Begin anew."""

@@ -17,6 +17,7 @@ from flows.making.driving import hazard_of, surface_of
 from flows.making.grid_entries import GridEntries, read_entries, recorded_reference
 from flows.making.memory import find_memory_problems
 from flows.making.places import remember_place
+from flows.making.road_users import find_road_user_problems
 from flows.making.traced import read_trace_inputs
 from tasks.errors import InputError
 from tasks.render.sensor import Sensor
@@ -59,6 +60,7 @@ def read_grid_inputs(grid: Grid, tick_rate_hz: int) -> tuple[GridEntries, Scenes
             entries.contents.update(_list_grades(grid, scenes))
     if sound:
         problems += cap_problems(_find_feature_problems(grid, entries.vehicle))
+        problems += cap_problems(find_road_user_problems(grid, entries))
     if sound and grid.poses is None:
         problems += cap_problems(find_bend_problems(grid, entries))
     entries.contents.update(grid.driven)

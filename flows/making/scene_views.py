@@ -42,12 +42,15 @@ AHEAD = (4.0, 40.0)
 """Nearest and farthest road that is looked at for holes [m]."""
 
 
-def show_scenes(scenes: list[str] | None = None, *, out: str, backend: str = "auto") -> dict[str, Any]:
+def show_scenes(
+    scenes: list[str] | None = None, *, out: str, streets: int = SEEDS, backend: str = "auto"
+) -> dict[str, Any]:
     """Draw a sheet with a row of pictures of each scene along its route.
 
     Parameters
     ----------
     scenes : names or folders; None takes the first streets of every kind
+    streets : how many streets of every kind, where none are named [1]
     out : folder for gallery.png
     backend : rasteriser
 
@@ -58,10 +61,10 @@ def show_scenes(scenes: list[str] | None = None, *, out: str, backend: str = "au
     Raises
     ------
     InputError
-        If a scene is missing or damaged.
+        If a scene is missing or damaged, or no street is asked for.
     """
     results = Outputs(out, "scene gallery", "gallery.png")
-    names = scenes or list_streets(SEEDS)
+    names = scenes or list_streets(streets)
     rows = []
     with progress_bar("scenes", len(names)) as advance:
         for name, scene in _open_scenes(names):
@@ -75,7 +78,7 @@ def show_scenes(scenes: list[str] | None = None, *, out: str, backend: str = "au
 
 
 def check_scenes(
-    scenes: list[str] | None = None, *, out: str | None = None, backend: str = "auto"
+    scenes: list[str] | None = None, *, out: str | None = None, streets: int = SEEDS, backend: str = "auto"
 ) -> dict[str, Any]:
     """Check scenes for holes, for what floats or stands in the way, for a route off the road, and for their scale.
 
@@ -85,6 +88,7 @@ def check_scenes(
     Parameters
     ----------
     scenes : names or folders; None takes the first streets of every kind
+    streets : how many streets of every kind, where none are named [1]
     out : folder for check.json
     backend : rasteriser
 
@@ -96,10 +100,10 @@ def check_scenes(
     Raises
     ------
     InputError
-        If a scene is missing or damaged.
+        If a scene is missing or damaged, or no street is asked for.
     """
     results = Outputs(out, "scene check", "check.json")
-    names = scenes or list_streets(SEEDS)
+    names = scenes or list_streets(streets)
     limit = load("table of physical limits").road_grade.value
     rows: list[dict[str, Any]] = []
     grains: list[NDArray[np.float64]] = []
@@ -167,6 +171,8 @@ def list_streets(count: int, first: int = 0) -> list[str]:
     ----------
     count, first : streets of each kind, and the first seed [1]
     """
+    if count < 1:
+        raise InputError(f"streets must be 1 or more; it is {count}")
     return [f"{kind}-{seed}" for kind in KINDS for seed in range(first, first + count)]
 
 

@@ -21,7 +21,7 @@ from pyarrow import dataset
 
 from catalogs.sentences import shorten, shorten_value
 from flows.reading.views import list_absent
-from flows.store.layout import Layout
+from flows.store.layout import OBJECTS, Layout
 from flows.store.missing import has_nulls, null_missing
 from flows.store.parquet_files import CHECKED, CLIPS_PER_FILE, refuse_footer
 from flows.store.sealed import recorded_grid
@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     import pyarrow.dataset
 SCHEME = "musync"
 STORED = ("clips", "ticks", "frames", "pairs")
-MOST_ROWS = {"clips": 100_000, "pairs": 10_000_000}
+"""Tables of every dataset; one with road users has ``objects`` too."""
+MOST_ROWS = {"clips": 100_000, "pairs": 10_000_000, "objects": 10_000_000}
 """Rows of the tables that hold a dataset's clips, and the pairs of them, in one file [1]."""
 _WHOLE = re.compile(r"telemetry/(?P<table>clips|pairs)\.parquet")
 _PART = re.compile(r"telemetry/(?P<table>ticks|frames)/family=[a-z0-9_-]{1,64}/part-[0-9]{4,9}\.parquet")
@@ -55,6 +56,10 @@ def table_files(layout: Layout, manifest: Mapping[str, Any]) -> dict[str, dict[s
             problems.append(f"{layout}/manifest.json: {shorten_value(recorded)}: no place of a table's files")
             continue
         tables[named["table"]][recorded.removeprefix("telemetry/")] = layout.root / recorded
+    if recorded_grid(manifest["grid"], layout).has_objects:
+        # their records are the clips', which readers of tables leave aside
+        files = sorted((layout.telemetry / OBJECTS).glob("clip-*.parquet"))
+        tables[OBJECTS] = {f"{OBJECTS}/{path.name}": path for path in files}
     problems += [
         f"{layout}: the files of {table} are missing: musync lab repair makes them again"
         for table, files in tables.items()

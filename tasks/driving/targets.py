@@ -3,6 +3,9 @@
 from dataclasses import dataclass
 from math import cos, inf, isfinite, sin
 
+import numpy as np
+from numpy.typing import NDArray
+
 from tasks.errors import InputError
 
 
@@ -13,7 +16,7 @@ class Target:
     Parameters
     ----------
     station : of the end that the car meets [m]
-    speed : along the route [m/s]
+    speed, acceleration : along the route [m/s, m/s2]
     lateral : of its middle, left of the car's path positive [m]
     lateral_speed : to the left [m/s]
     width : across the route [m]
@@ -21,6 +24,7 @@ class Target:
 
     station: float
     speed: float = 0.0
+    acceleration: float = 0.0
     lateral: float = 0.0
     lateral_speed: float = 0.0
     width: float = 1.8
@@ -71,17 +75,37 @@ class TargetTrack:
         if problems:
             raise InputError(problems)
 
-    def find(self, time: float) -> Target:
-        """Return the target at a time since the start [s]."""
+    @property
+    def settles_at(self) -> float:
+        """Time from which the speed no longer changes; 0 where it never does [s]."""
+        if self.change_at == inf:
+            return 0.0
+        change = self.final_speed - self.speed
+        return self.change_at + (change / self.acceleration if self.acceleration * change > 0 else 0.0)
+
+    def trace(
+        self, time: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return way along the heading [m], speed along it [m/s] and acceleration [m/s2] at times, any shape each.
+
+        Parameters
+        ----------
+        time : since the start, 0 or more [s]
+        """
         change = self.final_speed - self.speed
         lasts = change / self.acceleration if self.acceleration * change > 0 else 0.0
-        since = max(time - self.change_at, 0.0)
-        within = min(since, lasts)
+        since = np.maximum(time - self.change_at, 0.0)
+        within = np.minimum(since, lasts)
         speed = self.speed + self.acceleration * within
-        way = self.speed * min(time, self.change_at) + 0.5 * (self.speed + speed) * within
-        way += speed * (since - within)
+        way = self.speed * np.minimum(time, self.change_at) + 0.5 * (self.speed + speed) * within
+        rate = np.where((since > 0) & (since < lasts), self.acceleration, 0.0)
+        return way + speed * (since - within), speed, rate
+
+    def find(self, time: float) -> Target:
+        """Return the target at a time since the start [s]."""
+        way, speed, rate = (float(value) for value in self.trace(np.float64(time)))
         ahead, aside = cos(self.heading), sin(self.heading)
         return Target(
-            station=self.station + ahead * way, speed=ahead * speed, lateral=self.lateral + aside * way,
-            lateral_speed=aside * speed, width=self.width,
+            station=self.station + ahead * way, speed=ahead * speed, acceleration=ahead * rate,
+            lateral=self.lateral + aside * way, lateral_speed=aside * speed, width=self.width,
         )  # fmt: skip
