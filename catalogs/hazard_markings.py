@@ -61,11 +61,11 @@ class MarkingEntry(CatalogueEntry):
             stripe_width=self.stripe_width.value,
             paint=_as_colour(self.paint),
             gap=_as_colour(self.gap),
-            patch=self.patch and _as_colour(self.patch),
+            patch=None if self.patch is None else _as_colour(self.patch),
             patch_margin=self.patch_margin.value if self.patch_margin else 0.0,
-            joint=self.joint and _as_colour(self.joint),
+            joint=None if self.joint is None else _as_colour(self.joint),
             joint_width=self.joint_width.value if self.joint_width else 0.0,
-            sign=self.sign and self.sign.build(),
+            sign=None if self.sign is None else self.sign.build(),
         )
 
 
