@@ -15,6 +15,7 @@ MEANINGS = {
     "frames": "a row a frame: the tick that it shows, the rig's pose, the recovered motion",
     "verdicts": "a row a clip: its pose check",
     "pairs": "a row two clips that differ in one control, and what that changes",
+    "objects": "a row a frame and road user: its boxes, its motion, how much of it is seen; empty without road users",
 }
 """Rows of each view."""
 FOLLOWING = re.compile("_(p05|p50|p95|change)$")

@@ -8,7 +8,7 @@ from catalogs.scenes.gaussian_files import read_gaussians
 from flows.making.catalogue import Catalogue
 from tasks.render.moving_bodies import MovingBody
 from tasks.scene.road_users.bodies import COARSEST_M, FINEST_M, build_road_user, wrap_own_body
-from tasks.scene.road_users.track import Motion
+from tasks.scene.road_users.motion import Motion
 
 CELL_PX = 2.5
 """Spacing of the discs of a body in the picture, where it is nearest [px]."""

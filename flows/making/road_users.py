@@ -14,7 +14,7 @@ from flows.making.driving import hazard_of, surface_of
 from flows.making.grid_entries import GridEntries
 from tasks.errors import InputError
 from tasks.scene.road_users.ground import find_meeting, find_obstacle, measure_ground
-from tasks.scene.road_users.track import Motion, move_on_track
+from tasks.scene.road_users.motion import Motion, move_on_track
 from tasks.scene.scene import Scene
 from tasks.surface.road_profile import road_elevation
 

@@ -7,7 +7,8 @@ from catalogs.entries import load
 from tasks.errors import InputError
 from tasks.scene.road_users.bodies import build_road_user, measure_extent
 from tasks.scene.road_users.ground import find_meeting, find_obstacle
-from tasks.scene.road_users.track import GRAVITY, Track, drive_track, move_on_track
+from tasks.scene.road_users.motion import move_on_track
+from tasks.scene.road_users.track import GRAVITY, Track, drive_track
 from tasks.scene.route import route_from_positions
 from tests.toy_street import toy_street
 
