@@ -5,8 +5,7 @@ from typing import Annotated
 from pydantic import AfterValidator
 
 from catalogs.quantities import CatalogueEntry, Scalar, Table, require_quantity
-from tasks.render.feature_sign import WarningSign
-from tasks.render.road_paint import HazardMarking
+from tasks.render.road_paint import HazardMarking, WarningSign
 
 
 def _check_colour(table: Table) -> Table:

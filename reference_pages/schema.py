@@ -13,6 +13,7 @@ MEANINGS = {
     "clips": "a row a clip: controls, surface, outcome, verdict",
     "ticks": "a row a millisecond of a clip: all physics",
     "frames": "a row a frame: the tick that it shows, the rig's pose, the recovered motion",
+    "objects": "a row a road user and frame: its boxes, motion and how much of it one sees",
     "verdicts": "a row a clip: its pose check",
     "pairs": "a row two clips that differ in one control, and what that changes",
     "objects": "a row a frame and road user: its boxes, its motion, how much of it is seen; empty without road users",

@@ -241,7 +241,7 @@ def _clip_row(
     absent: frozenset[str],
 ) -> dict[str, Any]:
     ticks, frames = tables
-    facts = seen | driven
+    facts = seen | driven | (_find_policys_brake(ticks) if constants.policy else {})
     frames = frames | {name: np.full(len(frames["t_ns"]), driven[name]) for name in DEPTHS if name in driven}
     holes = [name for c in finite_rows(ticks) if (name := f"ticks.{c}") not in absent]
     with np.errstate(all="ignore"):  # stored values may be infinite; a law that infinity enters is broken
@@ -257,6 +257,15 @@ def _clip_row(
         "not_finite": holes,
     }
     return row | contact
+
+
+def _find_policys_brake(ticks: dict[str, np.ndarray]) -> dict[str, float]:
+    """Where a policy first braked, and its highest pressure, in the place of a scenario's brake."""
+    pressed = np.flatnonzero(ticks["brake_pressure_mpa"] > 0)
+    if not pressed.size:
+        return {}
+    onset = DT * max(int(pressed[0]) - 1, 0)
+    return {"brake_onset_s": onset, "peak_pressure_mpa": float(ticks["brake_pressure_mpa"].max())}
 
 
 def find_route(scene: Mapping[str, Any]) -> RouteLine | None:

@@ -151,9 +151,11 @@ def edit_scene(
     carriageway = scene.carriageway_left, scene.carriageway_right
     gaussians = refine_road(scene.gaussians, relief)
     if marking is not None:
-        gaussians = paint_feature(gaussians, relief, marking, *carriageway, asphalt_albedo)
+        gaussians = paint_feature(gaussians, relief, marking, *carriageway, asphalt_albedo, scene.daylight)
         if marking.sign is not None:
-            gaussians = add_sign(gaussians, relief, marking.sign, scene.carriageway_right, asphalt_albedo)
+            gaussians = add_sign(
+                gaussians, relief, marking.sign, scene.carriageway_right, asphalt_albedo, scene.daylight
+            )
     return extend_kerbs(apply_road_profile(gaussians, relief, *carriageway)[0], relief), relief
 
 

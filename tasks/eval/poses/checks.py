@@ -259,6 +259,17 @@ def unusable_pixels(class_id: NDArray[np.uint8], film_depth_mm: float) -> NDArra
     return hidden[class_id]
 
 
+def hide_moving(depth: NDArray[np.floating], instances: NDArray[np.uint16]) -> NDArray[np.floating]:
+    """Return the depth without that of road users, which move as no camera does; no check reads a pixel without depth.
+
+    Parameters
+    ----------
+    depth : [F, H, W] camera z [m]
+    instances : uint16 [F, H, W] number of the road user that a pixel shows, as a dataset has it; 0 for none
+    """
+    return np.where(instances > 0, np.nan, depth).astype(depth.dtype)
+
+
 def glossy_pixels(class_id: NDArray[np.uint8]) -> NDArray[np.bool_]:
     """Return the pixels of vehicles, whose paint and panes mirror the street in soft gradients, and which may move.
 

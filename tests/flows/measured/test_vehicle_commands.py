@@ -81,7 +81,8 @@ def test_an_implausible_car_checks_with_1_and_a_sentence_each(musync, tmp_path):
     result = json.loads(done.out)
     assert (done.code, result["plausible"], result["without_source"]) == (1, False, [])
     assert [problem.split(" must")[0] for problem in result["problems"]] == [
-        "cg_height_over_wheelbase", "wheel_radius", "road_load", "dive_gradient", "tolerance of wheel_radius over its value",
+        "cg_height_over_wheelbase", "wheel_radius", "road_load", "dive_gradient",
+        "tolerance of wheel_radius over its value",
     ]  # fmt: skip
     assert result["tolerances"] == {"wheel_radius": 5 / 0.64}
     rows = {row["figure"]: row for row in result["figures"]}
