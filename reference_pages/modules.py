@@ -129,7 +129,11 @@ def write_module_page(title: str, introduction: str, objects: tuple[str, ...]) -
     parts = [f"# {title}\n\n{introduction}\n"]
     for path in objects:
         name = path.rsplit(".", 1)[-1]
-        public = f"musync.{name}" if path.startswith(("flows.reading", "flows.driving")) or name == "InputError" else path
+        public = (
+            f"musync.{name}"
+            if path.startswith(("flows.reading", "flows.driving")) or name == "InputError"
+            else path
+        )
         parts.append(f"\n## `{public}`\n\n::: {path}\n")
     return "".join(parts)
 

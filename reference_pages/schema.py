@@ -16,7 +16,6 @@ MEANINGS = {
     "objects": "a row a road user and frame: its boxes, motion and how much of it one sees",
     "verdicts": "a row a clip: its pose check",
     "pairs": "a row two clips that differ in one control, and what that changes",
-    "objects": "a row a frame and road user: its boxes, its motion, how much of it is seen; empty without road users",
 }
 """Rows of each view."""
 FOLLOWING = re.compile("_(p05|p50|p95|change)$")
