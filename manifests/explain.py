@@ -49,7 +49,9 @@ REACHES = {
 """Stages whose bytes an input can change; motion reaches the picture because the camera rides on the body."""
 STAGE_OF_CONTENT = (
     dict.fromkeys(("ticks", "label", "scenario", "seed", "split", "calibration"), VEHICLE)
-    | dict.fromkeys(("rgb", "depth", "class", "normal", "road", "flow", "marks"), RENDER)
+    | dict.fromkeys(
+        ("rgb", "depth", "class", "instance", "normal", "road", "flow", "marks", "objects"), RENDER
+    )
     | dict.fromkeys(("frames", "figures", "verdict"), JUDGING)
 )
 """Stage that makes each content of a clip, and from which on each of its records can change."""

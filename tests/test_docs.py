@@ -26,7 +26,7 @@ from tests.documents import DOCS, DOCUMENTS, list_blocks, list_command_lines, li
 OURS = {"musync", "flows", "manifests", "catalogs", "tasks"}
 NOT_OURS = {"clip", "dask_jobqueue", "dask_kubernetes"}
 """Modules of the documents' Python that only their readers have."""
-MOST_WORDS, MOST_LONG = 34_000, 0.015
+MOST_WORDS, MOST_LONG = 35_000, 0.015
 """Of all documents together: words, and the share of sentences of more than 30 words (``make size``)."""
 PARTS = ["tutorial", "how-to", "reference", "explanation", "evidence"]
 

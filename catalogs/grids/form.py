@@ -161,6 +161,15 @@ class GridFile(Blocks):
         return {"ticks": round(self.telemetry_s * TICK_RATE_HZ) + 1, "frames": self.frames}
 
     @property
+    def has_objects(self) -> bool:
+        """Whether any scenario has road users: then all clips have an array of instances and a table of objects."""
+        levels = [self.base, *self.scenarios.values()]
+        levels += [
+            level for axes in (self.axes, self.zip) for axis in axes.values() for level in axis.values()
+        ]
+        return any(level.objects for level in levels)
+
+    @property
     def keeps_stops_steady(self) -> bool:
         """Whether the numbers of ``catalogs/low_speed.yaml`` reach the motion; coupled mode has no such rule."""
         return self.vehicle_mode == "paper" and self.low_speed == "steady"

@@ -23,6 +23,8 @@ SCENES = define_option(
     spelling="scene",
 )
 
+STREETS = define_option("streets", int, "Streets of each kind, where no scene is named.", 4)
+
 
 def shorten_check(result: dict[str, Any]) -> dict[str, Any]:
     """Return the check with a row for each scene that has faults, and the figures that differ most."""
@@ -85,14 +87,14 @@ COMMANDS = (
         group=GROUP,
         sentence="Draw a sheet of scenes along their routes.",
         function="flows.making.scene_views:show_scenes",
-        options=(SCENES, define_option("out", str, "Folder for gallery.png."), BACKEND),
+        options=(SCENES, STREETS, define_option("out", str, "Folder for gallery.png."), BACKEND),
     ),
     Command(
         name="scene check",
         group=GROUP,
         sentence="Check scenes for holes, floating parts, a route off the road, and their scale.",
         function="flows.making.scene_views:check_scenes",
-        options=(SCENES, OUT, BACKEND),
+        options=(SCENES, STREETS, OUT, BACKEND),
         brief=shorten_check,
         passed=require_key("sound"),
     ),

@@ -6,14 +6,16 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from catalogs.entries import load
 from catalogs.scenario import Scenario, find_scenario_problems
-from catalogs.sentences import shorten_value
+from catalogs.sentences import describe_rules, shorten_value
 from flows.making.driving import hazard_of, surface_of
 from flows.making.grid_inputs import grade_of
-from tasks.driving.stepped import SteppedDrive
-from tasks.driving.targets import Target, TargetTrack
+from tasks.driving.outcome import Outcome, judge_approach
+from tasks.driving.stepped import DriveSettings, SteppedDrive
+from tasks.driving.targets import Target, TargetTrack, follow_track
 from tasks.errors import InputError
 from tasks.surface.road_profile import LEVEL_ROAD, RoadGrade
 from tasks.surface.state import SurfaceParameters
@@ -21,7 +23,7 @@ from tasks.vehicle.model.simulation import COLUMNS
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Rollout
 
-UNBRAKED = ("peak_pressure_mpa", "brake_onset_s", "brake_onset_m", "hold_speed")
+UNBRAKED = ("peak_pressure_mpa", "brake_onset_s", "brake_onset_m")
 """Fields of a scenario that a drive by steps has no use for: who steps brakes."""
 LEVEL_SCENES = (None, "street")
 
@@ -62,11 +64,11 @@ class Simulator:
 
     Parameters
     ----------
-    scenario : a `Scenario`, or its fields by name; the brake's are left out
+    scenario : a `Scenario`, or its fields by name, without the brake's; ``hold_speed`` lasts until the first pressure
     vehicle, surface : names of the catalogue, or files
     rate_hz : of the steps, whole milliseconds each [Hz]
     duration_s : longest drive, whole steps [s]
-    targets : tracks of road users ahead
+    targets : tracks of road users ahead, beside the ``objects`` of the scenario
     truth : whether observations have the truth
     grade : of the road; None takes that of the scenario's scene, level where it names none
 
@@ -95,11 +97,17 @@ class Simulator:
         self.state = surface_of(asked, surface)
         if grade is None:
             grade = LEVEL_ROAD if asked.scene in LEVEL_SCENES else grade_of(str(asked.scene))
-        self.rate_hz, self._targets, self._truth = float(rate_hz), tuple(targets), truth
-        self._drive = SteppedDrive(
-            car, self.state, initial_speed=asked.initial_speed_km_h / 3.6, duration_s=duration_s, rate_hz=rate_hz,
-            hazard=hazard_of(asked), grade=grade,
+        sizes = load("road user sizes") if asked.objects else {}
+        objects = [
+            follow_track(user.build_track(sizes[user.kind]), sizes[user.kind], self.state.friction)
+            for user in asked.objects
+        ]
+        self.rate_hz, self._targets, self._truth = float(rate_hz), (*objects, *targets), truth
+        settings = DriveSettings(
+            initial_speed=asked.initial_speed_km_h / 3.6, duration_s=duration_s, rate_hz=rate_hz,
+            hold_speed=asked.hold_speed, hazard=hazard_of(asked), grade=grade,
         )  # fmt: skip
+        self._drive = SteppedDrive(car, self.state, settings)
 
     def reset(self) -> Observation:
         """Begin anew."""
@@ -129,6 +137,17 @@ class Simulator:
         """Return a column of the model at every millisecond so far [its unit]."""
         return self._drive.read_column(name)
 
+    def judge(self, overhang: float, width: float) -> list[Outcome]:
+        """Return what became of the approach to each target so far.
+
+        Parameters
+        ----------
+        overhang : of the front bumper before the front axle [m]
+        width : of the car [m]
+        """
+        columns = [self.read_column(name) for name in ("station", "speed", "brake_pressure_mpa")]
+        return [judge_approach(*columns, track, overhang=overhang, width=width) for track in self._targets]
+
     def _observe(self) -> Observation:
         drive = self._drive
         read, time = drive.read, drive.time
@@ -151,7 +170,10 @@ def _check_scenario(scenario: Scenario | Mapping[str, Any]) -> Scenario:
             raise InputError(
                 f"scenario: there is no field {', '.join(map(shorten_value, unknown))}; there are {', '.join(known)}"
             )
-        scenario = Scenario(**scenario)
+        try:
+            scenario = Scenario.of(scenario)
+        except ValidationError as error:
+            raise InputError(describe_rules(error, "scenario: objects")) from None
     plain = Scenario()
     problems = [
         f"scenario: {name} is the controller's, who brakes step by step; it is {getattr(scenario, name)}: leave it out"

@@ -9,6 +9,7 @@ from catalogs.entries import open_entry
 from catalogs.grids import GridFile
 from catalogs.grids.form import BEFORE
 from catalogs.low_speed import LOW_SPEED, LOW_SPEED_CUT
+from catalogs.road_users import ROAD_USERS
 from catalogs.studies.ablation import ABLATION
 from catalogs.vehicles import open_vehicle
 from catalogs.weather.grip import WEATHER
@@ -49,6 +50,7 @@ INPUTS = (
         name="hazard_marking.yaml", kind="hazard marking", setting="hazard_marking",
         needed=lambda settings: settings.marked_features,
     ),
+    Input(name=ROAD_USERS, kind="road user sizes", needed=lambda settings: settings.has_objects),
     Input(name=LOW_SPEED, kind="low-speed rule", needed=lambda settings: settings.keeps_stops_steady),
     Input(name=WET_FRICTION, kind="wet friction", needed=lambda settings: settings.grips_by_speed),
     Input(name=ABLATION, kind="ablation", needed=lambda settings: settings.variant == "fixed-mu"),

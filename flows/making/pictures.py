@@ -12,6 +12,7 @@ from catalogs.scenario import Scenario
 from flows.making.catalogue import Catalogue
 from flows.making.driving import hazard_of, weather_of
 from flows.making.plan import Plan, frame_ticks
+from flows.making.road_users import build_moving_bodies, move_road_users
 from tasks.render.camera import RigAt, body_poses, continuous_rig
 from tasks.render.clip import RigMotion, render_clip
 from tasks.render.feature_sign import add_sign
@@ -82,14 +83,10 @@ def render_frames(
         catalogue.marking,
         catalogue.weather_parameters.sky.asphalt_albedo,
     )
-    return render_clip(
+    buffers = render_clip(
         replace(scene, gaussians=gaussians),
         catalogue.camera,
-        RigMotion(
-            T_world_rig=T_world_rig,
-            frame_rate_hz=plan.settings.frame_rate_hz,
-            rig_at=rig_at,
-        ),
+        gather_motion(scenario, state, frames, plan, catalogue, rig_at),
         ClipConditions(
             state=state,
             pavement=catalogue.surface,
@@ -102,6 +99,30 @@ def render_frames(
         relief=relief,
         labels=plan.settings.labels,
         composition=plan.settings.composition,
+    )
+    if plan.settings.has_objects and not scenario.objects:
+        buffers["instance"] = np.zeros(buffers["class"].shape, np.uint16)
+    return buffers
+
+
+def gather_motion(
+    scenario: Scenario,
+    state: SurfaceState,
+    frames: Mapping[str, NDArray[Any]],
+    plan: Plan,
+    catalogue: Catalogue,
+    rig_at: RigAt,
+) -> RigMotion:
+    """Return the motion of rig and road users at a clip's frames."""
+    sizes, time = catalogue.road_user_sizes, frames["tick"] / TICK_RATE_HZ
+    motions = move_road_users(scenario, sizes, catalogue.scene, state.friction, time)
+    T_world_rig, camera = frames["T_world_rig"].reshape(-1, 4, 4), catalogue.camera
+    seen_from = T_world_rig @ camera.T_rig_camera, float(camera.K[0, 0])
+    return RigMotion(
+        T_world_rig=T_world_rig,
+        frame_rate_hz=plan.settings.frame_rate_hz,
+        rig_at=rig_at,
+        bodies=build_moving_bodies(scenario, sizes, motions, *seen_from),
     )
 
 
@@ -129,9 +150,11 @@ def edit_scene(
     carriageway = scene.carriageway_left, scene.carriageway_right
     gaussians = refine_road(scene.gaussians, relief)
     if marking is not None:
-        gaussians = paint_feature(gaussians, relief, marking, *carriageway, asphalt_albedo)
+        gaussians = paint_feature(gaussians, relief, marking, *carriageway, asphalt_albedo, scene.daylight)
         if marking.sign is not None:
-            gaussians = add_sign(gaussians, relief, marking.sign, scene.carriageway_right, asphalt_albedo)
+            gaussians = add_sign(
+                gaussians, relief, marking.sign, scene.carriageway_right, asphalt_albedo, scene.daylight
+            )
     return extend_kerbs(apply_road_profile(gaussians, relief, *carriageway)[0], relief), relief
 
 

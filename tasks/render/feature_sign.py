@@ -1,16 +1,17 @@
 """The warning sign beside a road feature: what announces it where snow hides its marking."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from tasks.conventions import SemanticClass
 from tasks.render.road_edit import RoadRelief
-from tasks.render.weather.ground_grid import read_between
-from tasks.render.weather.scene_light import append_gaussians, ground_light, to_display_unclipped
+from tasks.render.road_paint import WarningSign, measure_white
+from tasks.render.weather.scene_light import append_gaussians, to_display_unclipped
 from tasks.scene.bodies.body import Body, Finish, join_discs, make_body
 from tasks.scene.bodies.solids import cover_surface
 from tasks.scene.gaussians import Gaussians
@@ -22,6 +23,8 @@ Floats = NDArray[np.float64]
 _CELL = 0.03
 _POST = 0.03
 """Radius of the post [m]."""
+_AROUND = 50
+"""Gaussians of the road whose light is the sign's [1]."""
 _BORDER = 0.11
 """Width of the red border by the side of the triangle [1]."""
 
@@ -35,35 +38,13 @@ class Part(IntEnum):
     METAL = 3
 
 
-@dataclass(frozen=True, kw_only=True)
-class WarningSign:
-    """A triangle on a post at the right of the carriageway, with a hump or a dip in black.
-
-    Parameters
-    ----------
-    side : of the triangle [m]
-    foot : height of its lower edge above the road [m]
-    offset : of its middle beyond the edge of the carriageway [m]
-    before : way from the sign to the feature [m]
-    border, field, symbol, metal : reflectance of its parts, linear red, green, blue [1]
-    """
-
-    side: float
-    foot: float
-    offset: float
-    before: float
-    border: tuple[float, float, float]
-    field: tuple[float, float, float]
-    symbol: tuple[float, float, float]
-    metal: tuple[float, float, float]
-
-
 def add_sign(
     gaussians: Gaussians,
     relief: RoadRelief,
     sign: WarningSign,
     carriageway_right: float,
     asphalt_albedo: float,
+    daylight: ArrayLike | None = None,
 ) -> Gaussians:
     """Return the street with a feature's sign, which comes last; it faces who drives along the route.
 
@@ -74,6 +55,7 @@ def add_sign(
     sign : its looks and place
     carriageway_right : lateral position of the carriageway's right edge [m]
     asphalt_albedo : reflectance of the road, from which the incident light follows [1]
+    daylight : [3, 3] as `Scene.daylight`; None where it is not known [1]
     """
     sinks = float(relief.elevation(np.array([(relief.near + relief.far) / 2]))[0]) < 0
     body = _build_sign(sign, sinks)
@@ -83,9 +65,10 @@ def add_sign(
     own = body.gaussians
     means = (own.means.astype(np.float64) + place) @ pose[:3, :3].T + pose[:3, 3]
     turn = Rotation.from_matrix(pose[:3, :3]) * Rotation.from_quat(own.quats_wxyz, scalar_first=True)
-    light = ground_light(gaussians, SemanticClass.ROAD)
-    here = read_between(light.grid, light.illumination, means[:, :2])
-    colour = body.albedo * (body.openness * here)[:, None] * light.lit / asphalt_albedo
+    road = np.flatnonzero(gaussians.class_id == SemanticClass.ROAD)
+    nearest = road[np.argsort(np.linalg.norm(gaussians.means[road] - means.mean(axis=0), axis=1))[:_AROUND]]
+    white = measure_white(gaussians, nearest, asphalt_albedo, daylight).mean(axis=0)
+    colour = body.albedo * body.openness[:, None] * white
     if gaussians.display_encoded:
         colour = to_display_unclipped(colour)
     sh = np.zeros((len(own), *gaussians.sh.shape[1:]), np.float32)
@@ -100,9 +83,8 @@ def add_sign(
     if gaussians.surroundings is not None:
         placed = add_surroundings(placed)
     if gaussians.light is not None:
-        nearest = np.argmin(np.linalg.norm(gaussians.means - means.mean(axis=0), axis=1))
-        placed = replace(placed, light=np.tile(gaussians.light[nearest], (len(own), 1)))
-    missing = {
+        placed = replace(placed, light=np.tile(gaussians.light[nearest].mean(axis=0), (len(own), 1)))
+    missing: dict[str, Any] = {
         member.name: np.zeros((len(own), *value.shape[1:]), value.dtype)
         for member in fields(Gaussians)
         if isinstance(value := getattr(gaussians, member.name), np.ndarray)

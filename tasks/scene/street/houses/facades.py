@@ -19,7 +19,7 @@ from tasks.scene.street.surfels import Surfels, graded_cells, join_surfels, tile
 
 Floats = NDArray[np.float64]
 
-_CELL = (17.0, 11.0)
+_CELL = (18.0, 12.0)
 """Largest width and height of a wall cell where it is seen closest [px]."""
 _RECESS = np.array([0.0, -0.03, 0.10, 0.14, -0.06, -0.08, -0.04])
 """Distance of each part behind the wall's surface [m]."""
@@ -117,4 +117,4 @@ def _cut_bays(
 def _cut_pattern(pattern: Pattern, cell: float) -> tuple[Floats, Floats, NDArray[np.int64]]:
     """Cut cells along one side of a grid: walls finely at their ends, panes and boards evenly."""
     alike = np.array([part in (Part.GLASS, Part.SIGN, Part.PLINTH) for _, part in pattern])
-    return graded_cells(np.cumsum([0.0, *(size for size, _ in pattern)]), cell, np.where(alike, 1.0, 0.33))
+    return graded_cells(np.cumsum([0.0, *(size for size, _ in pattern)]), cell, np.where(alike, 1.0, 0.36))
