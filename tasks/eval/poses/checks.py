@@ -284,14 +284,3 @@ def glossy_pixels(class_id: NDArray[np.uint8]) -> NDArray[np.bool_]:
     bool [F, H, W]
     """
     return class_id == SemanticClass.VEHICLE
-
-
-def hide_moving(depth: NDArray[np.floating], instances: NDArray[np.uint16]) -> NDArray[np.floating]:
-    """Return the depth without that of road users, which move as no camera does; no check reads a pixel without depth.
-
-    Parameters
-    ----------
-    depth : [F, H, W] camera z [m]
-    instances : uint16 [F, H, W] number of the road user that a pixel shows, as a dataset has it; 0 for none
-    """
-    return np.where(instances > 0, np.nan, depth).astype(depth.dtype)

@@ -2,12 +2,15 @@
 
 from dataclasses import dataclass
 from math import inf
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tasks.errors import InputError
-from tasks.scene.route import Route
+
+if TYPE_CHECKING:  # a question of a dataset needs no splines
+    from tasks.scene.route import Route
 
 GRAVITY = 9.80665
 """Standard acceleration of free fall [m/s2]."""
@@ -88,7 +91,7 @@ def drive_track(track: Track, time: Floats, friction: float) -> tuple[Floats, Fl
     return way + speed * (since - within), speed, np.where((since > 0) & (since < lasts), rate, 0.0)
 
 
-def move_on_track(track: Track, route: Route, time: Floats, friction: float) -> Motion:
+def move_on_track(track: Track, route: "Route", time: Floats, friction: float) -> Motion:
     """Return the motion of a body on its track; it stands on the plane of the route.
 
     Parameters
@@ -120,7 +123,7 @@ def move_on_track(track: Track, route: Route, time: Floats, friction: float) -> 
     )
 
 
-def _trace_line(track: Track, route: Route, along: Floats) -> Floats:
+def _trace_line(track: Track, route: "Route", along: Floats) -> Floats:
     """Return the poses [M, 4, 4] at ways along the line, in stations, as far as it lies on the route."""
     cos, sin = np.cos(track.heading), np.sin(track.heading)
     turn = np.eye(4)
@@ -140,7 +143,7 @@ def _trace_line(track: Track, route: Route, along: Floats) -> Floats:
     return poses @ turn
 
 
-def _count_inside(station: Floats, route: Route) -> int:
+def _count_inside(station: Floats, route: "Route") -> int:
     """Return how many of the stations lie on the route before the first that does not."""
     outside = (station < 0) | (station > route.length)
     if len(outside) and outside[0]:

@@ -8,6 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import musync
+from catalogs.entries import load
 from flows.auditing.audit import audit_dataset
 from flows.exporting.export import export_dataset
 from flows.making.generate import generate_dataset
