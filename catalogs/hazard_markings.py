@@ -31,16 +31,7 @@ class SignEntry(CatalogueEntry):
 
     def build(self) -> WarningSign:
         """The sign itself."""
-        return WarningSign(
-            side=self.side.value,
-            foot=self.foot.value,
-            offset=self.offset.value,
-            before=self.before.value,
-            border=_as_colour(self.border),
-            field=_as_colour(self.field),
-            symbol=_as_colour(self.symbol),
-            metal=_as_colour(self.metal),
-        )
+        return WarningSign(**self.numbers())
 
 
 class MarkingEntry(CatalogueEntry):
@@ -57,18 +48,4 @@ class MarkingEntry(CatalogueEntry):
 
     def build(self) -> HazardMarking:
         """The marking itself."""
-        return HazardMarking(
-            stripe_width=self.stripe_width.value,
-            paint=_as_colour(self.paint),
-            gap=_as_colour(self.gap),
-            patch=self.patch and _as_colour(self.patch),
-            patch_margin=self.patch_margin.value if self.patch_margin else 0.0,
-            joint=self.joint and _as_colour(self.joint),
-            joint_width=self.joint_width.value if self.joint_width else 0.0,
-            sign=self.sign and self.sign.build(),
-        )
-
-
-def _as_colour(table: Table) -> tuple[float, float, float]:
-    red, green, blue = table.value
-    return red, green, blue
+        return HazardMarking(**self.numbers(), sign=None if self.sign is None else self.sign.build())

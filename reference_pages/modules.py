@@ -129,11 +129,8 @@ def write_module_page(title: str, introduction: str, objects: tuple[str, ...]) -
     parts = [f"# {title}\n\n{introduction}\n"]
     for path in objects:
         name = path.rsplit(".", 1)[-1]
-        public = (
-            f"musync.{name}"
-            if path.startswith(("flows.reading", "flows.driving")) or name == "InputError"
-            else path
-        )
+        offered = path.startswith(("flows.reading", "flows.driving")) or name == "InputError"
+        public = f"musync.{name}" if offered else path
         parts.append(f"\n## `{public}`\n\n::: {path}\n")
     return "".join(parts)
 

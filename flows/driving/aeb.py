@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import chain, islice, product
 from math import pi
 from typing import Any
 
@@ -134,19 +134,25 @@ def drive_approach(
             initial_speed=case.speed, duration_s=LONGEST_S, rate_hz=table.car.rate_hz.value, hold_speed=True
         ),
     )  # fmt: skip
-    for target in case.track.follow(np.arange(drive.steps) / table.car.rate_hz.value):
-        time, speed = drive.time, drive.read("speed")
-        bumper = drive.read("station") + overhang
-        if bumper >= target.station or drive.stop_time <= time:
-            break
-        if line.is_demanded and speed <= target.speed and time >= case.track.settles_at:
-            break
-        if not line.is_demanded and trigger.demands(
-            Approach(time=time, bumper=bumper, speed=speed, width=width, targets=(target,))
+    step = 1.0 / table.car.rate_hz.value
+    looks = case.track.follow(np.arange(drive.steps) * step)
+    # until a brake acts the speed is held, and the car is where it would be: those steps are driven at once
+    for held, target in enumerate(looks):
+        bumper = overhang + case.speed * held * step
+        unbraked = bumper >= target.station
+        if unbraked or trigger.demands(
+            Approach(time=held * step, bumper=bumper, speed=case.speed, width=width, targets=(target,))
         ):
-            line.demand(time)
+            break
+    drive.advance(0.0, max(held + unbraked, 1))
+    line.demand(held * step)
+    for seen in () if unbraked else islice(chain((target,), looks), drive.step_count - held, None):
+        time, speed = drive.time, drive.read("speed")
+        met = drive.read("station") + overhang >= seen.station
+        if met or drive.stop_time <= time or (speed <= seen.speed and time >= case.track.settles_at):
+            break
         # a step holds one pressure: that of its middle
-        drive.advance(line.pressure_at(time + 0.5 / table.car.rate_hz.value))
+        drive.advance(line.pressure_at(time + 0.5 * step))
     columns = (drive.read_column(name) for name in ("station", "speed", "brake_pressure_mpa"))
     return judge_approach(*columns, case.track, overhang=overhang, width=width)
 

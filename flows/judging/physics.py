@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from catalogs.scenes import load_scene
+from catalogs.scenes import load_route
 from catalogs.studies.ablation import cut_coupling
 from catalogs.variants import warn_of_variant
 from flows.judging.physics_constants import read_constants
@@ -277,7 +277,7 @@ def find_route(scene: Mapping[str, Any]) -> RouteLine | None:
     """
     try:
         refuse_changed_scene(scene)
-        route = load_scene(find_scene(scene)).route
+        route = load_route(find_scene(scene))
     except InputError:
         return None
     return RouteLine(station=route.station, T_world_rig=route.T_world_rig)

@@ -8,7 +8,7 @@ from catalogs.grids import Grid
 from catalogs.physical_limits import find_limit_problem
 from catalogs.road_grade import name_grade_file, write_road_grade
 from catalogs.scenario import find_range_problems, find_route_problems, find_scenario_problems
-from catalogs.scenes import load_scene, scene_identity
+from catalogs.scenes import load_route, scene_identity
 from catalogs.sentences import cap_problems
 from catalogs.street_names import parse_street_name
 from catalogs.studies.ablation import cut_coupling
@@ -191,7 +191,7 @@ def _find_feature_problems(grid: Grid, vehicle: Vehicle) -> list[str]:
 
 def grade_of(scene: str) -> RoadGrade:
     """Return the grade of the road in a scene, which is named as of `catalogs.scenes.load_scene`."""
-    return sample_grade(load_scene(scene).route)
+    return sample_grade(load_route(scene))
 
 
 def _find_route_problems(grid: Grid, scenes: Scenes) -> list[str]:
@@ -199,7 +199,7 @@ def _find_route_problems(grid: Grid, scenes: Scenes) -> list[str]:
     limit = load("table of physical limits").road_grade
     for named in scenes:
         scene = named or grid.settings.scene
-        route = load_scene(scene).route
+        route = load_route(scene)
         steepest = max(map(abs, sample_grade(route).rise))
         if problem := find_limit_problem("grade of the road", steepest, limit):
             problems[scene] = f"scene {scene}: {problem}: its z axis must point up, against gravity"

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from math import isnan
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -216,17 +217,23 @@ def _measure_holes(
     K: NDArray[np.float64],
     alpha: NDArray[np.float32],
 ) -> float:
-    """Return the share of the carriageway's points ahead whose pixel is not opaque [1]; 0 where none is seen."""
+    """Return the share of the carriageway's pixels that are not opaque [1]; 0 where none is seen.
+
+    The outermost pixel is left out: at its edge, and on a crest, the sky shares it.
+    """
     ahead = np.arange(station + AHEAD[0], min(station + AHEAD[1], scene.route.length), 0.5)
-    lateral = np.arange(scene.carriageway_right + 0.3, scene.carriageway_left - 0.3, 0.4)
-    if not len(ahead) or not len(lateral):
-        return 0.0
     poses = scene.route.pose(ahead)
-    points = poses[:, None, :3, 3] + lateral[None, :, None] * poses[:, None, :3, 1]
+    edges = np.array([scene.carriageway_right + 0.3, scene.carriageway_left - 0.3])
+    points = poses[:, None, :3, 3] + edges[None, :, None] * poses[:, None, :3, 1]
     x, y, z = np.moveaxis(points @ viewmat[:3, :3].T + viewmat[:3, 3], -1, 0)
-    column, row = (np.floor(K[k, k] * value / z + K[k, 2]).astype(int) for k, value in ((0, x), (1, y)))
-    seen = (z > 1) & (column >= 0) & (column < alpha.shape[1]) & (row >= 0) & (row < alpha.shape[0])
-    return float(np.mean(alpha[row[seen], column[seen]] < SEEN)) if seen.any() else 0.0
+    pixels = (
+        np.stack([K[0, 0] * x / z + K[0, 2], K[1, 1] * y / z + K[1, 2]], axis=-1).round().astype(np.int32)
+    )
+    road = np.zeros(alpha.shape, np.uint8)
+    for k in np.flatnonzero((z[1:] > 1).all(axis=1) & (z[:-1] > 1).all(axis=1)):
+        cv2.fillConvexPoly(road, np.stack([*pixels[k], *pixels[k + 1][::-1]]), 1)
+    inside = cv2.erode(road, np.ones((3, 3), np.uint8), borderValue=1).astype(bool)
+    return float(np.mean(alpha[inside] < SEEN)) if inside.any() else 0.0
 
 
 def _coarsen(picture: NDArray[np.uint8]) -> NDArray[np.float64]:

@@ -9,7 +9,7 @@ import io
 import os
 import re
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,12 +17,11 @@ from typing import TYPE_CHECKING, Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 from fsspec import AbstractFileSystem  # type: ignore[import-untyped]
-from pyarrow import dataset
 
 from catalogs.sentences import shorten, shorten_value
 from flows.reading.views import list_absent
 from flows.store.layout import OBJECTS, Layout
-from flows.store.missing import has_nulls, null_missing
+from flows.store.missing import has_nulls
 from flows.store.parquet_files import CHECKED, CLIPS_PER_FILE, refuse_footer
 from flows.store.sealed import recorded_grid
 from tasks.errors import InputError
@@ -111,7 +110,7 @@ def open_stored_table(layout: Layout, manifest: Mapping[str, Any], table: str) -
         opened = dataset.dataset(paths, schema=schema, format=checked, partitioning=partitioning)
         if has_nulls(stored):
             return opened
-        from flows.reading.table_files import OlderTable
+        from flows.reading.older_tables import OlderTable
 
         return OlderTable(list(opened.get_fragments()), schema, checked, opened.filesystem)
     except (pa.ArrowException, OSError) as error:
@@ -208,24 +207,3 @@ class _TableFile(io.RawIOBase):
         if not self.closed:
             os.close(self._descriptor)
         super().close()
-
-
-class OlderTable(dataset.FileSystemDataset):
-    """A lazy pyarrow dataset whose rows have NULL in place of NaN before a filter sees them.
-
-    The files' statistics leave NaN out, so no filter is handed down to them.
-    """
-
-    def scanner(
-        self, columns: Sequence[str] | None = None, filter: dataset.Expression | None = None, **options: Any
-    ) -> dataset.Scanner:
-        """Return a scanner over the rows, as `pyarrow.dataset.Dataset.scanner`.
-
-        Parameters
-        ----------
-        columns, filter, options : as pyarrow takes them
-        """
-        batches = map(null_missing, super().scanner().to_batches())
-        return dataset.Scanner.from_batches(
-            batches, schema=self.schema, columns=columns, filter=filter, **options
-        )

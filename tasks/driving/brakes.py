@@ -217,11 +217,6 @@ class BrakeLine:
         """Put the brake on, for good [s]."""
         self._demanded_at = min(self._demanded_at, time)
 
-    @property
-    def is_demanded(self) -> bool:
-        """Whether the brake has been put on."""
-        return self._demanded_at < inf
-
     def pressure_at(self, time: float) -> float:
         """Return the pressure at a time [s] [MPa]."""
         since = time - self._demanded_at - self.delay

@@ -147,39 +147,40 @@ class SteppedDrive:
         )  # fmt: skip
         self._state, self._history[0] = run.states[0], run.history[0]
 
-    def advance(self, pressure_mpa: float) -> None:
-        """Drive one step.
+    def advance(self, pressure_mpa: float, steps: int = 1) -> None:
+        """Drive one step, or several at one pressure.
 
         Parameters
         ----------
         pressure_mpa : that the brake is told when the step begins [MPa]
+        steps : how many, at least 1
 
         Raises
         ------
         InputError
             For a pressure that no brake has, or a drive that has ended.
         """
-        if self.step_count == self.steps:
+        if self.step_count + steps > self.steps:
             raise InputError(f"the drive has ended after {self._settings.duration_s:g} s: begin anew")
         if not 0.0 <= pressure_mpa <= HIGHEST_PRESSURE_MPA:  # a NaN too
             raise InputError(
                 f"brake pressure must be a number within 0 to {HIGHEST_PRESSURE_MPA:g} MPa; it is {pressure_mpa}"
             )
         self._held = self._held and pressure_mpa == 0.0
-        first = self.step_count * self.ticks_per_step
-        known = LATE + PER_TICK * (first + self.ticks_per_step)
-        self._trace[known - PER_TICK * self.ticks_per_step : known] = pressure_mpa
+        first, ticks = self.step_count * self.ticks_per_step, steps * self.ticks_per_step
+        known = LATE + PER_TICK * (first + ticks)
+        self._trace[known - PER_TICK * ticks : known] = pressure_mpa
         run = simulate(
             self._vehicle, self._response,
             make_trace_input(self._trace[:known], INTERNAL_STEP_S)._replace(hold_speed=self._held), self._conditions,
             Recording(
-                samples=self.ticks_per_step + 1, interval=1 / TICKS_PER_S, substeps=PER_TICK, keep_states=True
+                samples=ticks + 1, interval=1 / TICKS_PER_S, substeps=PER_TICK, keep_states=True
             ),
             start=self._state,
         )  # fmt: skip
-        self._history[first : first + self.ticks_per_step + 1] = run.history
+        self._history[first : first + ticks + 1] = run.history
         self._state, self._stop = run.states[-1], run.stop
-        self.step_count += 1
+        self.step_count += steps
 
     @property
     def time(self) -> float:

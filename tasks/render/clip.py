@@ -83,6 +83,7 @@ def render_clip(
         gaussians=scene.gaussians,
         environment=scene.environment,
         route=scene.route,
+        lanes=scene.lanes,
         relief=relief,
         to_sun=scene.to_sun,
         daylight=scene.daylight,

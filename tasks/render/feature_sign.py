@@ -2,6 +2,7 @@
 
 from dataclasses import fields, replace
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -83,7 +84,7 @@ def add_sign(
         placed = add_surroundings(placed)
     if gaussians.light is not None:
         placed = replace(placed, light=np.tile(gaussians.light[nearest].mean(axis=0), (len(own), 1)))
-    missing = {
+    missing: dict[str, Any] = {
         member.name: np.zeros((len(own), *value.shape[1:]), value.dtype)
         for member in fields(Gaussians)
         if isinstance(value := getattr(gaussians, member.name), np.ndarray)

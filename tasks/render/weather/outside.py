@@ -14,10 +14,11 @@ from tasks.render.weather.random_streams import unit_number
 from tasks.render.weather.skies import Daylight
 from tasks.render.weather.sky import (
     SkyLight,
-    balance_white,
+    draw_camera_colours,
     expose_light,
     replace_sky,
     row_elevations,
+    see_in_colours,
     sky_light,
     sunny_light,
 )
@@ -119,8 +120,7 @@ def make_outside(
     opened = expose_light(strength, p.sky, seed)
     if daylight is not None and daylight.has_sun:
         rows = np.float32(opened) * draw_sunny_sky(daylight, p.sky.clouds, seed, *above)
-        sky = balance_white(sunny_light(white, strength * opened, rows, ground), p.sky, seed)
-        rows = rows * (sky.white / (strength * opened * white)).astype(np.float32)
+        sky = sunny_light(white, strength * opened, rows, ground)
     else:
         rise = p.sky.zenith_gradient * (1 + p.sky.gradient_spread * (2 * unit_number(seed, "gradient") - 1))
         true = daylight is not None
@@ -133,9 +133,12 @@ def make_outside(
             true_colours=true,
             zenith_gradient=rise,
         )
-        sky = balance_white(sky, p.sky, seed)
         fade = xi_atm.extinction * p.sky.cloud_base_m
         rows = draw_closed_sky(sky.airlight, sky.gradient, fade, p.sky.clouds, seed, *above)
+    colours = draw_camera_colours(p.sky, seed)
+    sky = see_in_colours(sky, colours)
+    seen = [sum(np.float32(row[c]) * rows[..., c] for c in range(3)) for row in colours]
+    rows = np.maximum(np.stack(seen, axis=-1), np.float32(0))
     return Outside(
         look=look,
         road=xi_road,

@@ -28,8 +28,9 @@ class SkyParameters:
     sun : how sunlight comes through the air
     clouds : how sky and cloud look
     exposure_compensation : share of the light's loss, in stops, by which the camera opens [1]
+    least_vividness, largest_vividness : range of the saturation that a clip's camera gives, by that of the light [1]
     exposure_spread_ev : largest error of the camera's metering, which a clip draws [EV]
-    white_balance_spread : largest error of its red and of its blue gain, which a clip draws [1]
+    white_balance_spread : largest error of its red gain, which a clip draws; that of blue is its opposite [1]
     cloud_transmittance : light under full cloud by light under clear sky, where hardly anything falls [1]
     rain_cloud_transmittance : the same under the thick cloud of heavy precipitation [1]
     thickening_mm_h : rate over which the cloud grows from the one to the other [mm/h]
@@ -51,6 +52,8 @@ class SkyParameters:
     exposure_compensation: float
     exposure_spread_ev: float
     white_balance_spread: float
+    least_vividness: float
+    largest_vividness: float
     cloud_transmittance: float
     rain_cloud_transmittance: float
     thickening_mm_h: float
@@ -215,22 +218,34 @@ def expose_light(strength: float, parameters: SkyParameters, seed: int) -> float
     return float(strength**-parameters.exposure_compensation * 2**error)
 
 
-def balance_white(sky: SkyLight, parameters: SkyParameters, seed: int) -> SkyLight:
-    """Return the light as a camera sees it whose white balance is off, as that of each clip is.
+def draw_camera_colours(parameters: SkyParameters, seed: int) -> NDArray[np.float64]:
+    """Return how a clip's camera renders colours: linear light to linear light, float64 [3, 3] [1].
+
+    Parameters
+    ----------
+    parameters : largest error of its white balance, and its vividness
+    seed : visual seed of the clip [1]
+    """
+    p = parameters
+    warmer = p.white_balance_spread * (2 * unit_number(seed, "white balance") - 1)
+    vivid = p.least_vividness + (p.largest_vividness - p.least_vividness) * unit_number(seed, "vividness")
+    grey = np.outer(np.ones(3), LUMINANCE)
+    return np.array((1 + warmer, 1.0, 1 - warmer))[:, None] * (vivid * np.eye(3) + (1 - vivid) * grey)
+
+
+def see_in_colours(sky: SkyLight, colours: NDArray[np.float64]) -> SkyLight:
+    """Return the light as a camera renders it.
 
     Parameters
     ----------
     sky : the light
-    parameters : largest error of the gains
-    seed : visual seed of the clip [1]
+    colours : of `draw_camera_colours`
     """
-    red, blue = (2 * unit_number(seed, f"white balance {one}") - 1 for one in ("red", "blue"))
-    gain = 1 + parameters.white_balance_spread * np.array((red, 0.0, blue))
-    return replace(
-        sky,
-        relight=gain[:, None] * sky.relight,
-        **{name: gain * getattr(sky, name) for name in ("white", "zenith", "airlight", "ground")},
-    )
+    seen = {
+        name: np.maximum(colours @ getattr(sky, name), 0)
+        for name in ("white", "zenith", "airlight", "ground")
+    }
+    return replace(sky, relight=colours @ sky.relight, **seen)
 
 
 def replace_sky(

@@ -62,7 +62,7 @@ def detail_cars(
         cell = next(level for level in LEVELS if level >= spacing)
         rows = first + np.flatnonzero(owners == number)
         gone.append(rows)
-        coarse = {
+        coarse: dict[str, Any] = {
             member.name: value[rows]
             for member in fields(Gaussians)
             if isinstance(value := getattr(gaussians, member.name), np.ndarray)
