@@ -95,13 +95,16 @@ class Simulator:
     ) -> None:
         self.scenario = asked = _check_scenario(scenario)
         car = vehicle if isinstance(vehicle, Vehicle) else load("vehicle", vehicle)
-        if not isinstance(surface, SurfaceParameters):
-            surface = load("wet friction").apply(load("surface", surface))
-        self.state = surface_of(asked, surface)
+        pavement: SurfaceParameters = (
+            surface
+            if isinstance(surface, SurfaceParameters)
+            else load("wet friction").apply(load("surface", surface))
+        )
+        self.state = surface_of(asked, pavement)
         grade = LEVEL_ROAD if asked.scene in (None, LEVEL_SCENE) else grade_of(str(asked.scene))
         sizes = load("road user sizes") if asked.objects else {}
         objects = [
-            follow_track(user.build_track(sizes[user.kind]), sizes[user.kind], self.state.friction)
+            follow_track(user.build_track(size := user.choose_size(sizes)), size, self.state.friction)
             for user in asked.objects
         ]
         self.rate_hz, self._targets, self._truth = float(rate_hz), (*objects, *targets), truth
@@ -114,7 +117,7 @@ class Simulator:
         if camera is not None:
             scene = asked.scene or LEVEL_SCENE
             self._camera = StepCamera(
-                asked, self.state, surface, car, scene=scene, camera=camera, rate_hz=rate_hz
+                asked, self.state, pavement, car, scene=scene, camera=camera, rate_hz=rate_hz
             )
 
     def reset(self) -> Observation:
@@ -153,8 +156,13 @@ class Simulator:
         overhang : of the front bumper before the front axle [m]
         width : of the car [m]
         """
-        columns = [self.read_column(name) for name in ("station", "speed", "brake_pressure_mpa")]
-        return [judge_approach(*columns, track, overhang=overhang, width=width) for track in self._targets]
+        station, speed, pressure = (
+            self.read_column(name) for name in ("station", "speed", "brake_pressure_mpa")
+        )
+        return [
+            judge_approach(station, speed, pressure, track, overhang=overhang, width=width)
+            for track in self._targets
+        ]
 
     def _observe(self) -> Observation:
         drive = self._drive

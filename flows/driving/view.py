@@ -1,6 +1,7 @@
 """The picture of a drive by steps: what its camera sees when a step begins."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +11,12 @@ from catalogs.scenario import Scenario
 from catalogs.scenes import load_scene
 from catalogs.weather.grip import WEATHER
 from catalogs.weather.look import load_weather
+from flows.making.bodies import build_moving_bodies
 from flows.making.driving import hazard_of
 from flows.making.pictures import edit_scene
-from flows.making.road_users import build_moving_bodies, move_road_users
+from flows.making.road_users import move_road_users
 from tasks.errors import InputError
-from tasks.render.camera import body_poses
+from tasks.render.camera import Camera, body_poses
 from tasks.render.clip import RigMotion, render_clip
 from tasks.render.rasterise.backend import select_backend
 from tasks.render.weather.layers import ClipConditions
@@ -46,8 +48,9 @@ class StepCamera:
         camera: str, rate_hz: float,
     ) -> None:  # fmt: skip
         self._scenario, self._vehicle, self._rate = scenario, vehicle, rate_hz
-        self._camera, self._scene = load("camera", camera), load_scene(scene)
-        if self._camera.moves:
+        self.camera: Camera = load("camera", camera)
+        self._scene = load_scene(scene)
+        if self.camera.moves:
             raise InputError(
                 f"camera {camera}: moves while it sees a picture, which a drive by steps cannot show"
             )
@@ -57,7 +60,13 @@ class StepCamera:
         )
         self._edited = replace(self._scene, gaussians=gaussians)
         self._conditions = ClipConditions(state=state, pavement=pavement, parameters=parameters, seed=SEED)
-        self._sizes = load("road user sizes") if scenario.objects else {}
+        self.road_user_sizes: dict[str, tuple[float, ...]] = (
+            load("road user sizes") if scenario.objects else {}
+        )
+
+    def own_body(self, name: str) -> Path:
+        """Return the file of a body of the user's: the scenario's path."""
+        return Path(name)
 
     def see(
         self, step: int, station: NDArray[np.float64], heave: NDArray[np.float64], pitch: NDArray[np.float64]
@@ -74,16 +83,15 @@ class StepCamera:
             cg_height=self._vehicle.cg_height,
         )  # fmt: skip
         time = np.maximum(np.array([step - 1, step]), 0) / self._rate
-        seen_from = poses @ self._camera.T_rig_camera, float(self._camera.K[0, 0])
         motions = move_road_users(
-            self._scenario, self._sizes, self._scene, self._conditions.state.friction, time
+            self._scenario, self.road_user_sizes, self._scene, self._conditions.state.friction, time
         )
         motion = RigMotion(
             T_world_rig=poses, frame_rate_hz=self._rate, first_frame=step - 1,
-            bodies=build_moving_bodies(self._scenario, self._sizes, motions, *seen_from),
+            bodies=build_moving_bodies(self._scenario, self, motions, poses @ self.camera.T_rig_camera),
         )  # fmt: skip
         drawn = render_clip(
-            self._edited, self._camera, motion, self._conditions, select_backend("auto"), relief=self._relief
+            self._edited, self.camera, motion, self._conditions, select_backend("auto"), relief=self._relief
         )
         picture: NDArray[np.uint8] = drawn["rgb"][-1].astype(np.uint8, copy=False)
         return picture
