@@ -1,11 +1,15 @@
 """The bodies of a clip's road users: built in as fine as the camera comes near, or a user's own."""
 
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import NDArray
 
 from catalogs.scenario import Scenario
 from catalogs.scenes.gaussian_files import read_gaussians
-from flows.making.catalogue import Catalogue
+from tasks.render.camera import Camera
 from tasks.render.moving_bodies import MovingBody
 from tasks.scene.road_users.bodies import COARSEST_M, FINEST_M, build_road_user, wrap_own_body
 from tasks.scene.road_users.motion import Motion
@@ -14,15 +18,30 @@ CELL_PX = 2.5
 """Spacing of the discs of a body in the picture, where it is nearest [px]."""
 
 
+class BodySource(Protocol):
+    """What bodies are built from: sizes by kind [m], bodies of the user's by name, and the camera that sees them."""
+
+    @property
+    def road_user_sizes(self) -> Mapping[str, tuple[float, ...]]:
+        """Kind to length, width and height [m]."""
+
+    @property
+    def camera(self) -> Camera:
+        """The camera."""
+
+    def own_body(self, name: str) -> Path:
+        """Return the file of a body that a scenario names."""
+
+
 def build_moving_bodies(
-    scenario: Scenario, catalogue: Catalogue, motions: list[Motion], T_world_camera: NDArray[np.float64]
+    scenario: Scenario, catalogue: BodySource, motions: list[Motion], T_world_camera: NDArray[np.float64]
 ) -> list[MovingBody]:
     """Return the bodies of a scenario's road users on their way; numbers count from 1 in its order.
 
     Parameters
     ----------
     scenario : of the clip
-    catalogue : of the dataset
+    catalogue : of the dataset, or of a drive by steps
     motions : of each, at the frames
     T_world_camera : float64 [F, 4, 4] poses of the camera, which decide how fine a body is [m]
     """
