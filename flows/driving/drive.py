@@ -38,7 +38,8 @@ def drive_grid(
     Returns
     -------
     As `make_dataset`, and ``policy`` with its ``source_sha256``; of scenarios with road users ``outcomes[]``: scenario,
-    number and kind of the road user, ``collided``, ``impact_km_h``, ``min_ttc_s``, ``clearance_m``, ``avoided_km_h``.
+    number and kind of the road user, ``collided``, ``impact_speed_km_h``, ``min_ttc_s``, ``clearance_m``,
+    ``avoided_km_h``.
 
     Raises
     ------

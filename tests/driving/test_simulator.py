@@ -197,8 +197,8 @@ def test_a_policy_sees_the_road_users_of_a_grid_and_the_result_says_what_became_
     result = drive_grid("car.yaml", f"{folder}:Once", "data", pictures=False, runner="threads", workers=1)
     (outcome,) = result["outcomes"]
     assert (outcome["scenario"], outcome["number"], outcome["kind"]) == ("dry", 1, "car")
-    assert outcome["collided"] and 40 < outcome["impact_km_h"] < 50
-    assert outcome["avoided_km_h"] == pytest.approx(50 - outcome["impact_km_h"], abs=0.02)
+    assert outcome["collided"] and 40 < outcome["impact_speed_km_h"] < 50
+    assert outcome["avoided_km_h"] == pytest.approx(50 - outcome["impact_speed_km_h"], abs=0.02)
 
 
 def test_a_grid_that_brakes_by_itself_is_refused(folder, tmp_path):
