@@ -73,7 +73,8 @@ def compare_brakes(
     Returns
     -------
     ``rows[]`` with protocol, approach, ``speed_km_h``, weather, brake, friction, ``collided``,
-    ``impact_speed_km_h`` with its ``p05``, ``p50`` and ``p95``, ``min_ttc_s``, ``clearance_m``, ``avoided_km_h`` and ``allowed_km_h``;
+    ``impact_speed_km_h`` with its ``p05``, ``p50`` and ``p95``, ``min_ttc_s``, ``clearance_m``, ``avoided_km_h`` and
+    ``allowed_km_h``;
     ``summary[]`` by protocol, weather and brake; ``sources`` of the protocols.
 
     Raises
