@@ -55,7 +55,7 @@ def run_study() -> None:
     parser.add_argument("--seeds", type=int, default=3, help="networks of each kind of training")
     parser.add_argument("--frames", type=int, default=21, help="frames of each clip at most")
     parser.add_argument(
-        "--counts", type=int, nargs="+", default=COUNTS, help="real photographs of a class to add"
+        "--counts", type=int, nargs="*", default=COUNTS, help="real photographs of a class to add"
     )
     parser.add_argument("--steps", type=int, default=STEPS, help="of each training")
     asked = parser.parse_args()
