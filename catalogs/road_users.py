@@ -1,9 +1,11 @@
 """Road users of a scenario: their kinds with the sizes of their bodies, and the form of one in a grid."""
 
+from collections.abc import Mapping
 from math import cos, inf, radians, sin
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, field_serializer, model_validator
 
 from catalogs.entries import load
 from catalogs.physical_limits import find_limit_problem
@@ -14,6 +16,10 @@ ROAD_USERS = "road_users.yaml"
 """Name among a dataset's kept inputs, where its grid has road users."""
 Kind = Literal["car", "van", "truck", "adult", "child", "bicycle"]
 KM_H = 3.6
+LONGEST_M = 30.0
+"""Greatest side of a body [m]: longer than any road train of Council Directive 96/53/EC."""
+BODIES = "bodies"
+"""Folder of users' own bodies among a dataset's kept inputs."""
 
 
 def _check_size(table: Table) -> Table:
@@ -120,7 +126,37 @@ class RoadUser(_Form):
     """A road user of a scenario."""
 
     kind: Kind = Field(description="Which body; catalogs/road_users.yaml has its size")
+    body: str | None = Field(
+        default=None,
+        max_length=4096,
+        description="In place of that body, a .ply of Gaussians in body axes: x forward, y left, z up, the ground at 0",
+    )
+    size_m: tuple[Number, Number, Number] | None = Field(
+        default=None,
+        description="With body: length, width and height of its box, in the middle of which it stands [m]",
+    )
     track: TrackForm
+
+    @field_serializer("body")
+    def _record_body(self, body: str | None) -> str | None:
+        """Return the path as records have it: by its last part where the rest is a private matter."""
+        path = Path(body or "")
+        private = path.is_absolute() or path.parts[:1] == ("~",) or ".." in path.parts
+        return path.name if private else body
+
+    @model_validator(mode="after")
+    def _own_body_has_a_box(self) -> "RoadUser":
+        if (self.body is None) != (self.size_m is None):
+            raise ValueError("body and size_m go together; one of them is missing")
+        if self.size_m is not None and not all(0 < side <= LONGEST_M for side in self.size_m):
+            raise ValueError(f"size_m must be above 0 and at most {LONGEST_M:g} m; it is {list(self.size_m)}")
+        if self.body is not None and not self.body.lower().endswith(".ply"):
+            raise ValueError(f"body must be a .ply file; it is {self.body}")
+        return self
+
+    def choose_size(self, sizes: Mapping[str, tuple[float, ...]]) -> tuple[float, ...]:
+        """Return length, width and height of its box [m]: its own, or that of its kind."""
+        return self.size_m or sizes[self.kind]
 
     def as_record(self) -> dict[str, Any]:
         """What the grid says of it, as JSON has it."""

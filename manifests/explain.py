@@ -18,6 +18,8 @@ REACHES = {
     "surface.yaml": (VEHICLE, RENDER),
     "camera.yaml": (RENDER,),
     "hazard_marking.yaml": (RENDER,),
+    "road_users.yaml": (RENDER,),
+    "bodies": (RENDER,),
     "low_speed.yaml": (VEHICLE, RENDER),
     "wet_friction.yaml": (VEHICLE, RENDER),
     "road_grade.yaml": (VEHICLE, RENDER),
@@ -199,7 +201,7 @@ def kind_of_input(name: str) -> str:
         return "tyre"
     if path.parts[0] == "road_grade":
         return "road_grade.yaml"
-    return path.parts[0] if path.parts[0] in ("weather", "traces", "driven") else name
+    return path.parts[0] if path.parts[0] in ("weather", "traces", "driven", "bodies") else name
 
 
 def parse_input(name: str, content: bytes | None) -> Any:
@@ -219,6 +221,6 @@ def parse_input(name: str, content: bytes | None) -> Any:
         return ABSENT
     if kind_of_input(name) == "tyre":
         return tyre_entries(content)
-    if PurePosixPath(name).suffix in (".parquet", ".py"):
+    if PurePosixPath(name).suffix in (".parquet", ".py", ".ply"):
         return {"sha256": sha256_of([content])}
     return parse_yaml_value(content, name, "catalogue entry")

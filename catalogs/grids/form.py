@@ -11,6 +11,7 @@ from catalogs.grids.blocks import Number as LaxNumber
 from catalogs.grids.selection import Condition
 from catalogs.names import Name
 from catalogs.physical_limits import find_limit_problem
+from catalogs.road_users import RoadUser
 from catalogs.street_names import SceneName
 from catalogs.variants import Variant
 
@@ -161,13 +162,18 @@ class GridFile(Blocks):
         return {"ticks": round(self.telemetry_s * TICK_RATE_HZ) + 1, "frames": self.frames}
 
     @property
-    def has_objects(self) -> bool:
-        """Whether any scenario has road users: then all clips have an array of instances and a table of objects."""
+    def road_users(self) -> list[RoadUser]:
+        """Road users of all levels."""
         levels = [self.base, *self.scenarios.values()]
         levels += [
             level for axes in (self.axes, self.zip) for axis in axes.values() for level in axis.values()
         ]
-        return any(level.objects for level in levels)
+        return [user for level in levels for user in level.objects or ()]
+
+    @property
+    def has_objects(self) -> bool:
+        """Whether there are road users: then all clips have an array of instances and a table of objects."""
+        return bool(self.road_users)
 
     @property
     def keeps_stops_steady(self) -> bool:

@@ -100,8 +100,8 @@ def _compare_clip(
                 columns = _read_as_stored(name, layout.root / parts[name, clip_id], remade, clip_id)
                 digest, stored = content_hash(name, columns[1]), _compare_rows(*columns)
             elif name == OBJECTS:
-                rows = [read_objects(place, index, settings.frames) for place in (layout, remade)]
-                digest, stored = hash_objects(rows[1]), find_row_difference(*rows, list(rows[1]))
+                held, made = (read_objects(place, index, settings.frames) for place in (layout, remade))
+                digest, stored = hash_objects(made), find_row_difference(held, made, list(made))
             else:
                 stored = _compare_pixels(layout, remade, index, name, digest, is_same_writer)
         except InputError as error:

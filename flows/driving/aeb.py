@@ -72,8 +72,9 @@ def compare_brakes(
 
     Returns
     -------
-    ``rows[]`` with protocol, approach, ``speed_km_h``, weather, brake, friction, ``collided``, ``impact_km_h`` with
-    ``_p05``, ``_p50`` and ``_p95``, ``min_ttc_s``, ``clearance_m``, ``avoided_km_h`` and ``allowed_km_h``;
+    ``rows[]`` with protocol, approach, ``speed_km_h``, weather, brake, friction, ``collided``,
+    ``impact_speed_km_h`` with its ``p05``, ``p50`` and ``p95``, ``min_ttc_s``, ``clearance_m``, ``avoided_km_h`` and
+    ``allowed_km_h``;
     ``summary[]`` by protocol, weather and brake; ``sources`` of the protocols.
 
     Raises
@@ -101,7 +102,7 @@ def compare_brakes(
                         "weather": name,
                         "brake": kind,
                     }
-                    | _drive_case(car, state, case, kind, table, frictions if bounds else ())
+                    | _drive_case(car, state, case, kind, table, frictions.tolist() if bounds else [])
                 )
             advance(name)
     result = {
@@ -135,7 +136,7 @@ def drive_approach(
         ),
     )  # fmt: skip
     step = 1.0 / table.car.rate_hz.value
-    looks = case.track.follow(np.arange(drive.steps) * step)
+    looks = case.track.follow(np.arange(drive.steps, dtype=np.float64) * step)
     # until a brake acts the speed is held, and the car is where it would be: those steps are driven at once
     for held, target in enumerate(looks):
         bumper = overhang + case.speed * held * step
@@ -153,8 +154,10 @@ def drive_approach(
             break
         # a step holds one pressure: that of its middle
         drive.advance(line.pressure_at(time + 0.5 * step))
-    columns = (drive.read_column(name) for name in ("station", "speed", "brake_pressure_mpa"))
-    return judge_approach(*columns, case.track, overhang=overhang, width=width)
+    station, speeds, pressure = (
+        drive.read_column(name) for name in ("station", "speed", "brake_pressure_mpa")
+    )
+    return judge_approach(station, speeds, pressure, case.track, overhang=overhang, width=width)
 
 
 def make_brake(
@@ -247,10 +250,10 @@ def summarise(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
         {
             "protocol": protocol, "weather": weather, "brake": brake, "approaches": len(some),
             "collided": sum(row["collided"] for row in some),
-            "mean_impact_km_h": round(float(np.mean([row["impact_km_h"] for row in some])), 2),
-            "largest_impact_km_h": max(row["impact_km_h"] for row in some),
+            "mean_impact_km_h": round(float(np.mean([row["impact_speed_km_h"] for row in some])), 2),
+            "largest_impact_km_h": max(row["impact_speed_km_h"] for row in some),
             "beyond_rule": sum(
-                row["allowed_km_h"] is not None and row["impact_km_h"] > row["allowed_km_h"] for row in some
+                row["allowed_km_h"] is not None and row["impact_speed_km_h"] > row["allowed_km_h"] for row in some
             ),
         }
         for (protocol, weather, brake), some in found.items()
@@ -279,7 +282,7 @@ def _drive_case(
     return {
         "friction": round(state.friction, 4),
         **tell_outcome(outcome),
-        **{f"impact_km_h_p{p:02d}": round(v, 2) for p, v in zip(PERCENTILES, ends, strict=False)},
+        **{f"p{p:02d}": round(v, 2) for p, v in zip(PERCENTILES, ends, strict=False)},
         "allowed_km_h": case.allowed_km_h,
     }
 
@@ -293,7 +296,7 @@ def tell_outcome(outcome: Outcome) -> dict[str, Any]:
     """
     return {
         "collided": outcome.collided,
-        "impact_km_h": round(outcome.impact_speed * KM_H, 2),
+        "impact_speed_km_h": round(outcome.impact_speed * KM_H, 2),
         "min_ttc_s": _finite(outcome.min_ttc),
         "clearance_m": _finite(outcome.clearance),
         "avoided_km_h": round(outcome.avoided_speed * KM_H, 2),
@@ -381,8 +384,8 @@ def _tell_impacts(rows: Sequence[dict[str, Any]], brakes: Sequence[str]) -> list
         told.append(brake)
         lines: dict[str, dict[str, Any]] = {}
         for row in (row for row in rows if row["brake"] == brake):
-            allowed, impact = row["allowed_km_h"], row["impact_km_h"] or None
-            bad = allowed is not None and row["impact_km_h"] > allowed
+            allowed, impact = row["allowed_km_h"], row["impact_speed_km_h"] or None
+            bad = allowed is not None and row["impact_speed_km_h"] > allowed
             lines.setdefault(row["approach"], {"approach": row["approach"], "allowed": allowed})[
                 row["weather"]
             ] = Cell(value=impact, tone="bad") if bad else impact
@@ -402,13 +405,13 @@ def _plot_impacts(
         for place, weather in enumerate(weathers):
             some = [row for row in rows if (row["brake"], row["weather"]) == (brake, weather)]
             band = {
-                side: [row[f"impact_km_h_{end}"] for row in some]
+                side: [row[end] for row in some]
                 for side, end in (("low", "p05"), ("high", "p95"))
-                if some and f"impact_km_h_{end}" in some[0]
+                if some and end in some[0]
             }
             lines.append(
                 Line(
-                    name=weather, x=[row["speed_km_h"] for row in some], y=[row["impact_km_h"] for row in some],
+                    name=weather, x=[row["speed_km_h"] for row in some], y=[row["impact_speed_km_h"] for row in some],
                     style=pick_style(place), marked=True, **band,
                 )
             )  # fmt: skip

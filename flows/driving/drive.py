@@ -12,7 +12,6 @@ from flows.driving.policy import Policy, drive_with, load_policy
 from flows.driving.simulator import UNBRAKED, Simulator
 from flows.making.generate import generate_dataset
 from flows.making.grid_entries import read_entries
-from flows.making.grid_inputs import grade_of
 from flows.making.plan import name_clip
 from flows.making.request import list_facts
 from flows.running.progress import progress_bar
@@ -39,7 +38,8 @@ def drive_grid(
     Returns
     -------
     As `make_dataset`, and ``policy`` with its ``source_sha256``; of scenarios with road users ``outcomes[]``: scenario,
-    number and kind of the road user, ``collided``, ``impact_km_h``, ``min_ttc_s``, ``clearance_m``, ``avoided_km_h``.
+    number and kind of the road user, ``collided``, ``impact_speed_km_h``, ``min_ttc_s``, ``clearance_m``,
+    ``avoided_km_h``.
 
     Raises
     ------
@@ -91,18 +91,14 @@ def _drive_clips(
     entries = read_entries(settings, {scenario.weather for _, scenario in grid.scenarios})
     if entries.problems:
         raise InputError(entries.problems)
-    grades = {
-        scene: grade_of(scene or settings.scene)
-        for scene in {scenario.scene for _, scenario in grid.scenarios}
-    }
     driven: dict[str, list[float]] = {}
     outcomes: list[dict[str, Any]] = []
     bumper = load("emergency braking").car
     with progress_bar("driven", len(grid.scenarios)) as advance:
         for label, scenario in grid.scenarios:
             simulator = Simulator(
-                scenario, vehicle=entries.vehicle, surface=entries.surface, rate_hz=rate_hz,
-                duration_s=settings.telemetry_s, grade=grades[scenario.scene],
+                replace(scenario, scene=scenario.scene or settings.scene), vehicle=entries.vehicle,
+                surface=entries.surface, rate_hz=rate_hz, duration_s=settings.telemetry_s,
             )  # fmt: skip
             pressures = drive_with(policy, simulator, f"clip {label}")
             if not driven and drive_with(policy, simulator, f"clip {label}") != pressures:

@@ -10,7 +10,7 @@ from catalogs.entries import load
 from catalogs.low_speed import LOW_SPEED, LOW_SPEED_CUT
 from catalogs.references import read_reference
 from catalogs.road_grade import name_grade_file
-from catalogs.road_users import ROAD_USERS
+from catalogs.road_users import BODIES, ROAD_USERS
 from catalogs.scenes import load_recipe, load_scene
 from catalogs.studies.ablation import ABLATION, FamilyWeather, find_families
 from catalogs.vehicles import VehicleFile, open_vehicle
@@ -129,6 +129,10 @@ class Catalogue:
         """Kind of road user to length, width and height [m]; none where no clip has any."""
         sizes: dict[str, tuple[float, ...]] | None = self._load_kept("road user sizes", ROAD_USERS)
         return sizes or {}
+
+    def own_body(self, name: str) -> Path:
+        """Return the kept file of a user's own body, by its path in the grid."""
+        return self._inputs / BODIES / Path(name).name
 
     @cached_property
     def scene(self) -> Scene:

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from catalogs.grids.form import TICK_RATE_HZ
 from catalogs.scenario import Scenario
+from flows.making.bodies import build_moving_bodies
 from flows.making.catalogue import Catalogue
 from flows.making.driving import hazard_of, weather_of
 from flows.making.plan import Plan, frame_ticks
-from flows.making.road_users import build_moving_bodies, move_road_users
+from flows.making.road_users import move_road_users
 from tasks.render.camera import RigAt, body_poses, continuous_rig
 from tasks.render.clip import RigMotion, render_clip
 from tasks.render.feature_sign import add_sign
@@ -116,13 +117,13 @@ def gather_motion(
     """Return the motion of rig and road users at a clip's frames."""
     sizes, time = catalogue.road_user_sizes, frames["tick"] / TICK_RATE_HZ
     motions = move_road_users(scenario, sizes, catalogue.scene, state.friction, time)
-    T_world_rig, camera = frames["T_world_rig"].reshape(-1, 4, 4), catalogue.camera
-    seen_from = T_world_rig @ camera.T_rig_camera, float(camera.K[0, 0])
+    T_world_rig = frames["T_world_rig"].reshape(-1, 4, 4)
+    T_world_camera = T_world_rig @ catalogue.camera.T_rig_camera
     return RigMotion(
         T_world_rig=T_world_rig,
         frame_rate_hz=plan.settings.frame_rate_hz,
         rig_at=rig_at,
-        bodies=build_moving_bodies(scenario, sizes, motions, *seen_from),
+        bodies=build_moving_bodies(scenario, catalogue, motions, T_world_camera),
     )
 
 

@@ -13,17 +13,13 @@ from catalogs.scenes import load_scene
 from flows.making.driving import hazard_of, surface_of
 from flows.making.grid_entries import GridEntries
 from tasks.errors import InputError
-from tasks.render.moving_bodies import MovingBody
-from tasks.scene.road_users.bodies import COARSEST_M, FINEST_M, build_road_user
 from tasks.scene.road_users.ground import find_meeting, find_obstacle, measure_ground
-from tasks.scene.road_users.track import Motion, move_on_track
+from tasks.scene.road_users.motion import Motion, move_on_track
 from tasks.scene.scene import Scene
 from tasks.surface.road_profile import road_elevation
 
 Sizes = Mapping[str, tuple[float, ...]]
 
-CELL_PX = 2.5
-"""Spacing of the discs of a body in the picture, where it is nearest [px]."""
 CHECK_STEP_S = 0.05
 """Time between the poses that are held against the street [s]."""
 EGO_OVERHANG_M, EGO_WIDTH_M = 0.9, 1.8
@@ -51,7 +47,7 @@ def move_road_users(
     motions, problems = [], []
     for number, user in enumerate(scenario.objects, start=1):
         try:
-            motion = move_on_track(user.build_track(sizes[user.kind]), scene.route, time, friction)
+            motion = move_on_track(user.build_track(user.choose_size(sizes)), scene.route, time, friction)
         except InputError as error:
             problems += [f"object {number} ({user.kind}) {problem}" for problem in error.problems]
             continue
@@ -66,49 +62,6 @@ def move_road_users(
     if problems:
         raise InputError(problems)
     return motions
-
-
-def build_moving_bodies(
-    scenario: Scenario,
-    sizes: Sizes,
-    motions: list[Motion],
-    T_world_camera: NDArray[np.float64],
-    focal_px: float,
-) -> list[MovingBody]:
-    """Return the bodies of a scenario's road users on their way; numbers count from 1 in its order.
-
-    Parameters
-    ----------
-    scenario : of the clip
-    sizes : kind to length, width and height [m]
-    motions : of each, at the frames
-    T_world_camera : float64 [F, 4, 4] poses of the camera, which decide how fine a body is [m]
-    focal_px : its focal length [px]
-    """
-    return [
-        MovingBody(
-            number=number,
-            body=build_road_user(
-                user.kind,
-                np.array(sizes[user.kind]),
-                _choose_cell(motion, sizes[user.kind], T_world_camera, focal_px),
-            ),
-            T_world_body=motion.T_world_body,
-            velocity=motion.velocity,
-            braking=motion.acceleration < 0,
-        )
-        for number, (user, motion) in enumerate(zip(scenario.objects, motions, strict=True), start=1)
-    ]
-
-
-def _choose_cell(
-    motion: Motion, size: tuple[float, ...], T_world_camera: NDArray[np.float64], focal_px: float
-) -> float:
-    """Return the spacing of a body's discs, some pixels where the camera comes nearest, in steps of a quarter [m]."""
-    away = np.linalg.norm(motion.T_world_body[:, :3, 3] - T_world_camera[:, :3, 3], axis=1).min()
-    cell = CELL_PX * max(float(away) - max(size[:2]) / 2, 1.0) / focal_px
-    steps = np.floor(np.log(np.clip(cell, FINEST_M, COARSEST_M) / FINEST_M) / np.log(1.25) + 1e-9)
-    return round(float(FINEST_M * 1.25**steps), 4)
 
 
 def find_road_user_problems(grid: Grid, entries: GridEntries) -> list[str]:
@@ -137,7 +90,7 @@ def _find_problems(scenario: Scenario, grid: Grid, entries: GridEntries) -> list
     except InputError as error:
         return list(error.problems)
     names = [f"object {number} ({user.kind})" for number, user in enumerate(scenario.objects, start=1)]
-    boxes = [np.array(sizes[user.kind]) for user in scenario.objects]
+    boxes = [np.array(user.choose_size(sizes)) for user in scenario.objects]
     problems = []
     for name, motion, size in zip(names, motions, boxes, strict=True):
         if (met := find_obstacle(motion.T_world_body, size, scene.gaussians)) is not None:

@@ -49,7 +49,9 @@ def count_ticks(rate_hz: float) -> int:
     return ticks
 
 
-def trace_pressures(pressures: Sequence[float], ticks_per_step: int) -> NDArray[np.float64]:
+def trace_pressures(
+    pressures: Sequence[float] | NDArray[np.float64], ticks_per_step: int
+) -> NDArray[np.float64]:
     """Return the pressure at the internal steps of a drive, float64 [N] [MPa].
 
     Parameters
@@ -207,7 +209,10 @@ class SteppedDrive:
 
 
 def simulate_pressures(
-    vehicle: Vehicle, surface: SurfaceState, settings: DriveSettings, pressures: Sequence[float]
+    vehicle: Vehicle,
+    surface: SurfaceState,
+    settings: DriveSettings,
+    pressures: Sequence[float] | NDArray[np.float64],
 ) -> Rollout:
     """Simulate the drive in which each step has its pressure: that of `SteppedDrive`, in one call.
 

@@ -36,12 +36,14 @@ class RigMotion:
     frame_rate_hz : frames per second [Hz]
     rig_at : rig poses about each frame; a camera that `moves` during a frame needs them
     bodies : road users; during a frame they stand still, as in its middle
+    first_frame : number of the first frame, from which particles and noise count [1]
     """
 
     T_world_rig: NDArray[np.float64]
     frame_rate_hz: float
     rig_at: RigAt | None = None
     bodies: Sequence[MovingBody] = ()
+    first_frame: int = 0
 
 
 def render_clip(
@@ -112,7 +114,7 @@ def render_clip(
             width=field.width,
             height=field.height,
             velocity=velocity[frame],
-            time_s=frame / motion.frame_rate_hz,
+            time_s=(motion.first_frame + frame) / motion.frame_rate_hz,
             exposure_s=camera.exposure_s,
         )
         clear = compose_over_sky(gbuffer, sky, scene.gaussians.display_encoded)
@@ -125,7 +127,9 @@ def render_clip(
         developed = (
             paper_picture(finished)
             if composition == "paper"
-            else encode_picture(apply_sensor(seen.picture, camera.sensor, conditions.seed, frame))
+            else encode_picture(
+                apply_sensor(seen.picture, camera.sensor, conditions.seed, motion.first_frame + frame)
+            )
         )
         buffers: dict[str, NDArray[np.generic]] = {
             "rgb": developed,

@@ -177,6 +177,7 @@ def test_a_hole_in_a_slow_channel_is_a_gap(folder: Path) -> None:
         ),
         ("time", lambda x: x + 0.5 * (np.arange(300) > 100), "channel time must advance"),
         ("time", lambda x: 1.02 * x, "300 samples take"),
+        ("brake_pressure", lambda x: x * 10, "channel brake_pressure gives 0.2"),  # a check of all runs
         ("brake_pressure", lambda x: np.full(300, 0.7), "channel brake_pressure is frozen: it holds 0.7 MPa"),
         ("brake_pressure", lambda x: np.zeros(300), "channel brake_pressure is 0 over the whole run"),
         ("wheel_speed_rear", lambda x: x * 0.32 * 3.6, "(one looks like km/h)"),

@@ -17,6 +17,7 @@ from flows.store.layout import Layout
 from flows.store.sealed import read_manifest
 from tasks.driving.targets import TargetTrack
 from tasks.errors import InputError
+from tests.toy_street import write_toy_grid
 
 WET = {"weather": "rain", "precipitation_mm_h": 20.0, "initial_speed_km_h": 70.0}
 GRID = """
@@ -93,6 +94,20 @@ def test_a_drive_begins_anew_the_same_and_sees_what_is_ahead():
     assert last.truth["brake_pressure_mpa"] == 2.0 and 0.5 < last.truth["surface_friction"] < 0.7
     assert simulator.describe().columns["speed"][-1] == last.speed
     assert musync.Simulator is Simulator
+
+
+def test_pictures_are_those_of_the_drive_and_the_same_again(tmp_path):
+    write_toy_grid(tmp_path, frames=3)
+    car = {"kind": "car", "track": {"gap_m": 12.0}}
+    given = {"scene": str(tmp_path / "scene"), "initial_speed_km_h": 40.0, "objects": [car]}
+    drives = []
+    for _ in range(2):
+        simulator = Simulator(given, duration_s=0.2, rate_hz=10, camera=str(tmp_path / "camera.yaml"))
+        drives.append([simulator.reset(), *(simulator.step(0.0) for _ in range(2))])
+    first, again = ([seen.frame for seen in drive] for drive in drives)
+    assert first[0].shape == (64, 96, 3) and first[0].dtype == np.uint8
+    assert all((a == b).all() for a, b in zip(first, again, strict=True))
+    assert np.abs(first[2].astype(int) - first[0]).mean() > 1.0
 
 
 def test_the_objects_of_a_scenario_are_seen_by_the_end_that_the_car_meets():
@@ -182,8 +197,8 @@ def test_a_policy_sees_the_road_users_of_a_grid_and_the_result_says_what_became_
     result = drive_grid("car.yaml", f"{folder}:Once", "data", pictures=False, runner="threads", workers=1)
     (outcome,) = result["outcomes"]
     assert (outcome["scenario"], outcome["number"], outcome["kind"]) == ("dry", 1, "car")
-    assert outcome["collided"] and 40 < outcome["impact_km_h"] < 50
-    assert outcome["avoided_km_h"] == pytest.approx(50 - outcome["impact_km_h"], abs=0.02)
+    assert outcome["collided"] and 40 < outcome["impact_speed_km_h"] < 50
+    assert outcome["avoided_km_h"] == pytest.approx(50 - outcome["impact_speed_km_h"], abs=0.02)
 
 
 def test_a_grid_that_brakes_by_itself_is_refused(folder, tmp_path):

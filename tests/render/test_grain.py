@@ -20,7 +20,7 @@ def look_down(
     view = GBuffer(
         rgb=np.full((HEIGHT, WIDTH, 3), shade, np.float32), depth=depth, expected_depth=depth,
         alpha=np.ones_like(depth), normal=np.zeros((HEIGHT, WIDTH, 3), np.float32),
-        class_id=np.full((HEIGHT, WIDTH), kind, np.uint8),
+        class_id=np.full((HEIGHT, WIDTH), kind, np.uint8), object_id=np.zeros((HEIGHT, WIDTH), np.uint16),
     )  # fmt: skip
     return view, pose, K
 

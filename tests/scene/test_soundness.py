@@ -5,8 +5,10 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from flows.making.scene_views import check_scene, compare_streets
+from catalogs.scenes import write_scene
+from flows.making.scene_views import check_scene, check_scenes, compare_streets, show_scenes
 from tasks.conventions import ROAD_CLASSES
+from tasks.errors import InputError
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.scene import Scene
 from tasks.scene.soundness import find_faults, measure_soundness
@@ -74,3 +76,18 @@ def test_streets_are_compared_by_place_and_a_twin_is_the_one_most_like():
     ratio, other = compare_streets(grains)
     assert other.tolist() == [2, 0, 0] or other.tolist() == [2, 2, 0]
     assert ratio[0] == pytest.approx(0.2) and ratio[1] > 10
+
+
+def test_scenes_are_checked_and_shown_by_name_or_folder(tmp_path):
+    folders = []
+    for seed in (1, 2):
+        write_scene(toy_street(seed), tmp_path / f"toy-{seed}", {})
+        folders.append(str(tmp_path / f"toy-{seed}"))
+    result = check_scenes(folders, out=str(tmp_path / "check"), backend="cpu")
+    assert result["sound"] and result["faults"] == 0 and result["least_ratio"] > 0
+    assert [row["most_like"] for row in result["scenes"]] == folders[::-1]
+    assert (tmp_path / "check" / "check.json").is_file()
+    shown = show_scenes(folders[:1], out=str(tmp_path / "sheet"), backend="cpu")
+    assert shown["scenes"] == 1 and (tmp_path / "sheet" / "gallery.png").stat().st_size > 10_000
+    with pytest.raises(InputError, match="streets must be 1 or more"):
+        check_scenes(streets=0)

@@ -6,9 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from tasks.conventions import SemanticClass
 from tasks.scene.bodies import VEHICLES, Body, build_body
 from tasks.scene.bodies.solids import tangents
 from tasks.scene.bodies.vehicles import FINISHES, Part
+from tasks.scene.gaussians import Gaussians
+from tasks.scene.spherical_harmonics import C0
 
 Floats = NDArray[np.float64]
 
@@ -82,6 +85,43 @@ def build_road_user(kind: str, size: Floats, cell: float = FINEST_M) -> RoadUser
     else:
         body = _fit_box(build_body(kind, height=float(size[2]), cell=max(0.55 * cell, 0.03)), size)
         lamps = np.zeros(len(body.albedo), np.bool_)
+    return _add_shade(kind, size, body, lamps)
+
+
+def wrap_own_body(kind: str, size: Floats, cloud: Gaussians) -> RoadUserBody:
+    """Return a user's own Gaussians as the body of a road user; their colours are taken for reflectances.
+
+    Parameters
+    ----------
+    kind : car, van, truck, adult, child or bicycle
+    size : float64 [3] length, width and height of its box [m]
+    cloud : in body axes
+    """
+    colour = np.maximum(cloud.sh[:, 0].astype(np.float64) * C0 + 0.5, 0)
+    albedo = to_linear_light(colour) if cloud.display_encoded else colour
+    vehicle = kind in VEHICLES
+    plain = replace(
+        cloud,
+        sh=cloud.sh[:, :1],
+        class_id=np.full(len(cloud), SemanticClass.VEHICLE if vehicle else SemanticClass.OTHER, np.uint8),
+        surroundings=None,
+    )
+    body = Body(
+        gaussians=plain,
+        albedo=np.clip(albedo, 0, 0.95),
+        gloss=np.zeros(len(cloud)),
+        openness=np.ones(len(cloud)),
+        size=(float(size[0]), float(size[1]), float(size[2])),
+    )
+    return _add_shade(kind, size, body, np.zeros(len(cloud), np.bool_))
+
+
+def to_linear_light(display: Floats) -> Floats:
+    """Return linear light of sRGB-encoded values (IEC 61966-2-1)."""
+    return np.where(display <= 0.04045, display / 12.92, ((display + 0.055) / 1.055) ** 2.4)
+
+
+def _add_shade(kind: str, size: Floats, body: Body, lamps: NDArray[np.bool_]) -> RoadUserBody:
     share, boxes = _SHADES[kind]
     return RoadUserBody(
         kind=kind,

@@ -228,7 +228,7 @@ def _scatter_trees(layout: StreetLayout, seed: int, side: int, buildings: tuple[
     trees: list[Tree] = []
     count = round(layout.ground_trees_scale * (last - first) / 100)
     while count > 0:
-        group = int(min(rng.integers(1, 7), count))
+        group = min(int(rng.integers(1, 7)), count)
         count -= group
         # most stand near the road
         middle, away = rng.uniform(first, last), 5.0 + 0.8 * layout.open_ground * rng.random() ** 1.7
