@@ -6,7 +6,7 @@ READY := .venv/.ready
 DEMO ?= datasets/demo
 WORKERS ?= 2
 
-.PHONY: demo test test-minutes check docs docs-serve study study-schedule study-crash study-fuzz study-faults study-double-track study-drives study-scale study-production study-mutants study-exports study-calibration study-editors study-learning freeze bench lock size clean
+.PHONY: demo test test-minutes check docs docs-serve study study-schedule study-crash study-fuzz study-faults study-double-track study-drives study-scale study-production study-mutants study-exports study-calibration study-editors study-learning study-streets freeze bench lock size clean
 
 # Whatever comes from the network is held against a hash of constraints.txt, but for torch: one version of it has builds
 # with and without CUDA, one an index, and which of them is at hand differs; what a CUDA build needs beyond is not in the
@@ -111,6 +111,11 @@ study-editors: $(READY)
 # A small network learns friction from pictures (docs/tutorial/learn-friction.md): ten minutes, most of them for the dataset.
 study-learning: $(READY)
 	$(BIN)/python -m studies.learn_friction
+
+# 204 streets of six kinds: half an hour of one processor
+study-streets: $(READY)
+	$(BIN)/musync scene gallery --streets 4 --out datasets/streets/gallery
+	$(BIN)/musync scene check --streets 34 --out datasets/streets/check
 
 freeze: $(READY)
 	$(BIN)/musync lab freeze

@@ -112,7 +112,7 @@ class ProcedureEntry(CatalogueEntry):
             tolerance=self.tolerance.value if self.tolerance else None,
             bounds={group: _convert_bounds(bounds) for group, bounds in self.bounds.items()},
             yardstick=Yardstick(
-                scales=self.scales.values(),
+                scales=self.scales.numbers(),
                 start_s=self.start.value,
                 settle_s=self.settle.value,
                 tail_speed=self.tail_speed.value,

@@ -113,9 +113,7 @@ def parse_rows(content: bytes, needed: Collection[str], numbers: Collection[str]
     return rows
 
 
-def _find_row_problems(
-    row: dict[str, str], numbers: Collection[str], line: str, seen: set[str]
-) -> list[str]:
+def _find_row_problems(row: dict[str, str], numbers: Collection[str], line: str, seen: set[str]) -> list[str]:
     if None in row or None in row.values():
         return [f"{line}: must have as many fields as there are columns"]
     problems = []

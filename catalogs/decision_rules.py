@@ -1,12 +1,9 @@
 """The rules by which a verdict is reached."""
 
-from pathlib import Path
 from typing import Annotated
 
-from catalogs.quantities import CatalogueEntry, Scalar, read_entry, require_quantity
+from catalogs.quantities import CatalogueEntry, Scalar, require_quantity
 from tasks.identification.rules import DecisionRules
-
-DECISION_RULES = Path(__file__).with_name("decision_rules.yaml")
 
 Count = Annotated[Scalar, require_quantity("1", minimum=1)]
 Share = Annotated[Scalar, require_quantity("1", above=0, below=1)]
@@ -49,20 +46,5 @@ class DecisionRulesEntry(CatalogueEntry):
         """Return the rules; counts are integers."""
         counts = {name for name, kind in DecisionRules.__annotations__.items() if kind is int}
         return DecisionRules(
-            **{name: int(value) if name in counts else value for name, value in self.values().items()}
+            **{name: int(value) if name in counts else value for name, value in self.numbers().items()}
         )
-
-
-def load_decision_rules(path: str | Path = DECISION_RULES) -> DecisionRules:
-    """Read decision rules; by default those of the catalogue.
-
-    Parameters
-    ----------
-    path : YAML file
-
-    Raises
-    ------
-    InputError
-        Listing every rule the file breaks.
-    """
-    return read_entry(DecisionRulesEntry, Path(path), "set of decision rules").build()

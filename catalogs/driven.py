@@ -2,7 +2,7 @@
 
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -41,7 +41,7 @@ class DrivenClips:
     """
 
     entry: PolicyEntry
-    pressures: Mapping[str, NDArray[np.float64]]
+    pressures: Mapping[str, Sequence[float] | NDArray[np.float64]]
 
 
 def encode_driven(driven: DrivenClips, source: bytes) -> dict[str, bytes]:
@@ -88,6 +88,6 @@ def read_driven(inputs: Path) -> DrivenClips | None:
         raise InputError(
             f"{file}: must hold the pressures of a drive: {str(error).splitlines()[0]}"
         ) from None
-    firsts = np.flatnonzero(np.concatenate([[True], labels[1:] != labels[:-1]])) if len(labels) else []
+    firsts: NDArray[np.intp] = np.flatnonzero(np.append(True, labels[1:] != labels[:-1])[: len(labels)])
     parts = np.split(values, firsts[1:]) if len(labels) else []
     return DrivenClips(entry=entry, pressures=dict(zip(labels[firsts], parts, strict=True)))

@@ -17,7 +17,7 @@ class ForeignGateEntry(CatalogueEntry):
 
     def build(self) -> PoseThresholds:
         """The limits themselves; figures that need depth are not judged where the file has no limit of them."""
-        return PoseThresholds(**{"pitch_rmse_deg": float("inf"), "progress_rmse_m": None, **self.values()})
+        return PoseThresholds(**{"pitch_rmse_deg": float("inf"), "progress_rmse_m": None, **self.numbers()})
 
 
 class GateEntry(ForeignGateEntry):

@@ -5,7 +5,7 @@ from typing import Annotated
 from pydantic import AfterValidator
 
 from catalogs.quantities import CatalogueEntry, Scalar, Table, require_quantity
-from tasks.render.road_paint import HazardMarking
+from tasks.render.road_paint import HazardMarking, WarningSign
 
 
 def _check_colour(table: Table) -> Table:
@@ -15,6 +15,23 @@ def _check_colour(table: Table) -> Table:
 
 
 Reflectance = Annotated[Table, require_quantity("1", minimum=0, maximum=1), AfterValidator(_check_colour)]
+
+
+class SignEntry(CatalogueEntry):
+    """Content of a marking's sign; `WarningSign` gives the meanings."""
+
+    side: Annotated[Scalar, require_quantity("m", above=0)]
+    foot: Annotated[Scalar, require_quantity("m", above=0)]
+    offset: Annotated[Scalar, require_quantity("m", minimum=0)]
+    before: Annotated[Scalar, require_quantity("m", minimum=0)]
+    border: Reflectance
+    field: Reflectance
+    symbol: Reflectance
+    metal: Reflectance
+
+    def build(self) -> WarningSign:
+        """The sign itself."""
+        return WarningSign(**self.numbers())
 
 
 class MarkingEntry(CatalogueEntry):
@@ -27,20 +44,8 @@ class MarkingEntry(CatalogueEntry):
     patch_margin: Annotated[Scalar, require_quantity("m", minimum=0)] | None = None
     joint: Reflectance | None = None
     joint_width: Annotated[Scalar, require_quantity("m", above=0)] | None = None
+    sign: SignEntry | None = None
 
     def build(self) -> HazardMarking:
         """The marking itself."""
-        return HazardMarking(
-            stripe_width=self.stripe_width.value,
-            paint=_as_colour(self.paint),
-            gap=_as_colour(self.gap),
-            patch=self.patch and _as_colour(self.patch),
-            patch_margin=self.patch_margin.value if self.patch_margin else 0.0,
-            joint=self.joint and _as_colour(self.joint),
-            joint_width=self.joint_width.value if self.joint_width else 0.0,
-        )
-
-
-def _as_colour(table: Table) -> tuple[float, float, float]:
-    red, green, blue = table.value
-    return red, green, blue
+        return HazardMarking(**self.numbers(), sign=None if self.sign is None else self.sign.build())

@@ -17,7 +17,7 @@ class LowSpeedEntry(CatalogueEntry):
 
     def build(self) -> SteadyStop:
         """The numbers themselves."""
-        return SteadyStop(**self.values())
+        return SteadyStop(**self.numbers())
 
 
 class LowSpeedCutEntry(CatalogueEntry):

@@ -26,7 +26,7 @@ class CatalogueEntry(BaseModel):
         """Return what the entry is for those who ask for it: itself, where a kind has no other value."""
         return self
 
-    def values(self) -> dict[str, Any]:
+    def numbers(self) -> dict[str, Any]:
         """Return the numbers of its quantities, by their names [their own units]."""
         return {name: one.value for name, one in self if isinstance(one, Scalar | Table)}
 

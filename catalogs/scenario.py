@@ -1,6 +1,6 @@
 """One scenario: the weather q, the controls u and the road g that everything else follows from."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, fields
 from math import isfinite, pi
 from operator import attrgetter
@@ -14,6 +14,7 @@ from catalogs.physical_limits import (
     find_limit_problem,
 )
 from catalogs.quantities import Scalar
+from catalogs.road_users import RoadUser
 from tasks.surface.weather import DRY, WEATHERS, find_weather
 
 
@@ -35,6 +36,7 @@ class Scenario:
     hold_speed : the speed is held until the brake onset, without one throughout; else the car coasts
     hazard_center_m, hazard_length_m : where on the route the road feature lies and how long it is [m]
     hazard_height_m : positive a hump, negative a depression, 0 a flat road [m]
+    objects : road users beside the ego vehicle; in no row of a table, which has one value a column
     scene : that it drives in; None is the one scene of its grid, and stands in no row
     """
 
@@ -53,15 +55,27 @@ class Scenario:
     hazard_length_m: float = 0.0
     hazard_height_m: float = 0.0
     scene: str | None = None
+    objects: tuple[RoadUser, ...] = ()
+
+    @classmethod
+    def of(cls, record: Mapping[str, Any]) -> "Scenario":
+        """Return the scenario of a record as of `as_record`."""
+        users = tuple(RoadUser.model_validate(user) for user in record.get("objects", ()))
+        return cls(**{**record, "objects": users})
 
     def as_row(self) -> dict[str, Any]:
-        """The fields in order, for a manifest, a table row or a content id."""
+        """The fields in order, for a row of a table."""
         row = dict(zip(SCENARIO_FIELDS, _read_fields(self), strict=True))
         return row if self.scene is None else row | {"scene": self.scene}
 
+    def as_record(self) -> dict[str, Any]:
+        """The row and the road users, if any, for a manifest or a content id."""
+        users = [user.as_record() for user in self.objects]
+        return self.as_row() | ({"objects": users} if users else {})
 
-SCENARIO_FIELDS = tuple(field.name for field in fields(Scenario) if field.name != "scene")
-"""Fields of every scenario; the scene is one of those alone whose grid has several."""
+
+SCENARIO_FIELDS = tuple(field.name for field in fields(Scenario) if field.name not in {"scene", "objects"})
+"""Fields of every scenario; the scene is one of those alone whose grid has several, and road users are a list."""
 _read_fields = attrgetter(*SCENARIO_FIELDS)
 NUMBERS = tuple(name for name in SCENARIO_FIELDS if name not in {"weather", "hold_speed"})
 NOT_NEGATIVE = (

@@ -46,5 +46,5 @@ class FamilyEntry(CatalogueEntry):
     @property
     def family(self) -> TyreFamily:
         """The family's numbers."""
-        values = self.values()
+        values = self.numbers()
         return TyreFamily(**{**values, "burckhardt": BurckhardtCurve(*values["burckhardt"])})

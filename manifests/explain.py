@@ -18,6 +18,8 @@ REACHES = {
     "surface.yaml": (VEHICLE, RENDER),
     "camera.yaml": (RENDER,),
     "hazard_marking.yaml": (RENDER,),
+    "road_users.yaml": (RENDER,),
+    "bodies": (RENDER,),
     "low_speed.yaml": (VEHICLE, RENDER),
     "wet_friction.yaml": (VEHICLE, RENDER),
     "road_grade.yaml": (VEHICLE, RENDER),
@@ -49,7 +51,9 @@ REACHES = {
 """Stages whose bytes an input can change; motion reaches the picture because the camera rides on the body."""
 STAGE_OF_CONTENT = (
     dict.fromkeys(("ticks", "label", "scenario", "seed", "split", "calibration"), VEHICLE)
-    | dict.fromkeys(("rgb", "depth", "class", "normal", "road", "flow", "marks"), RENDER)
+    | dict.fromkeys(
+        ("rgb", "depth", "class", "instance", "normal", "road", "flow", "marks", "objects"), RENDER
+    )
     | dict.fromkeys(("frames", "figures", "verdict"), JUDGING)
 )
 """Stage that makes each content of a clip, and from which on each of its records can change."""
@@ -197,7 +201,7 @@ def kind_of_input(name: str) -> str:
         return "tyre"
     if path.parts[0] == "road_grade":
         return "road_grade.yaml"
-    return path.parts[0] if path.parts[0] in ("weather", "traces", "driven") else name
+    return path.parts[0] if path.parts[0] in ("weather", "traces", "driven", "bodies") else name
 
 
 def parse_input(name: str, content: bytes | None) -> Any:
@@ -217,6 +221,6 @@ def parse_input(name: str, content: bytes | None) -> Any:
         return ABSENT
     if kind_of_input(name) == "tyre":
         return tyre_entries(content)
-    if PurePosixPath(name).suffix in (".parquet", ".py"):
+    if PurePosixPath(name).suffix in (".parquet", ".py", ".ply"):
         return {"sha256": sha256_of([content])}
     return parse_yaml_value(content, name, "catalogue entry")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypeVar, get_type
 from pydantic import AfterValidator, ConfigDict, Field, TypeAdapter, ValidationError, with_config
 from typing_extensions import TypedDict
 
+from catalogs.road_users import RoadUser
 from catalogs.scenario import SCENARIO_FIELDS, Scenario
 from catalogs.sentences import cap_problems, describe_rules, shorten_value
 from manifests.canonical import ID_LENGTH
@@ -59,6 +60,12 @@ def _require_keys(keys: tuple[str, ...]) -> AfterValidator:
     return AfterValidator(check)
 
 
+def _check_road_users(users: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    for user in users:
+        RoadUser.model_validate(user)
+    return users
+
+
 _FIGURE_NAMES = {channel.name for channel in CLIP_CHANNELS}
 STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
@@ -70,10 +77,11 @@ if TYPE_CHECKING:  # their keys follow from what they record
     FiguresRecord = dict[str, Any]
     VerdictRecord = dict[str, Any]
 else:
+    _fields = get_type_hints(Scenario, include_extras=True)
+    _users = Annotated[list[dict[str, Any]], AfterValidator(_check_road_users), Field(min_length=1)]
     ScenarioRecord = with_config(STRICT)(
         TypedDict(
-            "ScenarioRecord",
-            get_type_hints(Scenario, include_extras=True) | {"scene": NotRequired[LocalName]},
+            "ScenarioRecord", {**_fields, "scene": NotRequired[LocalName], "objects": NotRequired[_users]}
         )
     )
     # a dataset decides what it has: a figure that came later is not represented

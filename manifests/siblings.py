@@ -22,6 +22,7 @@ CONTROLS: dict[str, tuple[str, ...]] = {
     ),
     "road": ("hazard_center_m", "hazard_length_m", "hazard_height_m"),
     "scene": ("scene",),
+    "road users": ("objects",),
 }
 """The scenario's fields by what an experimenter turns: q, u (speed and braking) and g of Eq. overall_pipeline."""
 FIGURES = ("surface_friction", "tyre_peak", "stopping_distance", "peak_pitch")
@@ -58,7 +59,7 @@ def _group_clips(clips: Sequence[Mapping[str, Any]], control: str) -> Iterator[l
     others = [name for other, names in CONTROLS.items() if other != control for name in names]
     groups: dict[tuple[Any, ...], list[int]] = {}
     for place, clip in enumerate(clips):
-        groups.setdefault(tuple(clip["scenario"].get(name) for name in others), []).append(place)
+        groups.setdefault(tuple(_read_control(clip, name) for name in others), []).append(place)
     yield from groups.values()
 
 
@@ -69,7 +70,13 @@ def _choose_pairs(group: Sequence[int]) -> list[tuple[int, int]]:
 
 
 def _list_differing(a: Mapping[str, Any], b: Mapping[str, Any], control: str) -> list[str]:
-    return [name for name in CONTROLS[control] if a["scenario"].get(name) != b["scenario"].get(name)]
+    return [name for name in CONTROLS[control] if _read_control(a, name) != _read_control(b, name)]
+
+
+def _read_control(clip: Mapping[str, Any], name: str) -> Any:
+    """Return the value of a field, as text where it is a list; None where the scenario has none."""
+    value = clip["scenario"].get(name)
+    return repr(value) if isinstance(value, list) else value
 
 
 def _make_pair(a: Mapping[str, Any], b: Mapping[str, Any], control: str) -> dict[str, Any]:

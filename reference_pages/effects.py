@@ -2,7 +2,7 @@
 
 import re
 
-from catalogs.effects import load_effects
+from catalogs.entries import load
 from reference_pages.markdown import format_table
 from tasks.vehicle.effects.table import EFFECT_TABLE, EFFECT_UNITS, EffectParameter
 
@@ -23,7 +23,7 @@ def write_effect_table() -> str:
             NUMBER.sub("...", effect.says),
             ", ".join(f"`{parameter.name}`" for parameter in effect.parameters),
         )
-        for effect in load_effects()
+        for effect in load("library of effects")
     ]
     return format_table(("effect", "class", "depends on", "what it adds", "in words", "numbers"), rows)
 

@@ -35,6 +35,8 @@ def write_field_table() -> str:
             limits = load("table of physical limits")
             falling = [(kind.name, kind.rate_limit) for kind in WEATHERS.values() if kind.rate_limit]
             row[3] = ", ".join(f"{name}: 0 to {getattr(limits, limit).value:g}" for name, limit in falling)
+        if field == "objects":
+            row[3] = "[road users](#road-users)"
         rows.append(row)
     return format_table(HEAD, rows)
 

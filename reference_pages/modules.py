@@ -4,14 +4,17 @@ from functools import partial
 
 PAGES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "musync": (
-        "musync: open a dataset",
-        "`import musync` opens a finished dataset. [Query a dataset](../../how-to/query-a-dataset.md) shows it in use.",
+        "musync: open a dataset, step a car",
+        "`import musync` opens a finished dataset ([query a dataset](../../how-to/query-a-dataset.md)) and drives a car"
+        " [step by step](../../how-to/drive-the-car-in-another-simulator.md#step-by-step-in-python).",
         (
             "flows.reading.opening.open",
             "flows.reading.opening.Dataset",
             "flows.reading.clips.Clip",
             "flows.reading.windows.ClipWindows",
             "flows.reading.windows.SeededOrder",
+            "flows.driving.simulator.Simulator",
+            "flows.driving.simulator.Observation",
             "tasks.errors.InputError",
         ),
     ),
@@ -126,7 +129,8 @@ def write_module_page(title: str, introduction: str, objects: tuple[str, ...]) -
     parts = [f"# {title}\n\n{introduction}\n"]
     for path in objects:
         name = path.rsplit(".", 1)[-1]
-        public = f"musync.{name}" if path.startswith("flows.reading") or name == "InputError" else path
+        offered = path.startswith(("flows.reading", "flows.driving")) or name == "InputError"
+        public = f"musync.{name}" if offered else path
         parts.append(f"\n## `{public}`\n\n::: {path}\n")
     return "".join(parts)
 

@@ -4,7 +4,7 @@ import re
 from typing import Any
 
 from flows.reading.query import list_columns
-from flows.store.arrays import arrays_of
+from flows.store.arrays import EVERY_ARRAY, INSTANCE_ARRAYS, LABEL_ARRAYS
 from reference_pages.markdown import format_table
 from tasks.campaign.channels import MAIN_CHANNELS, SIDE_CHANNELS
 from tasks.conventions import CHANNELS_BY_NAME
@@ -13,6 +13,7 @@ MEANINGS = {
     "clips": "a row a clip: controls, surface, outcome, verdict",
     "ticks": "a row a millisecond of a clip: all physics",
     "frames": "a row a frame: the tick that it shows, the rig's pose, the recovered motion",
+    "objects": "a row a road user and frame: its boxes, motion and how much of it one sees",
     "verdicts": "a row a clip: its pose check",
     "pairs": "a row two clips that differ in one control, and what that changes",
 }
@@ -53,7 +54,8 @@ def write_symbol_table() -> str:
 
 
 def _write_arrays(described: list[dict[str, Any]]) -> str:
-    always = arrays_of(labels=False)
+    asked = dict.fromkeys(LABEL_ARRAYS, "where the grid asks for labels")
+    asked |= dict.fromkeys(INSTANCE_ARRAYS, "where the grid has road users")
     rows = [
         (
             f"`{row['name']}`",
@@ -61,11 +63,11 @@ def _write_arrays(described: list[dict[str, Any]]) -> str:
             ", ".join(row["dimensions"]),
             row["unit"],
             row["description"],
-            "" if row["name"] in always else "where the grid asks for labels",
+            asked.get(row["name"], ""),
         )
         for row in described
     ]
-    classes = arrays_of(labels=True)["class"].flags
+    classes = EVERY_ARRAY["class"].flags
     return (
         format_table(("array", "type", "dimensions", "unit", "meaning", "written"), rows)
         + "\n## Classes of a pixel\n\n"

@@ -5,8 +5,7 @@ from inspect import getdoc
 
 import yaml
 
-from catalogs.decision_rules import DECISION_RULES
-from catalogs.effects import LIBRARY_FILE
+from catalogs.entries import find_entry
 from reference_pages.markdown import format_table
 from tasks.identification.decision.forms import PORT_STEP, SCANNED
 from tasks.identification.rules import DecisionRules
@@ -32,7 +31,7 @@ def read_meanings(rules: type) -> dict[str, str]:
 def write_decision_table() -> str:
     """Return the table of the numbers by which odds become a verdict, as Markdown."""
     meanings = read_meanings(DecisionRules)
-    numbers = yaml.safe_load(DECISION_RULES.read_text(encoding="utf-8"))
+    numbers = yaml.safe_load(find_entry("set of decision rules").read_text(encoding="utf-8"))
     rows = [(f"`{n}`", e["value"], e["unit"], meanings[n], e["source"]) for n, e in numbers.items()]
     return format_table(("number", "value", "unit", "what it is", "reason"), rows)
 
@@ -40,7 +39,7 @@ def write_decision_table() -> str:
 def write_size_table() -> str:
     """Return the table of the smallest size that matters of every effect, as Markdown."""
     rows = []
-    for effect in yaml.safe_load(LIBRARY_FILE.read_text(encoding="utf-8")):
+    for effect in yaml.safe_load(find_entry("library of effects").read_text(encoding="utf-8")):
         first = effect["parameters"][0]
         cells = (f"`{effect['name']}`", f"`{first}`", effect["matters"], PARAMETERS[first].unit)
         rows.append((*cells, effect["because"]))

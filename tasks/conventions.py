@@ -170,13 +170,33 @@ PAIR_CHANNELS: tuple[Channel, ...] = (
     Channel(name="clip_id_b", unit="", symbol="", description="the other sibling"),
     Channel(name="label_a", unit="", symbol="", description="label of the first"),
     Channel(name="label_b", unit="", symbol="", description="label of the other"),
-    Channel(name="control", unit="", symbol="", description="the one control in which they differ: weather, speed, braking, road or scene"),
+    Channel(name="control", unit="", symbol="", description="the one control in which they differ: weather, speed, braking, road, scene or road users"),
     Channel(name="differs", unit="", symbol="", description="the scenario fields of that control whose values differ"),
     Channel(name="surface_friction_change", unit="1", symbol="Delta mu_c", description="reference surface coefficient, b minus a"),
     Channel(name="tyre_peak_change", unit="1", symbol="Delta mu_eff", description="effective peak of the tyre curve, b minus a"),
     Channel(name="stopping_distance_change", unit="m", symbol="Delta d_stop", description="distance from brake onset to the stop, b minus a"),
     Channel(name="peak_pitch_change", unit="rad", symbol="", description="largest nose-down pitch, b minus a"),
 )  # fmt: skip
+
+OBJECT_CHANNELS: tuple[Channel, ...] = (
+    Channel(name="object", unit="1", symbol="", description="number of the road user in its clip, from 1 on, and in the array of instances"),
+    Channel(name="kind", unit="", symbol="", description="kind of the road user"),
+    Channel(name="box_left", unit="px", symbol="", description="left edge of the pixels that show it; null where none does, as the other edges"),
+    Channel(name="box_top", unit="px", symbol="", description="upper edge of these pixels"),
+    Channel(name="box_right", unit="px", symbol="", description="right edge of these pixels, behind the last"),
+    Channel(name="box_bottom", unit="px", symbol="", description="lower edge of these pixels, behind the last"),
+    Channel(name="visible_pixels", unit="1", symbol="", description="number of these pixels"),
+    Channel(name="visibility", unit="1", symbol="", description="share of its surface towards the camera, inside the picture, that nothing else hides; null where none is inside"),
+    Channel(name="truncation", unit="1", symbol="", description="share of its surface towards the camera that lies outside the picture"),
+    Channel(name="size", unit="m", symbol="", description="length, width and height of its box"),
+    Channel(name="centre_world", unit="m", symbol="", description="middle of its box in the world"),
+    Channel(name="rotation_world", unit="1", symbol="", description="rotation of its box into the world, quaternion wxyz; x is forward"),
+    Channel(name="centre_rig", unit="m", symbol="", description="middle of its box in the axes of the rig, T_world_rig"),
+    Channel(name="rotation_rig", unit="1", symbol="", description="rotation of its box into the axes of the rig, quaternion wxyz"),
+    Channel(name="velocity_world", unit="m s-1", symbol="", description="its velocity in the world"),
+    Channel(name="velocity_rig", unit="m s-1", symbol="", description="the same over ground, in the axes of the rig"),
+)  # fmt: skip
+"""Columns of the table of road users beside the frame, a row a frame and road user."""
 
 VARIANT_CHANNEL = Channel(
     name="variant",
@@ -194,7 +214,8 @@ SCENE_CHANNEL = Channel(
 CHANNELS_BY_NAME: dict[str, Channel] = {
     c.name: c
     for c in (
-        VARIANT_CHANNEL, SCENE_CHANNEL, *IDENTITY_CHANNELS, *TICK_CHANNELS, *FRAME_CHANNELS, *CLIP_CHANNELS, *CHECK_CHANNELS, *PAIR_CHANNELS
+        VARIANT_CHANNEL, SCENE_CHANNEL, *IDENTITY_CHANNELS, *TICK_CHANNELS, *FRAME_CHANNELS, *CLIP_CHANNELS, *CHECK_CHANNELS, *PAIR_CHANNELS,
+        *OBJECT_CHANNELS,
     )
 }  # fmt: skip
 

@@ -1,16 +1,13 @@
 """The library of effects that a vehicle model may lack."""
 
-from pathlib import Path
 from string import Formatter
 from typing import Annotated, Self
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from catalogs.quantities import CatalogueEntry, CatalogueList, Text, read_entry
+from catalogs.quantities import CatalogueEntry, CatalogueList, Text
 from tasks.vehicle.effects.library import Effect, EffectClass
 from tasks.vehicle.effects.table import PARAMETERS
-
-LIBRARY_FILE = Path(__file__).with_name("library.yaml")
 
 
 class EffectEntry(CatalogueEntry):
@@ -57,21 +54,6 @@ class EffectLibrary(CatalogueList[Annotated[list[EffectEntry], AfterValidator(_c
     def build(self) -> tuple[Effect, ...]:
         """Return the effects, in the order of the file."""
         return tuple(_make_effect(entry) for entry in self.root)
-
-
-def load_effects(path: str | Path = LIBRARY_FILE) -> tuple[Effect, ...]:
-    """Effects of a library file, in its order.
-
-    Parameters
-    ----------
-    path : YAML list of effects
-
-    Raises
-    ------
-    InputError
-        With every rule the file breaks.
-    """
-    return read_entry(EffectLibrary, Path(path), "library of effects").build()
 
 
 def _make_effect(entry: EffectEntry) -> Effect:

@@ -2,19 +2,16 @@
 
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from catalogs.effects import load_effects
-from catalogs.quantities import CatalogueEntry, Number, read_entry
+from catalogs.entries import load
+from catalogs.quantities import CatalogueEntry, Number
 from catalogs.sentences import shorten_value
 from tasks.vehicle.effects.ports import PORTS, VARIABLES
 from tasks.vehicle.effects.slots import Slot
-
-TRUTHS_FILE = Path(__file__).with_name("truths.yaml")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,7 +71,7 @@ class OutsideEntry(CatalogueEntry):
 
 @cache
 def _library_names() -> dict[str, set[str]]:
-    return {effect.name: {p.name for p in effect.parameters} for effect in load_effects()}
+    return {effect.name: {p.name for p in effect.parameters} for effect in load("library of effects")}
 
 
 class TruthFile(CatalogueEntry):
@@ -99,49 +96,29 @@ class TruthFile(CatalogueEntry):
             raise ValueError("; ".join(problems))
         return named
 
-
-def load_truths(path: str | Path = TRUTHS_FILE) -> tuple[Truth, ...]:
-    """Truths of a file, in its order.
-
-    Parameters
-    ----------
-    path : YAML with ``library`` (effect to parameters) and ``outside`` (name to port, variable and table)
-
-    Raises
-    ------
-    InputError
-        With every rule the file breaks.
-    """
-    file = read_entry(TruthFile, Path(path), "list of truths")
-    library = [
-        Truth(name=name, values=values, slots=(), left_out=()) for name, values in file.library.items()
-    ]
-    outside = [
-        Truth(name=name, values={}, slots=(_make_slot(form),), left_out=form.left_out)
-        for name, form in file.outside.items()
-    ]
-    return (*library, *outside)
+    def build(self) -> tuple[Truth, ...]:
+        """Return the truths, in the order of the file."""
+        library = [
+            Truth(name=name, values=values, slots=(), left_out=()) for name, values in self.library.items()
+        ]
+        outside = [
+            Truth(name=name, values={}, slots=(_make_slot(form),), left_out=form.left_out)
+            for name, form in self.outside.items()
+        ]
+        return (*library, *outside)
 
 
-def load_sizes(path: str | Path = TRUTHS_FILE) -> tuple[Truth, ...]:
-    """Truths of one effect at several sizes each, for power against size.
+class SizeFile(TruthFile):
+    """The same file, for the effects at several sizes each: power against size."""
 
-    Parameters
-    ----------
-    path : YAML with ``sizes`` (effect to parameter to its values)
-
-    Raises
-    ------
-    InputError
-        With every rule the file breaks.
-    """
-    file = read_entry(TruthFile, Path(path), "list of truths")
-    return tuple(
-        Truth(name=name, values={parameter: value}, slots=(), left_out=())
-        for name, parameters in file.sizes.items()
-        for parameter, values in parameters.items()
-        for value in values
-    )
+    def build(self) -> tuple[Truth, ...]:
+        """Return one truth for each size."""
+        return tuple(
+            Truth(name=name, values={parameter: value}, slots=(), left_out=())
+            for name, parameters in self.sizes.items()
+            for parameter, values in parameters.items()
+            for value in values
+        )
 
 
 def _make_slot(form: OutsideEntry) -> Slot:

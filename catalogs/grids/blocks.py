@@ -8,6 +8,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from catalogs.names import Label, WeatherName
+from catalogs.road_users import RoadUser
 from catalogs.scenario import NUMBERS
 from catalogs.sentences import shorten
 from catalogs.street_names import SceneName, read_scene_levels
@@ -48,6 +49,11 @@ class PartialScenario(Strict):
     hazard_center_m: Number | None = None
     hazard_length_m: Number | None = None
     hazard_height_m: Number | None = None
+    objects: tuple[RoadUser, ...] | None = Field(
+        default=None,
+        exclude_if=lambda users: users is None,
+        description="Road users beside the ego vehicle.",
+    )
     scene: SceneName | None = None
 
 

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from catalogs.grids.blocks import Levels, PartialScenario
 from catalogs.grids.form import GridFile
+from catalogs.road_users import RoadUser, TrackForm
 from catalogs.scenario import NUMBERS, UNKNOWN_WEATHER
 from catalogs.sentences import KeyPath, describe_rules
 
@@ -64,6 +65,8 @@ def read_form(content: dict[str, Any], path: Path) -> GridForm:
 
 
 def _known_keys(key_path: KeyPath) -> Iterable[str]:
+    if "objects" in key_path:
+        return TrackForm.model_fields if key_path[-1] == "track" else RoadUser.model_fields
     return GridFile.model_fields if not key_path else PartialScenario.model_fields
 
 

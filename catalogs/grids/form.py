@@ -11,6 +11,7 @@ from catalogs.grids.blocks import Number as LaxNumber
 from catalogs.grids.selection import Condition
 from catalogs.names import Name
 from catalogs.physical_limits import find_limit_problem
+from catalogs.road_users import RoadUser
 from catalogs.street_names import SceneName
 from catalogs.variants import Variant
 
@@ -159,6 +160,20 @@ class GridFile(Blocks):
     def rows_per_clip(self) -> dict[str, int]:
         """Rows of every clip in each table of telemetry, the first frame's tick among them [1]."""
         return {"ticks": round(self.telemetry_s * TICK_RATE_HZ) + 1, "frames": self.frames}
+
+    @property
+    def road_users(self) -> list[RoadUser]:
+        """Road users of all levels."""
+        levels = [self.base, *self.scenarios.values()]
+        levels += [
+            level for axes in (self.axes, self.zip) for axis in axes.values() for level in axis.values()
+        ]
+        return [user for level in levels for user in level.objects or ()]
+
+    @property
+    def has_objects(self) -> bool:
+        """Whether there are road users: then all clips have an array of instances and a table of objects."""
+        return bool(self.road_users)
 
     @property
     def keeps_stops_steady(self) -> bool:

@@ -6,7 +6,30 @@ from catalogs.entries import entry_names, load
 from catalogs.grids import GridFile
 from catalogs.scenario import SCENARIO_FIELDS, Scenario, list_ranges
 from catalogs.scenes import BUILT_IN
+from catalogs.street_names import HIGHEST_SEED, KINDS
 from tasks.conventions import CHANNELS_BY_NAME
+
+
+def _describe_streets(schema: dict[str, Any]) -> None:
+    """Add the forms in which a grid names streets by kind and seed, one and an axis of them."""
+    kind, seed = {"enum": list(KINDS)}, {"type": "integer", "minimum": 0, "maximum": HIGHEST_SEED}
+    ends = {"type": "object", "properties": {"min": seed, "max": seed}, "required": ["min", "max"]}
+    several = {
+        "kind": {"anyOf": [kind, {"type": "array", "items": kind}]},
+        "seed": {"anyOf": [seed, {"type": "array", "items": seed}, ends]},
+    }
+    one, axis = (
+        {"type": "object", "required": [key], "additionalProperties": False, "properties": {
+            key: {"type": "object", "required": ["kind", "seed"], "additionalProperties": False, "properties": parts}}}
+        for key, parts in (("street", {"kind": kind, "seed": seed}), ("streets", several))
+    )  # fmt: skip
+    for fields in (schema["properties"], schema["$defs"]["PartialScenario"]["properties"]):
+        known = {name: fields["scene"].pop(name) for name in ("type", "anyOf", "minLength", "maxLength")
+                 if name in fields["scene"]}  # fmt: skip
+        fields["scene"]["anyOf"] = [*known.pop("anyOf", [known]), one]
+    for block in ("axes", "zip"):
+        levels = schema["properties"][block]["additionalProperties"]
+        schema["properties"][block]["additionalProperties"] = {"anyOf": [axis, levels]}
 
 
 def grid_schema() -> dict[str, Any]:
@@ -21,6 +44,7 @@ def grid_schema() -> dict[str, Any]:
         fields[name] |= {"description": f"{channel.description}{unit}", "default": getattr(Scenario(), name)}
         fields[name] |= {bound: value for bound, value in bounds if value is not None}
     schema["properties"]["duration_s"]["maximum"] = load("table of physical limits").duration.value
+    _describe_streets(schema)
     entries = {
         "vehicle": entry_names("vehicle"),
         "surface": entry_names("surface"),

@@ -10,7 +10,9 @@ from catalogs.scenes.street_cache import BUILT_IN_SEED, cached_street
 from catalogs.sentences import shorten
 from catalogs.street_names import KIND_FILES, KINDS, parse_street_name
 from tasks.errors import InputError
+from tasks.scene.route import Route
 from tasks.scene.scene import Scene
+from tasks.scene.street.bend import integrate_course, lay_route
 from tasks.scene.street.layout import StreetLayout
 
 BUILT_IN = tuple(CHANGES)
@@ -89,9 +91,29 @@ def load_scene(name_or_folder: str) -> Scene:
     return read_scene(scene_folder(name_or_folder))
 
 
+@lru_cache(maxsize=256)
+def load_route(name_or_folder: str) -> Route:
+    """Return the route of a scene; that of a street which muSync makes follows from its entry, without its Gaussians.
+
+    Parameters
+    ----------
+    name_or_folder : as of `load_scene`
+
+    Raises
+    ------
+    InputError
+        As `load_scene` raises it.
+    """
+    recipe = find_recipe(name_or_folder)
+    if recipe is None:
+        return load_scene(name_or_folder).route
+    layout = load_street_layout(STREET_FILE, *recipe[0], seed=recipe[1])
+    return lay_route(layout, integrate_course(layout))
+
+
 def scene_identity(name_or_folder: str) -> str:
     """SHA-256 that identifies a scene's content."""
     return scene_hash(scene_folder(name_or_folder))
 
 
-__all__ = ["load_scene", "scene_folder", "scene_identity", "write_scene"]
+__all__ = ["load_route", "load_scene", "scene_folder", "scene_identity", "write_scene"]

@@ -129,7 +129,7 @@ def load_street_layout(path: Path = STREET_FILE, *changes: Path, seed: int = 0) 
         elif course is not None:
             layout = replace(layout, course=_read_value(course))
         if season is not None:
-            drawn_season = draw_season(_read_ranges(SeasonRanges, season), seed)
+            drawn_season: dict[str, Any] = draw_season(_read_ranges(SeasonRanges, season), seed)
             layout = replace(layout, **drawn_season)
             light = light_of(layout.sun_elevation_deg, layout.sun_rgb, layout.sky_rgb, layout.bounce_rgb)
             layout = replace(layout, sun_rgb=light[0], sky_rgb=light[1], bounce_rgb=light[2])

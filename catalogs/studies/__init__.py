@@ -63,7 +63,7 @@ class SensitivityEntry(CatalogueEntry):
 
     def build(self) -> tuple[StudyProtocol, tuple[PrintedFigure, ...]]:
         """Protocol and printed figures of the paper's Appendix E."""
-        values = self.protocol.values()
+        values = self.protocol.numbers()
         values["initial_speed"] /= 3.6
         values["samples"] = int(values["samples"])
         protocol = StudyProtocol(

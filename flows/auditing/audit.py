@@ -17,7 +17,7 @@ from flows.running.orchestration import run_as_stage
 from flows.running.processors import count_processors
 from flows.running.runner import RunnerName, check_runner
 from flows.store.address import open_for_writing, want_everything
-from flows.store.layout import STAGED_TABLES
+from flows.store.layout import OBJECTS, STAGED_TABLES
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
 from manifests.canonical import sha256_of
@@ -147,7 +147,7 @@ def count_contents(chosen: Sequence[Receipt]) -> dict[str, int]:
     chosen : receipts of the clips that were made again
     """
     contents = [name for clip in chosen for name in clip["content"]]
-    tables = sum(name in STAGED_TABLES for name in contents)
+    tables = sum(name in (*STAGED_TABLES, OBJECTS) for name in contents)
     return {"tables": tables, "arrays": len(contents) - tables}
 
 

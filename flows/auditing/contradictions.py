@@ -19,7 +19,7 @@ from flows.making.plan import Plan
 from flows.making.seal import SHEET
 from flows.making.summaries import SUMMARIES, summarise_clips
 from flows.store.arrays import arrays_of
-from flows.store.layout import STAGED_TABLES, Layout, encode_json
+from flows.store.layout import OBJECTS, STAGED_TABLES, Layout, encode_json
 from flows.store.links import require_file
 from flows.store.parquet_files import refuse_footer
 from flows.store.sealed import read_plan_record
@@ -90,7 +90,7 @@ def find_contradictions(
 
 def list_remade(plan: Plan) -> list[str]:
     """Return the paths of the files that `find_contradictions` holds against what our writer makes."""
-    names = arrays_of(plan.settings.labels) if plan.settings.pictures else {}
+    names = arrays_of(plan.settings.labels, plan.settings.has_objects) if plan.settings.pictures else {}
     return [
         "plan.json",
         GRID,
@@ -147,7 +147,7 @@ def _compare_ids(manifest: Manifest, plan: Plan) -> Iterator[str]:
     }
     for clip in plan.clips:
         if (
-            wanted := identify_clip(own[clip.scenario.scene], clip.scenario.as_row(), clip.seed)
+            wanted := identify_clip(own[clip.scenario.scene], clip.scenario.as_record(), clip.seed)
         ) != clip.clip_id:
             yield (
                 f"manifest.json: the id of clip {clip.label} must be {wanted}, the hash of its inputs, scenario and"
@@ -162,12 +162,14 @@ def _compare_ids(manifest: Manifest, plan: Plan) -> Iterator[str]:
 
 def _compare_files(layout: Layout, manifest: Manifest, plan: Plan) -> Iterator[str]:
     """Yield the files that are recorded and not planned, or planned and not recorded, or recorded of another clip."""
-    arrays = arrays_of(plan.settings.labels) if plan.settings.pictures else {}
+    arrays = arrays_of(plan.settings.labels, plan.settings.has_objects) if plan.settings.pictures else {}
     planned: dict[str, str | None] = dict.fromkeys(
         [*list_remade(plan), *(f"inputs/{name}" for name in plan.inputs)]
     )
     for made in plan.clips:
         planned |= {layout.relative(layout.frame_shard(name, made.index)): made.clip_id for name in arrays}
+        if plan.settings.has_objects:
+            planned[layout.relative(layout.object_table(made.index))] = made.clip_id
     recorded = {path: clip_id for path, (_, clip_id) in recorded_files(manifest).items()}
     for path in sorted(recorded.keys() ^ planned.keys()):
         is_recorded = path in recorded
@@ -181,7 +183,7 @@ def _compare_files(layout: Layout, manifest: Manifest, plan: Plan) -> Iterator[s
                 f"manifest.json: {path} must be a file of {_name_owner(planned[path])}; it is recorded as one of"
                 f" {_name_owner(recorded[path])}"
             )
-    contents = {*STAGED_TABLES, *arrays}
+    contents = {*STAGED_TABLES, *arrays, *([OBJECTS] if plan.settings.has_objects else [])}
     for clip in manifest["clips"]:
         passed, reasons = clip["verdict"]["passed"], clip["verdict"]["reasons"]
         if (passed is True) == bool(reasons):

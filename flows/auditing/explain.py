@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from catalogs.scenario import Scenario
-from catalogs.scenes import load_scene
+from catalogs.scenes import load_route
 from catalogs.studies.ablation import cut_coupling
 from catalogs.variants import warn_of_variant
 from flows.making.catalogue import Catalogue
@@ -197,6 +197,6 @@ def _list_scenario(scenario: Scenario) -> dict[str, Any]:
 def find_route(scene: Mapping[str, str]) -> Route | None:
     """The scene's route; None where the scene has moved away, which leaves one step out."""
     try:
-        return load_scene(find_scene(scene)).route
+        return load_route(find_scene(scene))
     except InputError:
         return None

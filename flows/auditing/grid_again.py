@@ -97,13 +97,13 @@ def _compare_clip(
     default = "" if scenario.scene is None else find_default_split(scenario.scene)
     splits = {name for name, condition in settings.splits.items() if condition.holds(facts)} or {default}
     asked: Mapping[str, object] = {
-        **scenario.as_row(),
+        **scenario.as_record(),
         "seed": derive_seed(seed, scenario.as_row()),
         "calibration": facts[CALIBRATION] if is_same_writer else clip.calibration,
         "split": clip.split if clip.split in splits else min(splits),
     }
     found = {
-        **clip.scenario.as_row(),
+        **clip.scenario.as_record(),
         "seed": clip.seed,
         "calibration": clip.calibration,
         "split": clip.split,

@@ -14,8 +14,9 @@ from flows.making.plan import Plan, read_plan
 from flows.running.runner import RunnerName
 from flows.store.arrays import arrays_of
 from flows.store.frames import buffer_hash, read_clip
-from flows.store.layout import STAGED_TABLES, Layout, write_atomically
+from flows.store.layout import OBJECTS, STAGED_TABLES, Layout, write_atomically
 from flows.store.links import require_file
+from flows.store.object_tables import hash_objects, read_objects
 from flows.store.sealed import read_receipt
 from flows.store.staging import scratch_dataset
 from flows.store.telemetry import content_hash, read_columns, table_columns
@@ -89,12 +90,18 @@ def _compare_clip(
     clip_id, index = clip["clip_id"], clip["index"]
     again = read_receipt(remade, clip_id)
     changed: dict[str, dict[str, Any]] = {}
-    for name in (*STAGED_TABLES, *(arrays_of(plan.settings.labels) if plan.settings.pictures else ())):
+    settings = plan.settings
+    arrays = arrays_of(settings.labels, settings.has_objects) if settings.pictures else ()
+    objects = (OBJECTS,) if settings.has_objects else ()
+    for name in (*STAGED_TABLES, *objects, *arrays):
         digest = again["content"][name]
         try:
             if name in STAGED_TABLES:
                 columns = _read_as_stored(name, layout.root / parts[name, clip_id], remade, clip_id)
                 digest, stored = content_hash(name, columns[1]), _compare_rows(*columns)
+            elif name == OBJECTS:
+                held, made = (read_objects(place, index, settings.frames) for place in (layout, remade))
+                digest, stored = hash_objects(made), find_row_difference(held, made, list(made))
             else:
                 stored = _compare_pixels(layout, remade, index, name, digest, is_same_writer)
         except InputError as error:

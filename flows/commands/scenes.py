@@ -1,6 +1,8 @@
 """Commands that build scenes from recordings and other tools, and render single frames of them."""
 
-from flows.commands.command import BACKEND, Command, define_argument, define_option, require_key
+from typing import Any
+
+from flows.commands.command import BACKEND, OUT, Command, define_argument, define_option, require_key
 from tasks.conventions import POSE_FORMS
 
 GROUP = "Scenes"
@@ -12,6 +14,27 @@ SUN = define_option(
     spelling="sun",
 )
 SCENE_OUT = define_option("out", str, "Scene folder to make.")
+
+SCENES = define_option(
+    "scenes",
+    list[str] | None,
+    "Folder, or street such as town-7; may be given more than once. By default the first streets of each kind.",
+    None,
+    spelling="scene",
+)
+
+STREETS = define_option("streets", int, "Streets of each kind, where no scene is named.", 4)
+
+
+def shorten_check(result: dict[str, Any]) -> dict[str, Any]:
+    """Return the check with a row for each scene that has faults, and the figures that differ most."""
+    kept = ("scene", "road_coverage", "in_the_way", "afloat", "holes", "ratio")
+    rows = [
+        {key: row[key] for key in kept if key in row} | {"faults": "; ".join(row["faults"])}
+        for row in result["scenes"]
+    ]
+    return result | {"scenes": rows}
+
 
 COMMANDS = (
     Command(
@@ -58,6 +81,22 @@ COMMANDS = (
             SUN,
         ),
         passed=require_key("road_found"),
+    ),
+    Command(
+        name="scene gallery",
+        group=GROUP,
+        sentence="Draw a sheet of scenes along their routes.",
+        function="flows.making.scene_views:show_scenes",
+        options=(SCENES, STREETS, define_option("out", str, "Folder for gallery.png."), BACKEND),
+    ),
+    Command(
+        name="scene check",
+        group=GROUP,
+        sentence="Check scenes for holes, floating parts, a route off the road, and their scale.",
+        function="flows.making.scene_views:check_scenes",
+        options=(SCENES, STREETS, OUT, BACKEND),
+        brief=shorten_check,
+        passed=require_key("sound"),
     ),
     Command(
         name="scene render",

@@ -23,7 +23,7 @@ COMMANDS = (
                 "base",
                 str,
                 "Vehicle to inherit from: a name, or a file in the folder of --out.",
-                "paper-reference",
+                "bmw-320i",
                 spelling="from",
                 known=VEHICLE.known,
             ),

@@ -7,11 +7,11 @@ from catalogs.driven import DrivenClips, PolicyEntry, encode_driven
 from catalogs.entries import load
 from catalogs.grids import Grid
 from catalogs.sentences import cap_problems
+from flows.driving.aeb import tell_outcome
 from flows.driving.policy import Policy, drive_with, load_policy
 from flows.driving.simulator import UNBRAKED, Simulator
 from flows.making.generate import generate_dataset
 from flows.making.grid_entries import read_entries
-from flows.making.grid_inputs import grade_of
 from flows.making.plan import name_clip
 from flows.making.request import list_facts
 from flows.running.progress import progress_bar
@@ -37,7 +37,9 @@ def drive_grid(
 
     Returns
     -------
-    As `make_dataset`, and ``policy`` with its ``source_sha256``.
+    As `make_dataset`, and ``policy`` with its ``source_sha256``; of scenarios with road users ``outcomes[]``: scenario,
+    number and kind of the road user, ``collided``, ``impact_speed_km_h``, ``min_ttc_s``, ``clearance_m``,
+    ``avoided_km_h``.
 
     Raises
     ------
@@ -49,11 +51,15 @@ def drive_grid(
     found = load_policy(policy)
     if problems := _find_problems(asked, rate_hz):
         raise InputError([f"{grid}: {problem}" for problem in problems])
-    pressures = _drive_clips(asked, found, rate_hz)
+    pressures, outcomes = _drive_clips(asked, found, rate_hz)
     entry = PolicyEntry(policy=found.name, source_sha256=found.source_sha256, rate_hz=float(rate_hz))
     files = encode_driven(DrivenClips(entry=entry, pressures=pressures), found.source)
     report = generate_dataset(replace(asked, driven=files), out, pictures=pictures, **execution)
-    return list_facts(report) | {"policy": found.name, "source_sha256": found.source_sha256}
+    return list_facts(report) | {
+        "policy": found.name,
+        "source_sha256": found.source_sha256,
+        "outcomes": outcomes,
+    }
 
 
 def _find_problems(grid: Grid, rate_hz: float) -> list[str]:
@@ -77,22 +83,22 @@ def _find_problems(grid: Grid, rate_hz: float) -> list[str]:
     return cap_problems(problems)
 
 
-def _drive_clips(grid: Grid, policy: Policy, rate_hz: float) -> dict[str, list[float]]:
-    """Pressures of each clip by its label; the first is driven twice."""
+def _drive_clips(
+    grid: Grid, policy: Policy, rate_hz: float
+) -> tuple[dict[str, list[float]], list[dict[str, Any]]]:
+    """Pressures of each clip by its label, and outcomes of the scenarios; the first is driven twice."""
     settings = grid.settings
     entries = read_entries(settings, {scenario.weather for _, scenario in grid.scenarios})
     if entries.problems:
         raise InputError(entries.problems)
-    grades = {
-        scene: grade_of(scene or settings.scene)
-        for scene in {scenario.scene for _, scenario in grid.scenarios}
-    }
     driven: dict[str, list[float]] = {}
+    outcomes: list[dict[str, Any]] = []
+    bumper = load("emergency braking").car
     with progress_bar("driven", len(grid.scenarios)) as advance:
         for label, scenario in grid.scenarios:
             simulator = Simulator(
-                scenario, vehicle=entries.vehicle, surface=entries.surface, rate_hz=rate_hz,
-                duration_s=settings.telemetry_s, grade=grades[scenario.scene],
+                replace(scenario, scene=scenario.scene or settings.scene), vehicle=entries.vehicle,
+                surface=entries.surface, rate_hz=rate_hz, duration_s=settings.telemetry_s,
             )  # fmt: skip
             pressures = drive_with(policy, simulator, f"clip {label}")
             if not driven and drive_with(policy, simulator, f"clip {label}") != pressures:
@@ -100,7 +106,12 @@ def _drive_clips(grid: Grid, policy: Policy, rate_hz: float) -> dict[str, list[f
                     f"policy {policy.name}: clip {label}: must ask for the same pressures in the same drive; asked"
                     " again it asks for others: take chance and memory out, or make it a class"
                 )
+            found = simulator.judge(bumper.overhang_m.value, bumper.width_m.value)
+            outcomes += [
+                {"scenario": label, "number": number, "kind": user.kind} | tell_outcome(outcome)
+                for number, (user, outcome) in enumerate(zip(scenario.objects, found, strict=True), start=1)
+            ]
             for seed in range(settings.seed, settings.seed + settings.visual_seeds):
                 driven[name_clip(label, seed, settings.visual_seeds)] = pressures
             advance(label)
-    return driven
+    return driven, outcomes

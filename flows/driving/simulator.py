@@ -6,24 +6,28 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from catalogs.entries import load
 from catalogs.scenario import Scenario, find_scenario_problems
-from catalogs.sentences import shorten_value
+from catalogs.sentences import describe_rules, shorten_value
+from flows.driving.view import StepCamera
 from flows.making.driving import hazard_of, surface_of
 from flows.making.grid_inputs import grade_of
-from tasks.driving.stepped import SteppedDrive
-from tasks.driving.targets import Target, TargetTrack
+from tasks.driving.outcome import Outcome, judge_approach
+from tasks.driving.stepped import DriveSettings, SteppedDrive
+from tasks.driving.targets import Target, TargetTrack, follow_track
 from tasks.errors import InputError
-from tasks.surface.road_profile import LEVEL_ROAD, RoadGrade
+from tasks.surface.road_profile import LEVEL_ROAD
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.model.simulation import COLUMNS
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Rollout
 
-UNBRAKED = ("peak_pressure_mpa", "brake_onset_s", "brake_onset_m", "hold_speed")
+UNBRAKED = ("peak_pressure_mpa", "brake_onset_s", "brake_onset_m")
 """Fields of a scenario that a drive by steps has no use for: who steps brakes."""
-LEVEL_SCENES = (None, "street")
+LEVEL_SCENE = "street"
+"""Scene of a scenario that names none; it need not be loaded to know its grade."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,13 +66,14 @@ class Simulator:
 
     Parameters
     ----------
-    scenario : a `Scenario`, or its fields by name; the brake's are left out
+    scenario : a `Scenario`, or its fields by name, without the brake's; ``hold_speed`` lasts until the first pressure
     vehicle, surface : names of the catalogue, or files
     rate_hz : of the steps, whole milliseconds each [Hz]
     duration_s : longest drive, whole steps [s]
-    targets : tracks of road users ahead
+    targets : tracks of road users ahead, beside the ``objects`` of the scenario
     truth : whether observations have the truth
-    grade : of the road; None takes that of the scenario's scene, level where it names none
+    camera : name or file of the camera whose picture observations have, in the scenario's scene; a step then takes
+        about as long as two pictures. None for no pictures
 
     Raises
     ------
@@ -86,20 +91,34 @@ class Simulator:
         duration_s: float = 10.0,
         targets: Sequence[TargetTrack] = (),
         truth: bool = False,
-        grade: RoadGrade | None = None,
+        camera: str | None = None,
     ) -> None:
         self.scenario = asked = _check_scenario(scenario)
         car = vehicle if isinstance(vehicle, Vehicle) else load("vehicle", vehicle)
-        if not isinstance(surface, SurfaceParameters):
-            surface = load("wet friction").apply(load("surface", surface))
-        self.state = surface_of(asked, surface)
-        if grade is None:
-            grade = LEVEL_ROAD if asked.scene in LEVEL_SCENES else grade_of(str(asked.scene))
-        self.rate_hz, self._targets, self._truth = float(rate_hz), tuple(targets), truth
-        self._drive = SteppedDrive(
-            car, self.state, initial_speed=asked.initial_speed_km_h / 3.6, duration_s=duration_s, rate_hz=rate_hz,
-            hazard=hazard_of(asked), grade=grade,
+        pavement: SurfaceParameters = (
+            surface
+            if isinstance(surface, SurfaceParameters)
+            else load("wet friction").apply(load("surface", surface))
+        )
+        self.state = surface_of(asked, pavement)
+        grade = LEVEL_ROAD if asked.scene in (None, LEVEL_SCENE) else grade_of(str(asked.scene))
+        sizes = load("road user sizes") if asked.objects else {}
+        objects = [
+            follow_track(user.build_track(size := user.choose_size(sizes)), size, self.state.friction)
+            for user in asked.objects
+        ]
+        self.rate_hz, self._targets, self._truth = float(rate_hz), (*objects, *targets), truth
+        settings = DriveSettings(
+            initial_speed=asked.initial_speed_km_h / 3.6, duration_s=duration_s, rate_hz=rate_hz,
+            hold_speed=asked.hold_speed, hazard=hazard_of(asked), grade=grade,
         )  # fmt: skip
+        self._drive = SteppedDrive(car, self.state, settings)
+        self._camera: StepCamera | None = None
+        if camera is not None:
+            scene = asked.scene or LEVEL_SCENE
+            self._camera = StepCamera(
+                asked, self.state, pavement, car, scene=scene, camera=camera, rate_hz=rate_hz
+            )
 
     def reset(self) -> Observation:
         """Begin anew."""
@@ -129,6 +148,22 @@ class Simulator:
         """Return a column of the model at every millisecond so far [its unit]."""
         return self._drive.read_column(name)
 
+    def judge(self, overhang: float, width: float) -> list[Outcome]:
+        """Return what became of the approach to each target so far.
+
+        Parameters
+        ----------
+        overhang : of the front bumper before the front axle [m]
+        width : of the car [m]
+        """
+        station, speed, pressure = (
+            self.read_column(name) for name in ("station", "speed", "brake_pressure_mpa")
+        )
+        return [
+            judge_approach(station, speed, pressure, track, overhang=overhang, width=width)
+            for track in self._targets
+        ]
+
     def _observe(self) -> Observation:
         drive = self._drive
         read, time = drive.read, drive.time
@@ -136,8 +171,17 @@ class Simulator:
             time=time, station=read("station"), speed=read("speed"), acceleration=read("longitudinal_acceleration"),
             wheel_speed_f=read("wheel_speed_f"), wheel_speed_r=read("wheel_speed_r"), stands=drive.stop_time <= time,
             ends=drive.step_count == drive.steps, targets=tuple(track.find(time) for track in self._targets),
-            truth=self._read_truth() if self._truth else None,
+            frame=self._see(), truth=self._read_truth() if self._truth else None,
         )  # fmt: skip
+
+    def _see(self) -> NDArray[np.uint8] | None:
+        if self._camera is None:
+            return None
+        now, per_step = self._drive.step_count, self._drive.ticks_per_step
+        ticks = [max(now - 1, 0) * per_step, now * per_step]
+        return self._camera.see(
+            now, *(self.read_column(name)[ticks] for name in ("station", "heave", "pitch"))
+        )
 
     def _read_truth(self) -> dict[str, float]:
         values = {name: self._drive.read(name) for name in COLUMNS}
@@ -151,7 +195,10 @@ def _check_scenario(scenario: Scenario | Mapping[str, Any]) -> Scenario:
             raise InputError(
                 f"scenario: there is no field {', '.join(map(shorten_value, unknown))}; there are {', '.join(known)}"
             )
-        scenario = Scenario(**scenario)
+        try:
+            scenario = Scenario.of(scenario)
+        except ValidationError as error:
+            raise InputError(describe_rules(error, "scenario: objects")) from None
     plain = Scenario()
     problems = [
         f"scenario: {name} is the controller's, who brakes step by step; it is {getattr(scenario, name)}: leave it out"

@@ -6,15 +6,18 @@ mask (``iscrowd`` 1). Boxes are x, y, width, height in pixels, from the picture'
 
 Parked cars, lamps, signs, bollards, bins and the letter box of a street that muSync makes are objects. Each has a mask
 and a box of its own (``iscrowd`` 0, categories from 101 on), ``instance_id``, ``visibility``, ``truncation`` (null
-where too little of it is seen). ``objects`` has their 3D boxes in the world, each image its ``T_world_camera``, and
-``camera`` is that of all images, with its lens and shutter. Images and objects name the scene where there are several.
+where too little of it is seen). Road users are objects in every scene, with instances from 10,001 on; their annotation
+has box and velocity in the world (``centre``, ``size``, ``rotation`` wxyz, ``velocity``). ``objects`` has their 3D
+boxes in the world, each image its ``T_world_camera``, and ``camera`` is that of all images, with its lens and shutter.
+Images and objects name the scene where there are several.
 
 Format: https://cocodataset.org/#format-data
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
+from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -25,11 +28,16 @@ from flows.exporting.camera import describe_camera
 from flows.exporting.dataset import ExportedDataset
 from flows.exporting.instances import describe_object, find_scene_objects, to_share
 from flows.exporting.json_array import open_array
+from flows.exporting.road_users import NAMES, list_objects_by_frame
 from tasks.conventions import SemanticClass
 from tasks.render.contact_sheet import encode_png
 from tasks.render.instances import Instances
 from tasks.scene.street.objects import KINDS, StreetObject
 
+EVERY_KIND = (*KINDS, *(kind for kind in NAMES if kind not in KINDS))
+"""Kinds of street objects, and then of road users."""
+FIRST_ROAD_USER = 10_000
+"""Numbers of the instances of road users begin after it [1]."""
 FIRST_KIND = 100
 """Category ids of objects begin after it [1]; those of classes lie below."""
 
@@ -57,6 +65,8 @@ def write_coco(dataset: ExportedDataset, folder: Path) -> None:
                 if (scene := find_scene(named)) is not None:
                     objects[named] = scene.objects
                 depth = clip.read_array("depth") if scene else None
+                instances = clip.read_array("instance") if clip.objects else None
+                users = list_objects_by_frame(clip)
                 for frame, picture in enumerate(clip.read_array("rgb")):
                     name = f"{clip.name}_{frame:06d}.png"
                     (folder / "images" / name).write_bytes(encode_png(picture))
@@ -70,16 +80,22 @@ def write_coco(dataset: ExportedDataset, folder: Path) -> None:
                         for kind in np.unique(classes[frame]).tolist()
                     ]
                     if scene is not None and depth is not None:
-                        found = scene.finder.find(depth[frame], classes[frame], clip.camera.K, poses[frame])
+                        # what moves is no part of the street
+                        still = (
+                            classes[frame] if instances is None else classes[frame] * (instances[frame] == 0)
+                        )
+                        found = scene.finder.find(depth[frame], still, clip.camera.K, poses[frame])
                         masks += describe_instances(found, scene.objects)
+                    if instances is not None:
+                        masks += describe_road_users(instances[frame], users[frame])
                     for mask in masks:
                         count += 1
                         annotations.append({"id": count, "image_id": len(images)} | mask)
         categories = [{"id": kind + 1, "name": kind.name.lower()} for kind in SemanticClass]
-        if objects:
+        if objects or dataset.plan.settings.has_objects:
             categories += [
                 {"id": FIRST_KIND + 1 + place, "name": kind, "supercategory": "object"}
-                for place, kind in enumerate(KINDS)
+                for place, kind in enumerate(EVERY_KIND if dataset.plan.settings.has_objects else KINDS)
             ]
         rest: dict[str, Any] = {
             "camera": describe_camera(dataset.camera),
@@ -137,6 +153,33 @@ def describe_instances(found: Instances, objects: Sequence[StreetObject]) -> lis
             "truncation": to_share(found.truncation[number]),
         }
         for number, visibility in found.visibility.items()
+    ]
+
+
+def describe_road_users(
+    instances: NDArray[np.uint16], rows: Sequence[Mapping[str, Any]]
+) -> list[dict[str, Any]]:
+    """Return mask, boxes, velocity, visibility and truncation of every road user that a frame shows.
+
+    Parameters
+    ----------
+    instances : uint16 [H, W] of the frame
+    rows : of its road users
+    """
+    return [
+        describe_mask(instances == row["object"], FIRST_KIND + EVERY_KIND.index(row["kind"]))
+        | {
+            "iscrowd": 0,
+            "instance_id": FIRST_ROAD_USER + row["object"],
+            "visibility": to_share(nan if row["visibility"] is None else row["visibility"]),
+            "truncation": to_share(row["truncation"]),
+            "centre": row["centre_world"],
+            "size": row["size"],
+            "rotation": row["rotation_world"],
+            "velocity": row["velocity_world"],
+        }
+        for row in rows
+        if row["visible_pixels"]
     ]
 
 

@@ -16,6 +16,7 @@ from flows.making.plan import Plan, read_plan
 from flows.store.arrays import arrays_of
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
+from flows.store.object_tables import read_objects
 from flows.store.telemetry import read_columns
 from manifests.records import Manifest
 from tasks.conventions import CHANNELS_BY_NAME, FRAME_CHANNELS, TICK_CHANNELS
@@ -70,7 +71,7 @@ class ExportedClip:
     @property
     def scenario(self) -> Scenario:
         """Weather, controls and road."""
-        return Scenario(**self.record["scenario"])
+        return Scenario.of(self.record["scenario"])
 
     @cached_property
     def ticks(self) -> Columns:
@@ -82,6 +83,13 @@ class ExportedClip:
         """Columns of the frame table: the telemetry of each frame's tick, and ``T_world_rig`` [F, 16]."""
         names = (*(channel.name for channel in FRAME_CHANNELS), *TICK_COLUMNS)
         return self._read(self.frames_file, names, self.plan.settings.frames)
+
+    @cached_property
+    def objects(self) -> Columns:
+        """Columns of the table of road users; none where the dataset has no such table."""
+        if not self.plan.settings.has_objects:
+            return {}
+        return read_objects(self.layout, self.record["index"], self.plan.settings.frames)
 
     @property
     def T_world_rig(self) -> NDArray[np.float64]:
@@ -161,7 +169,7 @@ class ExportedDataset:
     def arrays(self) -> tuple[str, ...]:
         """Names of the arrays of its frames; empty without frames."""
         settings = self.plan.settings
-        return tuple(arrays_of(settings.labels)) if settings.pictures else ()
+        return tuple(arrays_of(settings.labels, settings.has_objects)) if settings.pictures else ()
 
     def __len__(self) -> int:
         return len(self.rows)

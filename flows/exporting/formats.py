@@ -80,6 +80,12 @@ FORMATS: tuple[ExportFormat, ...] = (
         pictures=True,
     ),
     ExportFormat(name="tum", writer="tum:write_tum", files="a .txt a clip", reader="evo"),
+    ExportFormat(
+        name="opendrive",
+        writer="opendrive:write_opendrive",
+        files="an .xodr a street",
+        reader="scenariogeneration, asam-qc-opendrive",
+    ),
     ExportFormat(name="opencrg", writer="opencrg:write_opencrg", files="a .crg a clip", reader=""),
     ExportFormat(
         name="croissant",

@@ -2,9 +2,10 @@
 
 ``odometry/sequences/00`` has the pictures as ``image_2``, ``times.txt`` [s] and ``calib.txt``;
 ``odometry/poses/00.txt`` the camera's poses in its first frame (x right, y down, z forward, as ours).
-``raw/1970_01_01`` has a drive a clip with
-one OXTS packet a frame and no pictures. The velodyne's and the IMU's frame are our rig (x forward, y left, z up, below
-the middle of the front axle): ``Tr`` takes the rig to the camera. Pixel centres are whole numbers, as KITTI's.
+``raw/1970_01_01`` has a drive a clip with one OXTS packet a frame and no pictures. A dataset with road users has
+``object/training`` too: ``image_2``, ``calib`` and ``label_2``, a line a road user that the frame shows, numbered over
+all clips. The velodyne's and the IMU's frame are our rig (x forward, y left, z up, below the middle of the front axle):
+``Tr`` takes the rig to the camera. Pixel centres are whole numbers, as KITTI's.
 
 Of OXTS, roll, pitch and yaw turn the rig into the world by Rz Ry Rx: pitch is positive nose-down, as ours. The world's
 x is east, its y north; its origin lies at latitude and longitude zero. Velocities and accelerations are those of the
@@ -25,6 +26,7 @@ from numpy.typing import NDArray
 
 from flows.exporting.dataset import ExportedClip, ExportedDataset, require_pinhole
 from flows.exporting.inertial import compute_inertial_motion
+from flows.exporting.road_users import describe_kitti_label, list_objects_by_frame
 from tasks.render.camera import PIXEL_CENTRE, Camera
 from tasks.render.contact_sheet import encode_png
 from tasks.vehicle.parameters import Vehicle
@@ -54,6 +56,7 @@ def write_kitti(dataset: ExportedDataset, folder: Path) -> None:
         place.mkdir(parents=True)
     for name, content in _describe_raw_calibration(dataset.camera).items():
         (raw / name).write_text(content)
+    shown = 0
     for number, clip in enumerate(dataset):
         sequence = folder / "odometry" / "sequences" / f"{number:02d}"
         (sequence / "image_2").mkdir(parents=True)
@@ -63,6 +66,9 @@ def write_kitti(dataset: ExportedDataset, folder: Path) -> None:
         (sequence / "times.txt").write_text("".join(f"{t / 1e9:.6e}\n" for t in clip.frames["t_ns"]))
         seen = np.linalg.inv(clip.T_world_camera[0]) @ clip.T_world_camera
         (poses / f"{number:02d}.txt").write_text("".join(f"{_format(pose[:3])}\n" for pose in seen))
+        if dataset.plan.settings.has_objects:
+            _write_labels(clip, folder / "object" / "training", shown)
+            shown += len(clip.T_world_rig)
         _write_oxts(clip, dataset.vehicle, raw / f"{DATE}_drive_{number:04d}_sync" / "oxts")
 
 
@@ -95,6 +101,21 @@ def _write_oxts(clip: ExportedClip, vehicle: Vehicle, folder: Path) -> None:
         (folder / "data" / f"{frame:010d}.txt").write_text(f"{_format(packet)} 0 0 0 0 0\n")
     times = "".join(f"{_format_time(int(t))}\n" for t in clip.frames["t_ns"])
     (folder / "timestamps.txt").write_text(times)
+
+
+def _write_labels(clip: ExportedClip, folder: Path, first: int) -> None:
+    """Write pictures, calibration and labels of a clip's frames, which are numbered from ``first`` on."""
+    for name in ("image_2", "calib", "label_2"):
+        (folder / name).mkdir(parents=True, exist_ok=True)
+    calibration = _describe_calibration(clip.camera).replace("Tr:", "Tr_velo_to_cam:")
+    calibration += f"R0_rect: {_format(np.eye(3))}\nTr_imu_to_velo: {_format(np.eye(4)[:3])}\n"
+    pictures, poses = clip.read_array("rgb"), clip.T_world_camera
+    for frame, rows in enumerate(list_objects_by_frame(clip)):
+        name = f"{first + frame:06d}"
+        (folder / "image_2" / f"{name}.png").write_bytes(encode_png(pictures[frame]))
+        (folder / "calib" / f"{name}.txt").write_text(calibration)
+        lines = [describe_kitti_label(row, poses[frame]) for row in rows if row["visible_pixels"]]
+        (folder / "label_2" / f"{name}.txt").write_text("".join(lines))
 
 
 def _describe_calibration(camera: Camera) -> str:

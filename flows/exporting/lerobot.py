@@ -3,10 +3,12 @@
 ``observation.images.front`` is the picture as H.264 (4:2:0, constant rate factor 18: not lossless);
 ``observation.state`` the telemetry at the frame in float32, with our names, units and signs (pitch positive nose-down);
 ``observation.pose`` our ``T_world_rig`` (ISO 8855: x forward, y left, z up), row by row, in float64; ``action`` the
-commanded brake pressure [MPa]; the task is the clip's label. ``timestamp`` is the time since the start of the clip [s].
-Columns that a clip does not represent at every frame (of a reference trace) are not in the state. Episodes are in the
-order of the grid's splits, and ``splits`` has the range of episodes of each; without splits all are ``train``.
-Statistics are over all frames; those of pictures are of colours in 0..1, sampled.
+commanded brake pressure [MPa]; the task is the clip's label. With road users ``observation.environment_state`` has
+eleven numbers for each of as many as any clip has: 1 where the clip has it and else 0, middle, yaw and velocity in the
+axes of the rig, and size [m, rad, m/s]. ``timestamp`` is the time since the start of the clip [s]. Columns that a clip
+does not represent at every frame (of a reference trace) are not in the state. Episodes are in the order of the grid's
+splits, and ``splits`` has the range of episodes of each; without splits all are ``train``. Statistics are over all
+frames; those of pictures are of colours in 0..1, sampled.
 
 Format: codebase version v3.0, https://huggingface.co/docs/lerobot/lerobot-dataset-v3
 """
@@ -23,6 +25,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from flows.exporting.dataset import ExportedClip, ExportedDataset
+from flows.exporting.road_users import list_objects_by_frame
 from flows.exporting.running_statistics import RunningStatistics
 from flows.reading.film import write_film
 from flows.store.layout import write_json
@@ -31,6 +34,9 @@ from tasks.errors import InputError
 
 CAMERA, STATE, POSE, ACTION = "observation.images.front", "observation.state", "observation.pose", "action"
 ACTION_COLUMN = "brake_pressure_mpa"
+ENVIRONMENT = "observation.environment_state"
+FACTS = ("present", "x", "y", "z", "yaw", "v_x", "v_y", "v_z", "length", "width", "height")
+"""Numbers of a road user in the environment's state."""
 NO_STATE = frozenset({"t_ns", ACTION_COLUMN})
 """Columns of the tick table that are no part of the state."""
 FILES_PER_CHUNK = 1000
@@ -72,6 +78,8 @@ def write_lerobot(dataset: ExportedDataset, folder: Path) -> None:
     for number, clip in enumerate(dataset):
         place = {"chunk_index": number // FILES_PER_CHUNK, "file_index": number % FILES_PER_CHUNK}
         columns = _collect_columns(clip, state, number, first, rate)
+        if most := _count_road_users(dataset):
+            columns[ENVIRONMENT] = _list_environment(clip, most)
         pictures = clip.read_array("rgb")
         data, film = folder / DATA_PATH.format(**place), folder / VIDEO_PATH.format(video_key=CAMERA, **place)
         for file in (data, film):
@@ -128,6 +136,22 @@ def _collect_columns(
     }
 
 
+def _count_road_users(dataset: ExportedDataset) -> int:
+    return max(len(row["scenario"].get("objects", ())) for row in dataset.rows)
+
+
+def _list_environment(clip: ExportedClip, most: int) -> NDArray[np.float32]:
+    """Return `FACTS` of each road user at each frame, float32 [F, 11 most]; 0 where there are fewer."""
+    rows = list_objects_by_frame(clip)
+    facts = np.zeros((len(rows), most, len(FACTS)), np.float32)
+    for frame, users in enumerate(rows):
+        for row in users:
+            w, x, y, z = row["rotation_rig"]
+            yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+            facts[frame, row["object"] - 1] = (1, *row["centre_rig"], yaw, *row["velocity_rig"], *row["size"])
+    return facts.reshape(len(rows), -1)
+
+
 def _make_table(columns: Mapping[str, NDArray[Any]]) -> pa.Table:
     return pa.table(
         {
@@ -177,6 +201,8 @@ def _shape_statistics(statistics: RunningStatistics) -> dict[str, dict[str, list
 def _describe_features(dataset: ExportedDataset, state: Sequence[str]) -> dict[str, Any]:
     height, width, rate = dataset.camera.height, dataset.camera.width, round(dataset.frame_rate_hz)
     video = {"height": height, "width": width, "codec": "h264", "pix_fmt": "yuv420p", "is_depth_map": False}
+    users = [f"{fact}_{number}" for number in range(1, _count_road_users(dataset) + 1) for fact in FACTS]
+    environment = {ENVIRONMENT: {"dtype": "float32", "shape": [len(users)], "names": users}} if users else {}
     info = {f"video.{key}": value for key, value in (video | {"fps": rate, "channels": 3}).items()}
     return {
         CAMERA: {
@@ -192,6 +218,7 @@ def _describe_features(dataset: ExportedDataset, state: Sequence[str]) -> dict[s
             "names": [f"T_world_rig_{k // 4}{k % 4}" for k in range(16)],
         },
         ACTION: {"dtype": "float32", "shape": [1], "names": [ACTION_COLUMN]},
+        **environment,
         "timestamp": {"dtype": "float32", "shape": [1], "names": None},
         **{name: {"dtype": "int64", "shape": [1], "names": None} for name in COUNTED},
     }

@@ -3,7 +3,8 @@
 ``/telemetry`` (our own schema) has every tick, 1 kHz, with our names, units and signs: pitch positive nose-down; what
 is not represented is absent. ``/tf`` (FrameTransform) has world to rig at every frame, and rig to camera.
 ``/camera/image`` is CompressedImage (PNG, as stored), ``/camera/depth`` RawImage in 32FC1 [m], ``/camera/class``
-RawImage in 8UC1, and ``/camera/calibration`` CameraCalibration.
+RawImage in 8UC1, and ``/camera/calibration`` CameraCalibration. With road users ``/objects`` (SceneUpdate) has their
+boxes in the world, a cube an entity, and ``/camera/instance`` RawImage in 16UC1 their numbers.
 
 World and rig are ISO 8855 as ours; the rotation's pitch about +y is positive nose-down. The frame "camera" has x right,
 y down, z forward. Pixel centres are whole numbers, as ROS and OpenCV count them, so that the principal point is ours
@@ -14,7 +15,7 @@ Format: https://mcap.dev/spec
 
 import json
 from base64 import b64encode
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from numpy.typing import NDArray
 
 from flows.exporting.dataset import TICK_COLUMNS, ExportedClip, ExportedDataset, describe_columns
 from flows.exporting.poses import compute_quaternions
+from flows.exporting.road_users import list_objects_by_frame
 from tasks.render.camera import PIXEL_CENTRE, Camera
 from tasks.render.contact_sheet import encode_png
 
@@ -41,8 +43,11 @@ TOPICS = {
     "/camera/image": "foxglove.CompressedImage",
     "/camera/depth": "foxglove.RawImage",
     "/camera/class": "foxglove.RawImage",
+    "/objects": "foxglove.SceneUpdate",
+    "/camera/instance": "foxglove.RawImage",
 }
 """Topics and the names of their schemas."""
+OF_ROAD_USERS = ("/objects", "/camera/instance")
 
 
 def _object(title: str, **properties: Any) -> Message:
@@ -81,6 +86,11 @@ SCHEMAS: dict[str, Message] = {
             P=_numbers(12),
         ),
         _object(
+            "foxglove.SceneUpdate",
+            deletions={"type": "array", "items": _object("foxglove.SceneEntityDeletion")},
+            entities={"type": "array", "items": _object("foxglove.SceneEntity", id=_TEXT, frame_id=_TEXT)},
+        ),
+        _object(
             "foxglove.FrameTransform",
             timestamp=_TIME,
             parent_frame_id=_TEXT,
@@ -117,14 +127,14 @@ def describe_raw_image(t_ns: int, values: NDArray[Any]) -> Message:
     Parameters
     ----------
     t_ns : time since the start of the clip [ns]
-    values : float32 or uint8 [H, W]
+    values : float32, uint8 or uint16 [H, W]
     """
     height, width = values.shape
     plain = np.ascontiguousarray(values, np.dtype(values.dtype).newbyteorder("<"))
     return _seen(t_ns) | {
         "width": width,
         "height": height,
-        "encoding": {"float32": "32FC1", "uint8": "8UC1"}[values.dtype.name],
+        "encoding": {"float32": "32FC1", "uint8": "8UC1", "uint16": "16UC1"}[values.dtype.name],
         "step": width * values.dtype.itemsize,
         "data": b64encode(plain.tobytes()).decode(),
     }
@@ -142,6 +152,41 @@ def describe_camera(t_ns: int, camera: Camera) -> Message:
         "R": np.eye(3).ravel().tolist(),
         "P": np.column_stack((K, np.zeros(3))).ravel().tolist(),
     }
+
+
+def describe_boxes(t_ns: int, rows: Sequence[Mapping[str, Any]]) -> Message:
+    """Return the boxes of road users in the world as ``foxglove.SceneUpdate``.
+
+    Parameters
+    ----------
+    t_ns : time since the start of the clip [ns]
+    rows : of the frame's road users
+    """
+    entities = []
+    for row in rows:
+        w, x, y, z = row["rotation_world"]
+        pose = {
+            "position": dict(zip("xyz", row["centre_world"], strict=True)),
+            "orientation": {"x": x, "y": y, "z": z, "w": w},
+        }
+        cube = {
+            "pose": pose,
+            "size": dict(zip("xyz", row["size"], strict=True)),
+            "color": {"r": 1.0, "g": 0.6, "b": 0.0, "a": 0.4},
+        }
+        facts = {name: row[name] for name in ("kind", "visibility", "truncation", "velocity_world")}
+        entities.append(
+            {
+                "timestamp": describe_time(t_ns),
+                "frame_id": "world",
+                "id": str(row["object"]),
+                "lifetime": describe_time(0),
+                "frame_locked": False,
+                "metadata": [{"key": name, "value": str(value)} for name, value in facts.items()],
+                "cubes": [cube],
+            }
+        )
+    return {"deletions": [], "entities": entities}
 
 
 def describe_transform(
@@ -190,7 +235,8 @@ def write_mcap(dataset: ExportedDataset, folder: Path) -> None:
             channels = {
                 topic: writer.register_channel(topic, "json", schemas[name])
                 for topic, name in TOPICS.items()
-                if clip.pictures or not topic.startswith("/camera")
+                if (clip.pictures or not topic.startswith("/camera"))
+                and (clip.objects or topic not in OF_ROAD_USERS)
             }
             for topic, t_ns, message in _iterate_messages(clip):
                 content = json.dumps(message, allow_nan=False).encode()
@@ -206,7 +252,9 @@ def _iterate_messages(clip: ExportedClip) -> Iterator[tuple[str, int, Message]]:
     T_world_rig, mount = clip.T_world_rig, clip.camera.T_rig_camera
     turns = compute_quaternions(T_world_rig, scalar_first=False)
     turn = compute_quaternions(mount[None], scalar_first=False)[0]
-    arrays = {name: clip.read_array(name) for name in ("rgb", "depth", "class")} if clip.pictures else {}
+    names = ("rgb", "depth", "class", *(["instance"] if clip.objects else []))
+    arrays = {name: clip.read_array(name) for name in names} if clip.pictures else {}
+    users = list_objects_by_frame(clip)
     for tick, t_ns in enumerate(columns["t_ns"]):
         values = {name: column[tick] for name, column in columns.items()}
         known = {name: value for name, value in values.items() if np.isfinite(value)}
@@ -215,11 +263,15 @@ def _iterate_messages(clip: ExportedClip) -> Iterator[tuple[str, int, Message]]:
             continue
         yield "/tf", t_ns, describe_transform(t_ns, "world", "rig", T_world_rig[frame], turns[frame])
         yield "/tf", t_ns, describe_transform(t_ns, "rig", "camera", mount, turn)
+        if clip.objects:
+            yield "/objects", t_ns, describe_boxes(t_ns, users[frame])
         if arrays:
             yield "/camera/calibration", t_ns, describe_camera(t_ns, clip.camera)
             yield "/camera/image", t_ns, describe_png(t_ns, encode_png(arrays["rgb"][frame]))
             yield "/camera/depth", t_ns, describe_raw_image(t_ns, arrays["depth"][frame])
             yield "/camera/class", t_ns, describe_raw_image(t_ns, arrays["class"][frame])
+        if "instance" in arrays:
+            yield "/camera/instance", t_ns, describe_raw_image(t_ns, arrays["instance"][frame])
 
 
 def _describe_clip(dataset: ExportedDataset, clip: ExportedClip) -> dict[str, Any]:

@@ -9,8 +9,9 @@ times rise from scene to scene.
 Of the CAN bus, ``pose`` and ``ms_imu`` have a message a frame with the motion of the ego frame's origin in its own axes
 (acceleration as an accelerometer feels it, at rest 9.80665 m/s^2 up), ``zoe_veh_info`` 100 a second (wheel speeds
 [rpm], speed [km/h]) and ``vehicle_monitor`` two (speed [km/h], brake pressure as a whole number from 0 to 126 [bar],
-rear wheels [rpm]). Keys that we do not represent are absent. Scenes count from 2000, because the devkit refuses numbers
-of scenes of its own that lack a CAN bus.
+rear wheels [rpm]). Keys that we do not represent are absent. A road user is an instance with an annotation in every
+sample; its box counts no point of a lidar, which there is none of. Scenes count from 2000, because the devkit refuses
+numbers of scenes of its own that lack a CAN bus.
 
 Format: https://www.nuscenes.org/nuscenes#data-format and python-sdk/nuscenes/can_bus/README.md of nuscenes-devkit
 """
@@ -27,6 +28,7 @@ from flows.exporting.dataset import Columns, ExportedClip, ExportedDataset, requ
 from flows.exporting.inertial import compute_inertial_motion
 from flows.exporting.json_array import JsonArray, open_array
 from flows.exporting.poses import compute_quaternions
+from flows.exporting.road_users import NAMES, find_attribute, find_visibility_level, list_objects_by_frame
 from flows.store.layout import write_json
 from manifests.canonical import sha256_of
 from manifests.manifest import describe_scenes
@@ -40,8 +42,8 @@ CHANNEL = "CAM_FRONT"
 FIRST_SCENE = 2000
 MOST_SCENES = 8000
 """A scene's number has four digits."""
-STREAMED = ("ego_pose", "scene", "sample", "sample_data")
-EMPTY = ("category", "attribute", "visibility", "instance", "sample_annotation")
+STREAMED = ("ego_pose", "scene", "sample", "sample_data", "instance", "sample_annotation")
+VISIBILITIES = ("v0-40", "v40-60", "v60-80", "v80-100")
 RPM = 60 / (2 * np.pi)
 """Revolutions a minute in one radian a second."""
 KM_H = 3.6
@@ -90,7 +92,7 @@ def write_nuscenes(dataset: ExportedDataset, folder: Path) -> None:
     for place in (tables, folder / "samples" / CHANNEL, folder / "can_bus", folder / "maps"):
         place.mkdir(parents=True)
     (folder / "maps" / "none.png").write_bytes(encode_png(np.full((1, 1, 3), 255, np.uint8)))
-    for name, rows in (_describe_fixed(dataset) | {name: [] for name in EMPTY}).items():
+    for name, rows in _describe_fixed(dataset).items():
         write_json(tables / f"{name}.json", rows)
     period_us = round(dataset.plan.settings.telemetry_s * 1e6) + PAUSE_US
     with ExitStack() as stack:
@@ -101,6 +103,7 @@ def write_nuscenes(dataset: ExportedDataset, folder: Path) -> None:
         for number, clip in enumerate(dataset):
             scene, start_us = f"scene-{FIRST_SCENE + number:04d}", number * period_us
             _write_scene(clip, dataset, scene, start_us, folder, rows_of)
+            _write_annotations(clip, rows_of)
             for message, rows in describe_can_bus(clip, dataset.vehicle, start_us).items():
                 write_json(folder / "can_bus" / f"{scene}_{message}.json", rows)
 
@@ -207,6 +210,30 @@ def _write_scene(
         )  # fmt: skip
 
 
+def _write_annotations(clip: ExportedClip, rows_of: dict[str, JsonArray]) -> None:
+    frames = list_objects_by_frame(clip)
+    for place, first in enumerate(frames[0]):
+        number = first["object"]
+        token = make_token("instance", clip.clip_id, number)
+        boxes = [make_token("sample_annotation", clip.clip_id, number, frame) for frame in range(len(frames))]
+        rows_of["instance"].append(
+            {"token": token, "category_token": make_token("category", NAMES[first["kind"]].nuscenes),
+             "nbr_annotations": len(boxes), "first_annotation_token": boxes[0], "last_annotation_token": boxes[-1]}
+        )  # fmt: skip
+        for frame, rows in enumerate(frames):
+            row = rows[place]
+            length, width, height = row["size"]
+            rows_of["sample_annotation"].append(
+                {"token": boxes[frame], "sample_token": make_token("sample", clip.clip_id, frame),
+                 "instance_token": token, "visibility_token": str(find_visibility_level(row)),
+                 "attribute_tokens": [make_token("attribute", find_attribute(row))],
+                 "translation": row["centre_world"], "size": [width, length, height],
+                 "rotation": row["rotation_world"], "num_lidar_pts": 0, "num_radar_pts": 0,
+                 "prev": boxes[frame - 1] if frame else "",
+                 "next": boxes[frame + 1] if frame + 1 < len(boxes) else ""}
+            )  # fmt: skip
+
+
 def _link(table: str, clip: ExportedClip, frame: int, count: int) -> Iterator[tuple[str, str]]:
     for name, other in (("prev", frame - 1), ("next", frame + 1)):
         yield name, make_token(table, clip.clip_id, other) if 0 <= other < count else ""
@@ -216,7 +243,17 @@ def _describe_fixed(dataset: ExportedDataset) -> dict[str, list[dict[str, Any]]]
     camera = dataset.camera
     mount = np.linalg.inv(_rig_from_ego(dataset.vehicle)) @ camera.T_rig_camera
     log, sensor = make_token("log"), make_token("sensor")
+    users = dataset.plan.settings.has_objects
+    categories = dict.fromkeys(names.nuscenes for names in NAMES.values()) if users else {}
+    attributes = dict.fromkeys(name for names in NAMES.values() for name in names[2:]) if users else {}
+    levels = [
+        {"token": str(level), "level": name, "description": f"visibility of {name[1:]} %"}
+        for level, name in enumerate(VISIBILITIES, start=1)
+    ]
     return {
+        "category": [{"token": make_token("category", name), "name": name, "description": ""} for name in categories],
+        "attribute": [{"token": make_token("attribute", name), "name": name, "description": ""} for name in attributes],
+        "visibility": levels if users else [],
         "log": [{"token": log, "logfile": dataset.manifest["run_id"], "vehicle": dataset.plan.settings.vehicle,
                  "date_captured": "", "location": describe_scenes(dataset.manifest)}],
         "map": [{"token": make_token("map"), "log_tokens": [log], "category": "semantic_prior",

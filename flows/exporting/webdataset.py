@@ -1,10 +1,10 @@
 """WebDataset: one ``.tar`` shard a clip, one sample a frame.
 
 A sample holds ``rgb.png`` (sRGB, as stored), ``arrays.npz`` (depth [m], class and, where the dataset has them, its
-labels, as stored) and ``json`` (label and split of the clip; the telemetry at the frame with our names, units and
-signs; the poses ``T_world_rig`` and ``T_world_camera``; the camera with its lens and shutter). Frames and signs are
-ours: ISO 8855 for world and rig, pitch positive nose-down; camera axes x right, y down, z forward; pixel centres at
-+0.5. The samples of a shard stand in the order of time.
+instances and labels, as stored) and ``json`` (label and split of the clip; the telemetry at the frame with our names,
+units and signs; the poses ``T_world_rig`` and ``T_world_camera``; the road users as their table has them; the camera
+with its lens and shutter). Frames and signs are ours: ISO 8855 for world and rig, pitch positive nose-down; camera axes
+x right, y down, z forward; pixel centres at +0.5. The samples of a shard stand in the order of time.
 
 Format: https://github.com/webdataset/webdataset, a POSIX tar whose members with one stem are one sample.
 """
@@ -20,6 +20,7 @@ import numpy as np
 
 from flows.exporting.camera import describe_camera
 from flows.exporting.dataset import ExportedClip, ExportedDataset
+from flows.exporting.road_users import list_objects_by_frame
 from tasks.render.contact_sheet import encode_png
 
 
@@ -44,6 +45,7 @@ def write_webdataset(dataset: ExportedDataset, folder: Path) -> None:
 def _iterate_members(clip: ExportedClip, names: tuple[str, ...]) -> Iterator[tuple[str, bytes]]:
     arrays = {name: clip.read_array(name) for name in names}
     rgb = arrays.pop("rgb")
+    users = list_objects_by_frame(clip)
     for frame, picture in enumerate(rgb):
         # an id has no dot, which would end the key
         key = f"{clip.clip_id}_{frame:06d}"
@@ -52,11 +54,11 @@ def _iterate_members(clip: ExportedClip, names: tuple[str, ...]) -> Iterator[tup
             packed, allow_pickle=False, **{name: values[frame] for name, values in arrays.items()}
         )
         yield f"{key}.arrays.npz", packed.getvalue()
-        yield f"{key}.json", json.dumps(_describe_frame(clip, frame), allow_nan=False).encode()
+        yield f"{key}.json", json.dumps(_describe_frame(clip, frame, users[frame]), allow_nan=False).encode()
         yield f"{key}.rgb.png", encode_png(picture)
 
 
-def _describe_frame(clip: ExportedClip, frame: int) -> dict[str, Any]:
+def _describe_frame(clip: ExportedClip, frame: int, users: list[dict[str, Any]]) -> dict[str, Any]:
     return {
         "label": clip.label,
         "clip_id": clip.clip_id,
@@ -66,4 +68,4 @@ def _describe_frame(clip: ExportedClip, frame: int) -> dict[str, Any]:
         "T_world_rig": clip.T_world_rig[frame].tolist(),
         "T_world_camera": clip.T_world_camera[frame].tolist(),
         "camera": describe_camera(clip.camera),
-    }
+    } | ({"objects": users} if clip.plan.settings.has_objects else {})

@@ -19,7 +19,7 @@ from flows.store.frames import read_clip
 from flows.store.layout import Layout
 from tasks.conventions import ROAD_CLASSES
 from tasks.eval.no_reference import piqe, temporal_error
-from tasks.eval.poses.checks import POSE_CHECKS
+from tasks.eval.poses.checks import POSE_CHECKS, hide_moving
 from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.poses.outside_trajectory import motion_from_trajectory
 from tasks.eval.poses.undistort import undistort_frames
@@ -79,11 +79,14 @@ class View:
     crf: int | None = None
 
     def arrays(self, index: int, *names: str) -> list[NDArray[Any]]:
-        """Arrays of the clip at that index, by name."""
+        """Arrays of the clip at that index, by name; depth is that of the street, without road users."""
         buffers = {name: read_clip(Layout(self.root).frames, index, name) for name in names}
         if self.crf is not None and "rgb" in buffers:
             rate = read_plan(self.root).settings.frame_rate_hz
             buffers["rgb"] = through_film(buffers["rgb"], rate, self.crf)
+        if "depth" in buffers and read_plan(self.root).settings.has_objects:
+            instances = read_clip(Layout(self.root).frames, index, "instance")
+            buffers["depth"] = hide_moving(buffers["depth"], instances)
         camera = catalogue_of(self.root).camera
         return list(undistort_frames(buffers, camera.K - PIXEL_CENTRE, camera.distortion).values())
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from catalogs.scenes import load_scene
+from catalogs.scenes import load_route
 from catalogs.studies.ablation import cut_coupling
 from catalogs.variants import warn_of_variant
 from flows.judging.physics_constants import read_constants
@@ -241,7 +241,7 @@ def _clip_row(
     absent: frozenset[str],
 ) -> dict[str, Any]:
     ticks, frames = tables
-    facts = seen | driven
+    facts = seen | driven | (_find_policys_brake(ticks) if constants.policy else {})
     frames = frames | {name: np.full(len(frames["t_ns"]), driven[name]) for name in DEPTHS if name in driven}
     holes = [name for c in finite_rows(ticks) if (name := f"ticks.{c}") not in absent]
     with np.errstate(all="ignore"):  # stored values may be infinite; a law that infinity enters is broken
@@ -259,6 +259,15 @@ def _clip_row(
     return row | contact
 
 
+def _find_policys_brake(ticks: dict[str, np.ndarray]) -> dict[str, float]:
+    """Where a policy first braked, and its highest pressure, in the place of a scenario's brake."""
+    pressed = np.flatnonzero(ticks["brake_pressure_mpa"] > 0)
+    if not pressed.size:
+        return {}
+    onset = DT * max(int(pressed[0]) - 1, 0)
+    return {"brake_onset_s": onset, "peak_pressure_mpa": float(ticks["brake_pressure_mpa"].max())}
+
+
 def find_route(scene: Mapping[str, Any]) -> RouteLine | None:
     """Return the route of the recorded scene; None where that is not at hand, or is another one by now.
 
@@ -268,7 +277,7 @@ def find_route(scene: Mapping[str, Any]) -> RouteLine | None:
     """
     try:
         refuse_changed_scene(scene)
-        route = load_scene(find_scene(scene)).route
+        route = load_route(find_scene(scene))
     except InputError:
         return None
     return RouteLine(station=route.station, T_world_rig=route.T_world_rig)

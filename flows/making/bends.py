@@ -7,7 +7,7 @@ import numpy as np
 
 from catalogs.grids import Grid
 from catalogs.scenario import find_scenario_problems
-from catalogs.scenes import load_scene
+from catalogs.scenes import load_route
 from catalogs.sentences import name_some
 from catalogs.studies.ablation import cut_coupling
 from flows.making.driving import simulate_drive, surface_of
@@ -92,7 +92,7 @@ def list_tight_bends(grid: Grid, entries: GridEntries) -> Iterator[Bend]:
     roads: dict[str | None, tuple[Route, RoadGrade]] = {}
     for label, seen in grid.scenarios:
         if seen.scene not in roads:
-            found = load_scene(seen.scene or settings.scene).route
+            found = load_route(seen.scene or settings.scene)
             roads[seen.scene] = found, sample_grade(found)
         route, grade = roads[seen.scene]
         scenario = cut_coupling(seen, settings.variant)

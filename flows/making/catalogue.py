@@ -10,6 +10,7 @@ from catalogs.entries import load
 from catalogs.low_speed import LOW_SPEED, LOW_SPEED_CUT
 from catalogs.references import read_reference
 from catalogs.road_grade import name_grade_file
+from catalogs.road_users import BODIES, ROAD_USERS
 from catalogs.scenes import load_recipe, load_scene
 from catalogs.studies.ablation import ABLATION, FamilyWeather, find_families
 from catalogs.vehicles import VehicleFile, open_vehicle
@@ -122,6 +123,16 @@ class Catalogue:
         scene : as the scenario of a clip calls it
         """
         return self._load_kept("grade of the road", name_grade_file(scene)) or LEVEL_ROAD
+
+    @cached_property
+    def road_user_sizes(self) -> dict[str, tuple[float, ...]]:
+        """Kind of road user to length, width and height [m]; none where no clip has any."""
+        sizes: dict[str, tuple[float, ...]] | None = self._load_kept("road user sizes", ROAD_USERS)
+        return sizes or {}
+
+    def own_body(self, name: str) -> Path:
+        """Return the kept file of a user's own body, by its path in the grid."""
+        return self._inputs / BODIES / Path(name).name
 
     @cached_property
     def scene(self) -> Scene:

@@ -24,17 +24,19 @@ from flows.making.driving import (
     surface_of,
 )
 from flows.making.gate import judge_motion, nothing_to_judge
-from flows.making.pictures import frame_rows, render_frames, rig_of
+from flows.making.pictures import frame_rows, gather_motion, render_frames, rig_of
 from flows.making.places import remember_place
 from flows.making.plan import ClipPlan, Plan, read_plan
 from flows.making.traced import replay_drive, unknown_ranges
 from flows.running.processors import measure_peak_memory
 from flows.store.address import find_local, send_files
 from flows.store.frames import buffer_hash, write_clip
-from flows.store.layout import STAGED_TABLES, Layout, write_json
+from flows.store.layout import OBJECTS, STAGED_TABLES, Layout, write_json
+from flows.store.object_tables import hash_objects, make_object_table
 from flows.store.telemetry import content_hash, labelled_table, write_parquet
 from manifests.canonical import sha256_of_file
 from tasks.errors import InputError
+from tasks.render.object_truth import measure_objects
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.peaks import compute_peaks
 from tasks.vehicle.rollout import Rollout, compute_lift_times
@@ -208,14 +210,19 @@ def commit_clip(
     identity = {"clip_id": clip.clip_id, "label": clip.label, "weather": clip.scenario.weather}
     if buffers:
         write_clip(layout.frames, clip.index, buffers)
+    files = [layout.frame_shard(name, clip.index) for name in buffers]
+    content = {name: buffer_hash(values) for name, values in buffers.items()}
+    if work.plan.settings.has_objects:
+        objects = _observe_objects(work, surface, ride, frames, buffers)
+        files.append(layout.object_table(clip.index))
+        content[OBJECTS] = hash_objects(objects)
+        write_parquet(make_object_table(objects, identity), files[-1])
     write_parquet(labelled_table(ride.columns, identity), layout.staged(clip.clip_id, "ticks"))
     write_parquet(labelled_table(frames, identity | facts), layout.staged(clip.clip_id, "frames"))
-    shards = {name: layout.frame_shard(name, clip.index) for name in buffers}
     receipt = {
         **clip.as_json(),
-        "artifacts": {layout.relative(path): sha256_of_file(path) for path in shards.values()},
-        "content": {name: buffer_hash(values) for name, values in buffers.items()}
-        | {"ticks": content_hash("ticks", ride.columns), "frames": content_hash("frames", frames)},
+        "artifacts": {layout.relative(path): sha256_of_file(path) for path in files},
+        "content": content | {"ticks": content_hash("ticks", ride.columns), "frames": content_hash("frames", frames)},
         "figures": _json_numbers(facts | {
             "stop_time": ride.stop_time,
             "stopping_distance": ride.stopping_distance,
@@ -228,8 +235,19 @@ def commit_clip(
     }  # fmt: skip
     write_json(layout.receipt(clip.clip_id), receipt)
     tables = [layout.staged(clip.clip_id, table) for table in STAGED_TABLES]
-    send_files(layout, [*shards.values(), *tables], last=layout.receipt(clip.clip_id))
+    send_files(layout, [*files, *tables], last=layout.receipt(clip.clip_id))
     return receipt
+
+
+def _observe_objects(
+    work: ClipWork, surface: SurfaceState, ride: Rollout, frames: Columns, buffers: Columns
+) -> dict[str, NDArray[Any]]:
+    """Return the rows of a clip's road users; no columns where it has none."""
+    if not work.clip.scenario.objects:
+        return {}
+    rig_at = rig_of(ride, frames, work.catalogue)
+    motion = gather_motion(work.clip.scenario, surface, frames, work.plan, work.catalogue, rig_at)
+    return measure_objects(buffers, work.catalogue.camera, motion)
 
 
 def collect_motion_figures(columns: Columns) -> dict[str, float]:

@@ -8,7 +8,7 @@ from catalogs.scenario import Scenario
 from flows.making.catalogue import Catalogue
 from flows.making.driving import hazard_of, surface_of, weather_of
 from manifests.manifest import is_driven
-from tasks.driving.stepped import simulate_pressures
+from tasks.driving.stepped import DriveSettings, simulate_pressures
 from tasks.errors import InputError
 from tasks.studies.label_ranges import label_ranges, sampled_friction
 from tasks.surface.state import SurfaceState
@@ -35,11 +35,12 @@ def drive_by_pressures(
     driven = catalogue.driven
     if driven is None or label not in driven.pressures:
         raise InputError(f"inputs/{PRESSURES}: must have the pressures of clip {label}; it has none")
-    return simulate_pressures(
-        catalogue.vehicle, state or surface_of(scenario, catalogue.surface), driven.pressures[label],
+    settings = DriveSettings(
         initial_speed=scenario.initial_speed_km_h / 3.6, duration_s=duration_s, rate_hz=driven.entry.rate_hz,
-        hazard=hazard_of(scenario), grade=catalogue.grade,
+        hold_speed=scenario.hold_speed, hazard=hazard_of(scenario), grade=catalogue.grade,
     )  # fmt: skip
+    surface = state or surface_of(scenario, catalogue.surface)
+    return simulate_pressures(catalogue.vehicle, surface, settings, driven.pressures[label])
 
 
 def driven_ranges_of(

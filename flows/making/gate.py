@@ -10,7 +10,14 @@ from numpy.typing import NDArray
 from flows.making.catalogue import Catalogue
 from tasks.eval.body_agreement import BodyClaim, pose_body
 from tasks.eval.motion_agreement import PoseVerdict, judge_pose
-from tasks.eval.poses.checks import GATE_CHECK, POSE_CHECKS, CheckedClip, JudgeCamera, prepare_clip
+from tasks.eval.poses.checks import (
+    GATE_CHECK,
+    POSE_CHECKS,
+    CheckedClip,
+    JudgeCamera,
+    hide_moving,
+    prepare_clip,
+)
 from tasks.eval.poses.undistort import undistort_frames
 from tasks.render.camera import PIXEL_CENTRE
 
@@ -24,6 +31,8 @@ def judge_motion(
     """Motion that the gate's pose check recovers from the finished frames, compared with the telemetry."""
     camera = catalogue.camera
     shown = {name: buffers[name] for name in ("rgb", "depth", "class")}
+    if "instance" in buffers:
+        shown["depth"] = hide_moving(buffers["depth"], buffers["instance"])
     pinhole = undistort_frames(shown, camera.K - PIXEL_CENTRE, camera.distortion)
     recovered = POSE_CHECKS[GATE_CHECK](prepare_for_checks(pinhole, frames, film_depth_mm, catalogue))
     body = pose_body(

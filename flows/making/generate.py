@@ -227,6 +227,7 @@ def describe_frame_arrays(layout: Layout, plan: Plan) -> dict[str, Any]:
     return {
         "shape": (len(plan.clips), plan.settings.frames, camera.height, camera.width),
         "labels": plan.settings.labels,
+        "objects": plan.settings.has_objects,
         "attributes": attributes,
         "compression": plan.settings.compression,
     }

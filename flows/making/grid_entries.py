@@ -9,6 +9,8 @@ from catalogs.entries import open_entry
 from catalogs.grids import GridFile
 from catalogs.grids.form import BEFORE
 from catalogs.low_speed import LOW_SPEED, LOW_SPEED_CUT
+from catalogs.road_users import BODIES, ROAD_USERS
+from catalogs.scenes.gaussian_files import read_gaussians
 from catalogs.studies.ablation import ABLATION
 from catalogs.vehicles import open_vehicle
 from catalogs.weather.grip import WEATHER
@@ -49,6 +51,7 @@ INPUTS = (
         name="hazard_marking.yaml", kind="hazard marking", setting="hazard_marking",
         needed=lambda settings: settings.marked_features,
     ),
+    Input(name=ROAD_USERS, kind="road user sizes", needed=lambda settings: settings.has_objects),
     Input(name=LOW_SPEED, kind="low-speed rule", needed=lambda settings: settings.keeps_stops_steady),
     Input(name=WET_FRICTION, kind="wet friction", needed=lambda settings: settings.grips_by_speed),
     Input(name=ABLATION, kind="ablation", needed=lambda settings: settings.variant == "fixed-mu"),
@@ -139,6 +142,18 @@ def read_entries(settings: GridFile, weathers: Collection[str] = ()) -> GridEntr
     if tyre is not None:
         place, content = tyre
         contents[place.name], places[place.name] = content, ("vehicle", place)
+    for own in dict.fromkeys(user.body for user in settings.road_users if user.body is not None):
+        name = f"{BODIES}/{Path(own).name}"
+        try:
+            read_gaussians(Path(own))
+            content = Path(own).read_bytes()
+        except InputError as error:
+            problems += [f"objects: body {problem}" for problem in error.problems]
+            continue
+        if contents.setdefault(name, content) != content:
+            problems.append(
+                f"objects: body {own}: another body has the name {Path(own).name}: rename one of them"
+            )
     return GridEntries(contents=contents, values=values, places=places, problems=problems)
 
 

@@ -8,7 +8,7 @@ from catalogs.grids import Grid
 from catalogs.physical_limits import find_limit_problem
 from catalogs.road_grade import name_grade_file, write_road_grade
 from catalogs.scenario import find_range_problems, find_route_problems, find_scenario_problems
-from catalogs.scenes import load_scene, scene_identity
+from catalogs.scenes import load_route, scene_identity
 from catalogs.sentences import cap_problems
 from catalogs.street_names import parse_street_name
 from catalogs.studies.ablation import cut_coupling
@@ -17,6 +17,7 @@ from flows.making.driving import hazard_of, surface_of
 from flows.making.grid_entries import GridEntries, read_entries, recorded_reference
 from flows.making.memory import find_memory_problems
 from flows.making.places import remember_place
+from flows.making.road_users import find_road_user_problems
 from flows.making.traced import read_trace_inputs
 from tasks.errors import InputError
 from tasks.render.sensor import Sensor
@@ -59,6 +60,7 @@ def read_grid_inputs(grid: Grid, tick_rate_hz: int) -> tuple[GridEntries, Scenes
             entries.contents.update(_list_grades(grid, scenes))
     if sound:
         problems += cap_problems(_find_feature_problems(grid, entries.vehicle))
+        problems += cap_problems(find_road_user_problems(grid, entries))
     if sound and grid.poses is None:
         problems += cap_problems(find_bend_problems(grid, entries))
     entries.contents.update(grid.driven)
@@ -189,7 +191,7 @@ def _find_feature_problems(grid: Grid, vehicle: Vehicle) -> list[str]:
 
 def grade_of(scene: str) -> RoadGrade:
     """Return the grade of the road in a scene, which is named as of `catalogs.scenes.load_scene`."""
-    return sample_grade(load_scene(scene).route)
+    return sample_grade(load_route(scene))
 
 
 def _find_route_problems(grid: Grid, scenes: Scenes) -> list[str]:
@@ -197,7 +199,7 @@ def _find_route_problems(grid: Grid, scenes: Scenes) -> list[str]:
     limit = load("table of physical limits").road_grade
     for named in scenes:
         scene = named or grid.settings.scene
-        route = load_scene(scene).route
+        route = load_route(scene)
         steepest = max(map(abs, sample_grade(route).rise))
         if problem := find_limit_problem("grade of the road", steepest, limit):
             problems[scene] = f"scene {scene}: {problem}: its z axis must point up, against gravity"

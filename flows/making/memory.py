@@ -30,7 +30,7 @@ def clip_memory(settings: GridFile, camera: Camera, ticks: int) -> int:
     numbers = sum(
         np.dtype(array.dtype).itemsize
         * int(np.prod([DIMENSION_SIZES[dimension] for dimension in array.dimensions]))
-        for array in arrays_of(settings.labels).values()
+        for array in arrays_of(settings.labels, settings.has_objects).values()
     )
     pixels = settings.frames * camera.width * camera.height if settings.pictures else 0
     return int(BASE_BYTES + COPIES_OF_PICTURES * numbers * pixels + BYTES_PER_TICK * ticks)

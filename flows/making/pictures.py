@@ -9,11 +9,14 @@ from numpy.typing import NDArray
 
 from catalogs.grids.form import TICK_RATE_HZ
 from catalogs.scenario import Scenario
+from flows.making.bodies import build_moving_bodies
 from flows.making.catalogue import Catalogue
 from flows.making.driving import hazard_of, weather_of
 from flows.making.plan import Plan, frame_ticks
+from flows.making.road_users import move_road_users
 from tasks.render.camera import RigAt, body_poses, continuous_rig
 from tasks.render.clip import RigMotion, render_clip
+from tasks.render.feature_sign import add_sign
 from tasks.render.kerb_face import extend_kerbs
 from tasks.render.rasterise.backend import select_backend
 from tasks.render.road_edit import RoadRelief, apply_road_profile
@@ -81,14 +84,10 @@ def render_frames(
         catalogue.marking,
         catalogue.weather_parameters.sky.asphalt_albedo,
     )
-    return render_clip(
+    buffers = render_clip(
         replace(scene, gaussians=gaussians),
         catalogue.camera,
-        RigMotion(
-            T_world_rig=T_world_rig,
-            frame_rate_hz=plan.settings.frame_rate_hz,
-            rig_at=rig_at,
-        ),
+        gather_motion(scenario, state, frames, plan, catalogue, rig_at),
         ClipConditions(
             state=state,
             pavement=catalogue.surface,
@@ -102,6 +101,30 @@ def render_frames(
         labels=plan.settings.labels,
         composition=plan.settings.composition,
     )
+    if plan.settings.has_objects and not scenario.objects:
+        buffers["instance"] = np.zeros(buffers["class"].shape, np.uint16)
+    return buffers
+
+
+def gather_motion(
+    scenario: Scenario,
+    state: SurfaceState,
+    frames: Mapping[str, NDArray[Any]],
+    plan: Plan,
+    catalogue: Catalogue,
+    rig_at: RigAt,
+) -> RigMotion:
+    """Return the motion of rig and road users at a clip's frames."""
+    sizes, time = catalogue.road_user_sizes, frames["tick"] / TICK_RATE_HZ
+    motions = move_road_users(scenario, sizes, catalogue.scene, state.friction, time)
+    T_world_rig = frames["T_world_rig"].reshape(-1, 4, 4)
+    T_world_camera = T_world_rig @ catalogue.camera.T_rig_camera
+    return RigMotion(
+        T_world_rig=T_world_rig,
+        frame_rate_hz=plan.settings.frame_rate_hz,
+        rig_at=rig_at,
+        bodies=build_moving_bodies(scenario, catalogue, motions, T_world_camera),
+    )
 
 
 def edit_scene(
@@ -113,7 +136,7 @@ def edit_scene(
     ----------
     scene : without the feature
     hazard : road feature; height 0 leaves the scene as it is
-    marking : painted on a hump; None leaves it plain
+    marking : finish of the feature; None leaves it plain
     asphalt_albedo : share of the light that the pavement sends back [1]
     """
     if hazard.height_m == 0:
@@ -128,7 +151,11 @@ def edit_scene(
     carriageway = scene.carriageway_left, scene.carriageway_right
     gaussians = refine_road(scene.gaussians, relief)
     if marking is not None:
-        gaussians = paint_feature(gaussians, relief, marking, *carriageway, asphalt_albedo)
+        gaussians = paint_feature(gaussians, relief, marking, *carriageway, asphalt_albedo, scene.daylight)
+        if marking.sign is not None:
+            gaussians = add_sign(
+                gaussians, relief, marking.sign, scene.carriageway_right, asphalt_albedo, scene.daylight
+            )
     return extend_kerbs(apply_road_profile(gaussians, relief, *carriageway)[0], relief), relief
 
 

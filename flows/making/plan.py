@@ -58,7 +58,7 @@ class ClipPlan:
 
     def as_json(self) -> dict[str, Any]:
         return {field.name: getattr(self, field.name) for field in fields(self)} | {
-            "scenario": self.scenario.as_row()
+            "scenario": self.scenario.as_record()
         }
 
 
@@ -144,7 +144,7 @@ class Plan:
             backend=content["backend"],
             inputs=content["inputs"],
             made_with=content["made_with"],
-            clips=tuple(ClipPlan(**clip | {"scenario": Scenario(**clip["scenario"])}) for clip in clips),
+            clips=tuple(ClipPlan(**clip | {"scenario": Scenario.of(clip["scenario"])}) for clip in clips),
         )
 
 
@@ -294,7 +294,7 @@ def _clip_plans(
         seed = derive_seed(grid_seed, row)
         yield ClipPlan(
             index=index,
-            clip_id=identify_clip(own[scenario.scene], row, seed),
+            clip_id=identify_clip(own[scenario.scene], scenario.as_record(), seed),
             label=name_clip(label, grid_seed, len(seeds)),
             seed=seed,
             scenario=scenario,

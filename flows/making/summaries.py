@@ -61,7 +61,7 @@ def clips_table(receipts: Iterable[Receipt], variant: Variant) -> pa.Table:
 def _clip_row(r: Receipt) -> dict[str, Any]:
     return (
         {name: r[name] for name in ("clip_id", "index", "label", "seed", "split", "calibration")}
-        | r["scenario"]
+        | {name: value for name, value in r["scenario"].items() if name != "objects"}
         | r["figures"]
         | {"quarantined": is_quarantined(r)}
         | {f"check_{key}": value for key, value in r["verdict"].items() if key != "reasons"}
@@ -102,7 +102,7 @@ class Outcomes(Sequence[Mapping[str, Any]]):
         return {
             "clip_id": clip.clip_id,
             "label": clip.label,
-            "scenario": clip.scenario.as_row(),
+            "scenario": clip.scenario.as_record(),
             "figures": figures,
         }
 

@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catalogs.campaigns import read_campaign
-from catalogs.decision_rules import load_decision_rules
-from catalogs.effects import LIBRARY_FILE, load_effects
-from catalogs.entries import load
+from catalogs.entries import find_entry, load
 from catalogs.vehicles import open_vehicle
 from flows.measured.closing_ledger import count_readings, record_reading
 from flows.measured.friction_pulls import compute_friction_pulls, describe_friction_pulls
@@ -27,7 +25,7 @@ from tasks.identification.decision.answer import ChannelError, NamedEffect, Para
 from tasks.identification.decision.excitation import find_reached_range
 from tasks.identification.decision.naming import measure_force
 from tasks.identification.decision.verdict import Outcome, judge_runs
-from tasks.identification.decision.words import join_phrases, list_unshared, say_effect, tell_verdict
+from tasks.identification.decision.words import describe_effect, describe_verdict, join_phrases, list_unshared
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.table import PARAMETERS
 
@@ -65,7 +63,7 @@ def close_loop(
     results.write_json("split.json", split_of(measured))
     count_readings(measured)  # a faulty ledger is reported before the fit
     measured = replace(measured, tolerances=measured.tolerances.with_session(session_tolerances(name)))
-    outcome = judge_runs(measured, model, road, load_effects(), load_decision_rules())
+    outcome = judge_runs(measured, model, road, load("library of effects"), load("set of decision rules"))
     earlier = record_reading(measured, sha256_of([open_vehicle(name).content]))
     result = verdict_json(outcome.verdict) | describe_search(outcome)
     result = describe_friction_pulls(result, measured.tolerances.friction)
@@ -136,7 +134,7 @@ def describe_search(outcome: Outcome) -> dict[str, Any]:
     ----------
     outcome : the verdict and what it stands on
     """
-    library, verdict = load_effects(), outcome.verdict
+    library, verdict = load("library of effects"), outcome.verdict
     train, held_out = predict_runs(outcome)
     planned_for = verdict.experiment.between[0] if verdict.experiment else None
     suggested = next((effect for effect in verdict.tried if effect.name == planned_for), None)
@@ -144,7 +142,7 @@ def describe_search(outcome: Outcome) -> dict[str, Any]:
     if len(verdict.odds) > 1:
         apart = [effect.name for effect in list_unshared(verdict.effects, verdict.odds)]
         force = measure_force(outcome.finding, outcome.fitted, apart)
-    sentence = tell_verdict(verdict, library, suggested, _describe_own_numbers(outcome, library), force)
+    sentence = describe_verdict(verdict, library, suggested, _describe_own_numbers(outcome, library), force)
     return {
         "channels": [CHANNELS[c] for c in train[0].channels],
         "sentence": sentence,
@@ -169,7 +167,7 @@ def _describe_own_numbers(outcome: Outcome, library: Sequence[Effect]) -> str:
     """Return what the numbers that the file hardly knew say of the car, else the one pulled most beside no name."""
     rivals = {rival.name for _, rival in outcome.verdict.rivals}
     if own := [effect for effect in outcome.calibrated if effect.name not in rivals]:
-        return join_phrases(say_effect(effect, library) for effect in own)
+        return join_phrases(describe_effect(effect, library) for effect in own)
     if outcome.verdict.effects or outcome.verdict.experiment is not None:
         return ""
     base = outcome.fitted
@@ -191,7 +189,7 @@ def split_of(campaign: Campaign) -> dict[str, Any]:
 
 def verdict_json(verdict: Verdict) -> dict[str, Any]:
     """Return a verdict as plain values."""
-    experiment, library = verdict.experiment, load_effects()
+    experiment, library = verdict.experiment, load("library of effects")
     return {
         "campaign": verdict.campaign,
         "verdict": verdict.verdict,
@@ -233,7 +231,7 @@ def verdict_json(verdict: Verdict) -> dict[str, Any]:
         },
         "content_sha256": verdict.content_hash,
         "split_sha256": verdict.split_hash,
-        "library_sha256": sha256_of_file(LIBRARY_FILE),
+        "library_sha256": sha256_of_file(find_entry("library of effects")),
         "made_with": code_version(),
     }
 
@@ -252,7 +250,7 @@ def effect_json(effect: NamedEffect, library: Sequence[Effect]) -> dict[str, Any
     """Return a named effect as plain values."""
     return {
         "name": effect.name,
-        "says": say_effect(effect, library),
+        "says": describe_effect(effect, library),
         "class": effect.effect_class,
         "port": effect.port,
         "variable": effect.variable,

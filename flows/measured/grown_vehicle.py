@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from catalogs.documents import parse_yaml
-from catalogs.effects import LIBRARY_FILE
-from catalogs.entries import entry_folder
+from catalogs.entries import entry_folder, find_entry
 from catalogs.vehicles import open_vehicle
 from catalogs.vehicles.frozen import frozen_text
 from manifests.canonical import sha256_of, sha256_of_file
@@ -98,7 +97,7 @@ def grown_vehicle(
         "base": source.stem,
         "base_sha256": sha256_of([content]),
         "procedure": f"close-loop, verdict {verdict.verdict}: {', '.join(e.name for e in verdict.effects)}{untold}",
-        "procedure_sha256": sha256_of_file(LIBRARY_FILE),
+        "procedure_sha256": sha256_of_file(find_entry("library of effects")),
         "version": code_version()["version"],
         "split": f"train of {verdict.campaign}",
         "data_sha256": {"campaign": verdict.content_hash, "split": verdict.split_hash},

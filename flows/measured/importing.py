@@ -72,8 +72,8 @@ def import_measurements(
         )
     try:
         channel_map, map_file = load("channel map", map)
-    except FaultyMap as faults:
-        raise InputError([*faults.problems, *find_signal_problems(Path(source), faults.readable)]) from None
+    except FaultyMap as faulty:
+        raise InputError([*faulty.problems, *find_signal_problems(Path(source), faulty.readable)]) from None
     root = recording_root(Path(source))
     channel_map, recordings, left_out, lost = read_recordings(
         recording_files(Path(source), channel_map), channel_map

@@ -103,9 +103,7 @@ def format_text(result: dict[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def make_vehicle_template(
-    *, out: str, base: str = "paper-reference", name: str | None = None
-) -> dict[str, Any]:
+def make_vehicle_template(*, out: str, base: str = "bmw-320i", name: str | None = None) -> dict[str, Any]:
     """Write a vehicle file that extends another vehicle, with the numbers of a data sheet to be filled in.
 
     Parameters

@@ -149,11 +149,11 @@ def draw_splines(outcome: Outcome) -> tuple[list[dict[str, Any]], Figure]:
     ----------
     outcome : the verdict and what it stands on
     """
-    grams, told = outcome.finding.grams, outcome.opened[0].told
+    grams, named_members = outcome.finding.grams, outcome.opened[0].named
     grids = find_scanned_ranges(outcome.finding.evidence.train)
     rows = []
     for form in (c for c in grams.columns.candidates if c.effect is None):
-        rest = [m for m in told if m.effect is not None]
+        rest = [m for m in named_members if m.effect is not None]
         alone, named, both = (
             weigh_explanation(grams, m, spread=False) for m in ([form], rest, [*rest, form])
         )

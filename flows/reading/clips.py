@@ -93,8 +93,6 @@ class Clip:
 
     def plot(self) -> "go.Figure":
         """Return speed, slip, wheel load and pitch over time as a Plotly figure."""
-        from flows.reading.clips import COLUMNS, draw_clip
-
         return draw_clip(self.label, self.pandas("ticks", COLUMNS))
 
     def _repr_html_(self) -> str:

@@ -12,8 +12,9 @@ from catalogs.sentences import shorten
 from flows.reading.table_files import SCHEME, TableFiles, bound_rows, open_stored_table, table_files
 from flows.reading.views import VIEWS, list_absent
 from flows.store.address import open_for_reading, want_telemetry
-from flows.store.layout import Layout
+from flows.store.layout import OBJECTS, Layout
 from flows.store.missing import has_nulls
+from flows.store.object_tables import read_no_objects
 from flows.store.parquet_files import refuse_footer
 from flows.store.sealed import read_manifest_head
 from manifests.manifest import is_traced
@@ -87,6 +88,8 @@ def connect_sealed(
                 )
             else:
                 connection.from_arrow(open_stored_table(layout, manifest, table)).create_view(table)
+        if OBJECTS not in tables:
+            connection.from_arrow(read_no_objects()).create_view(OBJECTS)
         checks = ", ".join(channel.name for channel in VIEWS["verdicts"])
         connection.execute(f"CREATE VIEW verdicts AS SELECT {checks} FROM clips")
     except (duckdb.Error, pa.ArrowException, OSError) as error:

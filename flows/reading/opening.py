@@ -18,8 +18,8 @@ from flows.reading.suggestions import suggest_names
 from flows.reading.table_files import STORED, explain_unreadable, open_stored_table
 from flows.reading.views import VIEWS
 from flows.store.address import open_for_reading, want_telemetry
-from flows.store.layout import Layout
-from flows.store.sealed import read_manifest, read_manifest_head
+from flows.store.layout import OBJECTS, Layout
+from flows.store.sealed import read_manifest, read_manifest_head, recorded_grid
 from tasks.conventions import CHANNELS_BY_NAME
 from tasks.errors import InputError
 
@@ -105,7 +105,9 @@ class Dataset:
         InputError
             If there is no such table.
         """
-        _check_names(table, STORED)
+        _check_names(
+            table, (*STORED, OBJECTS) if recorded_grid(self.head["grid"], self.place).has_objects else STORED
+        )
         return open_stored_table(self._layout, self.head, table)
 
     @cached_property

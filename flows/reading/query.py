@@ -14,7 +14,7 @@ from flows.reading.answer_files import format_csv, format_parquet, make_plain, o
 from flows.reading.connection import connect_views
 from flows.reading.suggestions import suggest_names
 from flows.reading.views import VIEWS
-from flows.store.arrays import arrays_of
+from flows.store.arrays import EVERY_ARRAY
 from tasks.conventions import SCENE_CHANNEL, VARIANT_CHANNEL, Channel
 from tasks.errors import InputError
 
@@ -85,7 +85,7 @@ def query_dataset(
 
 def number_repeats(names: Sequence[str]) -> list[str]:
     """Return names of which no two are the same to SQL, which knows no case: a, A and a become a, A_1 and a_2."""
-    names: list[str] = []
+    numbered: list[str] = []
     repeats: dict[str, int] = {}
     for name in names:
         unique, known = name, name.casefold()
@@ -93,8 +93,8 @@ def number_repeats(names: Sequence[str]) -> list[str]:
             repeats[known] += 1
             unique = f"{name}_{repeats[known]}"
         repeats[unique.casefold()] = 0
-        names.append(unique)
-    return names
+        numbered.append(unique)
+    return numbered
 
 
 def refuse_several(connection: duckdb.DuckDBPyConnection, query: str, *, allow_files: bool) -> None:
@@ -229,7 +229,7 @@ def list_columns(*, grid: bool = False) -> dict[str, Any]:
         "arrays": [
             _describe_channel(array.channel)
             | {"dtype": array.dtype, "dimensions": ["clip", "frame", "y", "x", *array.dimensions]}
-            for array in arrays_of(labels=True).values()
+            for array in EVERY_ARRAY.values()
         ]
     }
 

@@ -9,7 +9,7 @@ import io
 import os
 import re
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,12 +17,11 @@ from typing import TYPE_CHECKING, Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 from fsspec import AbstractFileSystem  # type: ignore[import-untyped]
-from pyarrow import dataset
 
 from catalogs.sentences import shorten, shorten_value
 from flows.reading.views import list_absent
-from flows.store.layout import Layout
-from flows.store.missing import has_nulls, null_missing
+from flows.store.layout import OBJECTS, Layout
+from flows.store.missing import has_nulls
 from flows.store.parquet_files import CHECKED, CLIPS_PER_FILE, refuse_footer
 from flows.store.sealed import recorded_grid
 from tasks.errors import InputError
@@ -31,7 +30,8 @@ if TYPE_CHECKING:
     import pyarrow.dataset
 SCHEME = "musync"
 STORED = ("clips", "ticks", "frames", "pairs")
-MOST_ROWS = {"clips": 100_000, "pairs": 10_000_000}
+"""Tables of every dataset; one with road users has ``objects`` too."""
+MOST_ROWS = {"clips": 100_000, "pairs": 10_000_000, "objects": 10_000_000}
 """Rows of the tables that hold a dataset's clips, and the pairs of them, in one file [1]."""
 _WHOLE = re.compile(r"telemetry/(?P<table>clips|pairs)\.parquet")
 _PART = re.compile(r"telemetry/(?P<table>ticks|frames)/family=[a-z0-9_-]{1,64}/part-[0-9]{4,9}\.parquet")
@@ -55,6 +55,10 @@ def table_files(layout: Layout, manifest: Mapping[str, Any]) -> dict[str, dict[s
             problems.append(f"{layout}/manifest.json: {shorten_value(recorded)}: no place of a table's files")
             continue
         tables[named["table"]][recorded.removeprefix("telemetry/")] = layout.root / recorded
+    if recorded_grid(manifest["grid"], layout).has_objects:
+        # their records are the clips', which readers of tables leave aside
+        files = sorted((layout.telemetry / OBJECTS).glob("clip-*.parquet"))
+        tables[OBJECTS] = {f"{OBJECTS}/{path.name}": path for path in files}
     problems += [
         f"{layout}: the files of {table} are missing: musync lab repair makes them again"
         for table, files in tables.items()
@@ -106,7 +110,7 @@ def open_stored_table(layout: Layout, manifest: Mapping[str, Any], table: str) -
         opened = dataset.dataset(paths, schema=schema, format=checked, partitioning=partitioning)
         if has_nulls(stored):
             return opened
-        from flows.reading.table_files import OlderTable
+        from flows.reading.older_tables import OlderTable
 
         return OlderTable(list(opened.get_fragments()), schema, checked, opened.filesystem)
     except (pa.ArrowException, OSError) as error:
@@ -203,24 +207,3 @@ class _TableFile(io.RawIOBase):
         if not self.closed:
             os.close(self._descriptor)
         super().close()
-
-
-class OlderTable(dataset.FileSystemDataset):
-    """A lazy pyarrow dataset whose rows have NULL in place of NaN before a filter sees them.
-
-    The files' statistics leave NaN out, so no filter is handed down to them.
-    """
-
-    def scanner(
-        self, columns: Sequence[str] | None = None, filter: dataset.Expression | None = None, **options: Any
-    ) -> dataset.Scanner:
-        """Return a scanner over the rows, as `pyarrow.dataset.Dataset.scanner`.
-
-        Parameters
-        ----------
-        columns, filter, options : as pyarrow takes them
-        """
-        batches = map(null_missing, super().scanner().to_batches())
-        return dataset.Scanner.from_batches(
-            batches, schema=self.schema, columns=columns, filter=filter, **options
-        )

@@ -4,11 +4,13 @@ import pyarrow as pa
 
 from flows.store.telemetry import labelled_field
 from tasks.conventions import (
+    CHANNELS_BY_NAME,
     CHECK_CHANNELS,
     CLIP_CHANNELS,
     ESSENTIAL,
     FRAME_CHANNELS,
     IDENTITY_CHANNELS,
+    OBJECT_CHANNELS,
     PAIR_CHANNELS,
     TICK_CHANNELS,
     Channel,
@@ -24,6 +26,7 @@ VIEWS: dict[str, tuple[Channel, ...]] = {
     "frames": (*_JOIN_KEYS, *_SURFACE, *FRAME_CHANNELS, *TICK_CHANNELS),
     "verdicts": (*_JOIN_KEYS, *CHECK_CHANNELS),
     "pairs": PAIR_CHANNELS,
+    "objects": (*_JOIN_KEYS, CHANNELS_BY_NAME["frame"], *OBJECT_CHANNELS),
 }
 """The views and their columns; ``ticks`` and ``frames`` also have ``family``, by which their files lie."""
 

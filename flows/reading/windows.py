@@ -15,7 +15,7 @@ from torch.utils.data import Dataset, Sampler
 from catalogs.sentences import shorten, shorten_value
 from flows.reading.arguments import is_whole
 from flows.reading.table_files import table_files
-from flows.store.arrays import arrays_of
+from flows.store.arrays import EVERY_ARRAY
 from flows.store.frame_metadata import check_array, check_frames, read_local_metadata
 from flows.store.frames import read_frames
 from flows.store.layout import Layout
@@ -146,7 +146,7 @@ def windows_of(
         row for row in manifest["clips"] if clips is None or row["label"] in clips or row["clip_id"] in clips
     ]
     files = list(table_files(layout, manifest)["frames"].values())
-    stored = {name for name in arrays_of(labels=True) if (layout.frames / name).is_dir()}
+    stored = {name for name in EVERY_ARRAY if (layout.frames / name).is_dir()}
     problems = _find_column_problems(files[0], columns)
     problems += [f"array {name!r}: the dataset has {', '.join(sorted(stored)) or 'no frames'}"
                  for name in arrays if name not in stored]  # fmt: skip

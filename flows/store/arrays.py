@@ -61,12 +61,25 @@ _LABELS = (
         "marks", "uint8", "1", "bits: what changed the pixel, is out of sight in the next frame, is hazard"
     ),
 )
+_INSTANCES = (
+    _define_array(
+        "instance",
+        "uint16",
+        "1",
+        "number of the road user that the pixel shows, of the table of objects; 0 for none",
+    ),
+)
 ARRAYS = {array.channel.name: array for array in _PIXELS}
 LABEL_ARRAYS = {array.channel.name: array for array in _LABELS}
 """Written where the grid asks for labels."""
 DIMENSION_SIZES = {"channel": 3, "axis": 3, "coordinate": 2, "direction": 2}
 
 
-def arrays_of(labels: bool) -> dict[str, PixelArray]:
-    """The arrays of a dataset with or without labels, by name."""
-    return ARRAYS | LABEL_ARRAYS if labels else ARRAYS
+INSTANCE_ARRAYS = {array.channel.name: array for array in _INSTANCES}
+"""Written where the grid has road users."""
+EVERY_ARRAY = ARRAYS | INSTANCE_ARRAYS | LABEL_ARRAYS
+
+
+def arrays_of(labels: bool, objects: bool) -> dict[str, PixelArray]:
+    """The arrays of a dataset with or without labels, and with or without road users, by name."""
+    return ARRAYS | (INSTANCE_ARRAYS if objects else {}) | (LABEL_ARRAYS if labels else {})

@@ -13,7 +13,7 @@ import numpy as np
 
 from catalogs.documents import parse_json
 from catalogs.sentences import cap_problems, shorten_value
-from flows.store.arrays import DIMENSION_SIZES, PixelArray, arrays_of
+from flows.store.arrays import DIMENSION_SIZES, EVERY_ARRAY, PixelArray
 from tasks.errors import InputError
 
 METADATA = "zarr.json"
@@ -65,7 +65,7 @@ def check_frames(
     problems = _find_group_problems(read, members, place)
     shapes = {}
     for name in sorted(members):
-        if name not in arrays_of(labels=True):
+        if name not in EVERY_ARRAY:
             problems.append(f"{place}/{shorten_value(name)}: no array that muSync writes; remove it")
             continue
         try:
@@ -104,7 +104,7 @@ def check_array(read: ReadMetadata, name: str, place: object) -> tuple[int, ...]
     if content is None:
         raise InputError(f"{where}: missing: musync lab repair makes it again")
     metadata = parse_json(content, where, "array's metadata")
-    array = arrays_of(labels=True)[name]
+    array = EVERY_ARRAY[name]
     if not isinstance(metadata, dict):
         raise InputError(f"{where}: must be a table of metadata; it is {shorten_value(metadata)}")
     shape: Any = metadata.get("shape")
@@ -140,7 +140,7 @@ def _find_group_problems(read: ReadMetadata, members: Collection[str], place: ob
 
 def _are_copies(found: Any, read: ReadMetadata, members: Collection[str]) -> bool:
     """Whether the group holds what stands in the arrays' own files, and no other array."""
-    known = arrays_of(labels=True)
+    known = EVERY_ARRAY
     match found:
         case {"kind": "inline", "must_understand": False, "metadata": dict(copies)} if len(found) == 3:
             names = copies.keys() | (known.keys() & set(members))

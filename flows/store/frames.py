@@ -27,7 +27,7 @@ from zarr.errors import ZarrUserWarning
 from zarr.storage import MemoryStore
 
 from catalogs.sentences import shorten
-from flows.store.arrays import DIMENSION_SIZES, PixelArray, arrays_of
+from flows.store.arrays import DIMENSION_SIZES, EVERY_ARRAY, PixelArray, arrays_of
 from flows.store.frame_metadata import check_array, read_local_metadata
 from flows.store.layout import write_atomically
 from flows.store.telemetry import channel_labels
@@ -53,15 +53,16 @@ def create_arrays(
     labels: bool,
     attributes: Mapping[str, Any],
     compression: Literal["zstd", "lz4"] = "zstd",
+    objects: bool = False,
 ) -> None:
     """Create the group and its arrays, once, before any clip is written.
 
     Parameters
     ----------
     path : of the group
-    shape, labels, attributes, compression : as of `encode_arrays`
+    shape, labels, attributes, compression, objects : as of `encode_arrays`
     """
-    for name, content in encode_arrays(shape, labels, attributes, compression).items():
+    for name, content in encode_arrays(shape, labels, attributes, compression, objects).items():
         write_atomically(path / name, content)
 
 
@@ -70,6 +71,7 @@ def encode_arrays(
     labels: bool,
     attributes: Mapping[str, Any],
     compression: Literal["zstd", "lz4"] = "zstd",
+    objects: bool = False,
 ) -> dict[str, bytes]:
     """Return the files of the group and its arrays while these are empty: their metadata, by path in the group.
 
@@ -79,12 +81,13 @@ def encode_arrays(
     labels : whether the arrays of labels are wanted too
     attributes : of the group
     compression : of `COMPRESSIONS`
+    objects : whether the array of road users is wanted too
     """
     clips, frames, *size = shape
     codec, level = COMPRESSIONS[compression]
     metadata: dict[str, Buffer] = {}
     group = zarr.create_group(MemoryStore(metadata), attributes=dict(attributes))
-    for name, array in arrays_of(labels).items():
+    for name, array in arrays_of(labels, objects).items():
         dtype = array.dtype
         tail = (*size, *(DIMENSION_SIZES[dimension] for dimension in array.dimensions))
         group.create_array(
@@ -179,7 +182,7 @@ def read_frames(path: Path, name: str, shape: tuple[int, ...], index: int, span:
     """
     if not (0 <= index < shape[0] and 0 <= span.start <= span.stop <= shape[1]):
         raise ValueError(f"there are {shape[0]} clips of {shape[1]} frames; asked for clip {index}, {span}")
-    array = arrays_of(labels=True)[name]
+    array = EVERY_ARRAY[name]
     pictures = np.empty((span.stop - span.start, *shape[2:]), array.dtype)
     shard = path / name / "c" / "/".join(str(place) for place in (index, *(0 for _ in shape[1:])))
     read_chunks(shard, shape[1], span.start, pictures, _choose_fill_value(array.dtype))

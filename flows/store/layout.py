@@ -12,9 +12,11 @@ from threading import get_native_id
 from typing import Any
 
 from catalogs.documents import read_json_document
-from flows.store.arrays import arrays_of
+from flows.store.arrays import EVERY_ARRAY
 
 STAGED_TABLES = ("ticks", "frames")
+OBJECTS = "objects"
+"""Name of the table of road users, and of its hash in a clip's record."""
 STAGING = ".staging"
 PARTIAL = ".musync-partial"
 """End of the name of a file that is being written."""
@@ -78,8 +80,12 @@ class Layout:
 
     def frame_shard(self, array: str, index: int) -> Path:
         """The one file that holds a clip's frames of one array (Zarr v3 default chunk keys)."""
-        further = arrays_of(labels=True)[array].dimensions
+        further = EVERY_ARRAY[array].dimensions
         return self.frames.joinpath(array, "c", str(index), "0", "0", "0", *("0" for _ in further))
+
+    def object_table(self, index: int) -> Path:
+        """The file with a clip's road users, of a dataset that has any."""
+        return self.telemetry / "objects" / f"clip-{index:05d}.parquet"
 
     def relative(self, path: Path) -> str:
         return path.relative_to(self.root).as_posix()

@@ -10,8 +10,6 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 from urllib.parse import urlsplit
 
-from zarr.storage import ObjectStore, WrapperStore
-
 from flows.store.layout import write_atomically
 from tasks.errors import InputError
 
@@ -149,7 +147,7 @@ class Objects:
         """The objects as a Zarr store that reads a chunk when it is asked for; a recorded one must be there."""
         from zarr.storage import ObjectStore
 
-        from flows.store.objects import RecordedObjects
+        from flows.store.recorded_objects import RecordedObjects
 
         return RecordedObjects(ObjectStore(self._store, read_only=True), recorded, self.address)
 
@@ -184,35 +182,3 @@ class Objects:
 
 def _find_server() -> str:
     return os.environ.get("AWS_ENDPOINT_URL") or "Amazon S3"
-
-
-class RecordedObjects(WrapperStore[ObjectStore[Any]]):
-    """A store whose recorded objects must be there; Zarr takes an absent object for fill values.
-
-    Parameters
-    ----------
-    store : of the objects
-    recorded : names that must be there
-    address : of the store, for the sentence
-    """
-
-    def __init__(
-        self, store: ObjectStore[Any], recorded: Collection[str] = frozenset(), address: str = ""
-    ) -> None:
-        super().__init__(store)
-        self.recorded, self.address = recorded, address
-
-    async def get(self, key: str, *arguments: Any, **options: Any) -> Any:
-        """Return an object's bytes, or None where there is none and none is recorded.
-
-        Raises
-        ------
-        InputError
-            If there is no object and one is recorded.
-        """
-        found = await super().get(key, *arguments, **options)
-        if found is None and key in self.recorded:
-            raise InputError(
-                f"{self.address}/{key}: missing, with pictures of a clip: musync lab repair makes it again"
-            )
-        return found

@@ -10,8 +10,8 @@ from catalogs.documents import LARGEST_JSON, parse_json, read_content
 from catalogs.grids import GridFile
 from catalogs.grids.form import BEFORE
 from catalogs.sentences import cap_problems, describe_rules, shorten_value
-from flows.store.arrays import arrays_of
-from flows.store.layout import RECORD, STAGED_TABLES, Layout, read_json
+from flows.store.arrays import EVERY_ARRAY
+from flows.store.layout import OBJECTS, RECORD, STAGED_TABLES, Layout, read_json
 from flows.store.telemetry import content_hash, labelled_field, read_table, table_columns
 from manifests.canonical import sha256_of_file
 from manifests.manifest import MANIFEST_FORMAT, head_of_sealed, is_sealed
@@ -216,9 +216,10 @@ def read_receipt(layout: Layout, clip_id: str) -> Receipt:
     """
     place = layout.receipt(clip_id)
     receipt = check_record(Receipt, read_json(place), place)
-    arrays = arrays_of(labels=True).keys() & receipt["content"].keys()
-    shards = {layout.relative(layout.frame_shard(name, receipt["index"])) for name in arrays}
-    if receipt["clip_id"] != clip_id or receipt["artifacts"].keys() != shards:
+    arrays = EVERY_ARRAY.keys() & receipt["content"].keys()
+    files = [layout.frame_shard(name, receipt["index"]) for name in arrays]
+    files += [layout.object_table(receipt["index"])] if OBJECTS in receipt["content"] else []
+    if receipt["clip_id"] != clip_id or receipt["artifacts"].keys() != set(map(layout.relative, files)):
         raise InputError(
             f"{place}: must be the receipt of clip {clip_id} and name its files; it is another: remove it"
         )

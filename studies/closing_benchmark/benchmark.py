@@ -5,9 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from catalogs.decision_rules import load_decision_rules
-from catalogs.effects import load_effects
-from catalogs.effects.truths import Truth, load_sizes, load_truths
+from catalogs.effects.truths import Truth
 from catalogs.entries import load
 from flows.measured.closing_error_rates import engine_hash
 from flows.store.journal import append_line, read_lines
@@ -81,7 +79,11 @@ def close_loop_benchmark(
     log, engine = results.path(FILE).with_name(LOG), engine_hash()
     rows = [row for row in read_lines(log, {"engine", "truth", "seed"}) if row["engine"] == engine]
     done = {(row["truth"], row["seed"]) for row in rows}
-    model, surface, effects = load("vehicle", vehicle), load("surface", "dense-asphalt"), load_effects()
+    model, surface, effects = (
+        load("vehicle", vehicle),
+        load("surface", "dense-asphalt"),
+        load("library of effects"),
+    )
     started = time.monotonic()
     for planned in _plan(seeds, first_seed, nulls, harder):
         if (planned.name, planned.seed) in done:
@@ -96,7 +98,7 @@ def close_loop_benchmark(
         )  # fmt: skip
         made = time.process_time()
         library = tuple(effect for effect in effects if effect.name not in left_out)
-        verdict = judge_runs(campaign, model, surface, library, load_decision_rules()).verdict
+        verdict = judge_runs(campaign, model, surface, library, load("set of decision rules")).verdict
         miss = measure_interval_miss(verdict, planned.name, planned.values) if planned.name else None
         row = {
             "kind": planned.kind,
@@ -140,7 +142,7 @@ def _outcome(verdict: Verdict, truths: tuple[Truth, ...]) -> str:
 
 def _plan(seeds: int, first_seed: int, nulls: int, harder: int) -> Iterator[Planned]:
     """Every campaign, round by round over all truths, nulls and sizes spread over them; then the harder ones."""
-    truths, sizes, study = load_truths(), load_sizes(), load_harder()
+    truths, sizes, study = load("list of truths"), load("list of sizes"), load_harder()
     library = tuple(truth for truth in truths if truth.in_library)
     rounds = max(seeds, 1)
     for i in range(rounds):

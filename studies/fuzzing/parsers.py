@@ -3,8 +3,6 @@
 from functools import partial
 
 from catalogs.campaigns import read_campaign
-from catalogs.effects import load_effects
-from catalogs.effects.truths import load_sizes, load_truths
 from catalogs.entries import load
 from catalogs.learned_judges import load_judges
 from catalogs.references import read_reference
@@ -95,8 +93,9 @@ PARSERS: tuple[Parser, ...] = (
     parse_entries("bump study", f"{PLANS}/comma2k19.yaml", partial(load_plan, "bump study"), share=2),
     parse_entries("sensitivity study", "studies/surface-sensitivity.yaml", partial(load, "sensitivity study"), share=1),
     parse_entries("street", "scenes/street.yaml", load_street_layout, share=2),
-    parse_entries("effects library", "effects/library.yaml", load_effects, share=0.5),
-    parse_entries("truths", "effects/truths.yaml", lambda path: (load_truths(path), load_sizes(path)), share=1),
+    parse_entries("effects library", "effects/library.yaml", partial(load, "library of effects"), share=0.5),
+    parse_entries("truths", "effects/truths.yaml", partial(load, "list of truths"), share=0.5),
+    parse_entries("sizes", "effects/truths.yaml", partial(load, "list of sizes"), share=0.5),
     parse_entries(
         "channel map", "channel_maps/*.yaml", partial(load, "channel map"), share=3,
         rules=(files_inside(r"runs\|\d+\|file"),),

@@ -96,7 +96,7 @@ COLUMN_UNITS = {"time": "s", **{name: channel.unit for name, channel in CHANNELS
 """Units of the columns of a run's file."""
 
 
-def say_brake(pressure: float, signal: str) -> str:
+def describe_brake(pressure: float, signal: str) -> str:
     """Return how hard a brake is applied, by the signal that was logged: "2.4 MPa", or "0.24 of the brake command".
 
     Parameters

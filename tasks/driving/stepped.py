@@ -5,6 +5,7 @@ writes this down, and the rollout of that trace is the stepped drive bit for bit
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import inf, isfinite
 
 import numpy as np
@@ -48,7 +49,9 @@ def count_ticks(rate_hz: float) -> int:
     return ticks
 
 
-def trace_pressures(pressures: Sequence[float], ticks_per_step: int) -> NDArray[np.float64]:
+def trace_pressures(
+    pressures: Sequence[float] | NDArray[np.float64], ticks_per_step: int
+) -> NDArray[np.float64]:
     """Return the pressure at the internal steps of a drive, float64 [N] [MPa].
 
     Parameters
@@ -60,16 +63,16 @@ def trace_pressures(pressures: Sequence[float], ticks_per_step: int) -> NDArray[
     return np.concatenate([np.zeros(LATE), told])
 
 
-class SteppedDrive:
-    """A drive of the coupled model whose brake is told step by step.
+@dataclass(frozen=True, kw_only=True)
+class DriveSettings:
+    """What a drive by steps is given beside car and surface.
 
     Parameters
     ----------
-    vehicle : the vehicle
-    surface : kind of weather, friction and how it depends on speed, snow
     initial_speed : [m/s]
     duration_s : length of the drive, whole steps [s]
     rate_hz : of the steps [Hz]
+    hold_speed : keep the speed until a pressure above 0 is told
     hazard : road feature
     grade : of the road
 
@@ -79,74 +82,107 @@ class SteppedDrive:
         For a rate, a duration or a speed that is none.
     """
 
-    def __init__(
-        self, vehicle: Vehicle, surface: SurfaceState, *, initial_speed: float, duration_s: float, rate_hz: float,
-        hazard: RoadHazard = FLAT_ROAD, grade: RoadGrade = LEVEL_ROAD,
-    ) -> None:  # fmt: skip
-        self.ticks_per_step = count_ticks(rate_hz)
-        ticks = round(duration_s * TICKS_PER_S) if isfinite(duration_s) else 0
-        problems = []
-        if ticks <= 0 or ticks % self.ticks_per_step or abs(ticks - duration_s * TICKS_PER_S) > 1e-6:
+    initial_speed: float
+    duration_s: float
+    rate_hz: float
+    hold_speed: bool = False
+    hazard: RoadHazard = FLAT_ROAD
+    grade: RoadGrade = LEVEL_ROAD
+
+    def __post_init__(self) -> None:
+        step, ticks, problems = self.ticks_per_step, self.ticks, []
+        if ticks <= 0 or ticks % step or abs(ticks - self.duration_s * TICKS_PER_S) > 1e-6:
             problems.append(
-                f"duration_s must be whole steps of {self.ticks_per_step / TICKS_PER_S:g} s; it is {duration_s:g}"
+                f"duration_s must be whole steps of {step / TICKS_PER_S:g} s; it is {self.duration_s:g}"
             )
-        if not (isfinite(initial_speed) and initial_speed > 0):
-            problems.append(f"initial_speed must be a positive number of m/s; it is {initial_speed}")
+        if not (isfinite(self.initial_speed) and self.initial_speed > 0):
+            problems.append(f"initial_speed must be a positive number of m/s; it is {self.initial_speed}")
         if problems:
             raise InputError(problems)
-        self.steps = ticks // self.ticks_per_step
-        self._vehicle, self._surface, self._grade = vehicle, surface, grade
-        self._speed, self._duration = initial_speed, duration_s
-        self._response = compute_surface_response(vehicle, surface.kind, surface.friction)
-        self._conditions = Conditions(
-            hazard=hazard, snow_depth_mm=surface.snow_depth_mm, grade=grade, grip=surface.grip
+
+    @property
+    def ticks_per_step(self) -> int:
+        """Milliseconds of a step [1]."""
+        return count_ticks(self.rate_hz)
+
+    @property
+    def ticks(self) -> int:
+        """Milliseconds of the drive [1]."""
+        return round(self.duration_s * TICKS_PER_S) if isfinite(self.duration_s) else 0
+
+    def set_conditions(self, surface: SurfaceState) -> Conditions:
+        """Return the conditions of the drive on a surface."""
+        return Conditions(
+            hazard=self.hazard, snow_depth_mm=surface.snow_depth_mm, grade=self.grade, grip=surface.grip
         )
-        self._trace = np.empty(LATE + PER_TICK * ticks)
-        self._history = np.empty((ticks + 1, len(COLUMNS)))
+
+
+class SteppedDrive:
+    """A drive of the coupled model whose brake is told step by step.
+
+    Parameters
+    ----------
+    vehicle : the vehicle
+    surface : kind of weather, friction and how it depends on speed, snow
+    settings : the drive
+    """
+
+    def __init__(self, vehicle: Vehicle, surface: SurfaceState, settings: DriveSettings) -> None:
+        self.ticks_per_step = settings.ticks_per_step
+        self.steps = settings.ticks // self.ticks_per_step
+        self._vehicle, self._surface, self._settings = vehicle, surface, settings
+        self._response = compute_surface_response(vehicle, surface.kind, surface.friction)
+        self._conditions = settings.set_conditions(surface)
+        self._trace = np.empty(LATE + PER_TICK * settings.ticks)
+        self._history = np.empty((settings.ticks + 1, len(COLUMNS)))
         self.begin()
 
     def begin(self) -> None:
         """Put the car to the start: its wheels roll and its body is at rest."""
-        self.step_count, self._stop = 0, inf
+        self.step_count, self._stop, self._held = 0, inf, self._settings.hold_speed
         self._trace[:LATE] = 0.0
         run = simulate(
-            self._vehicle, self._response, make_trace_input(self._trace[:LATE], INTERNAL_STEP_S), self._conditions,
+            self._vehicle, self._response,
+            make_trace_input(self._trace[:LATE], INTERNAL_STEP_S)._replace(hold_speed=self._held), self._conditions,
             Recording(samples=1, interval=1 / TICKS_PER_S, substeps=PER_TICK, keep_states=True),
-            initial_speed=self._speed,
+            initial_speed=self._settings.initial_speed,
         )  # fmt: skip
         self._state, self._history[0] = run.states[0], run.history[0]
 
-    def advance(self, pressure_mpa: float) -> None:
-        """Drive one step.
+    def advance(self, pressure_mpa: float, steps: int = 1) -> None:
+        """Drive one step, or several at one pressure.
 
         Parameters
         ----------
         pressure_mpa : that the brake is told when the step begins [MPa]
+        steps : how many, at least 1
 
         Raises
         ------
         InputError
             For a pressure that no brake has, or a drive that has ended.
         """
-        if self.step_count == self.steps:
-            raise InputError(f"the drive has ended after {self._duration:g} s: begin anew")
+        if self.step_count + steps > self.steps:
+            raise InputError(f"the drive has ended after {self._settings.duration_s:g} s: begin anew")
         if not 0.0 <= pressure_mpa <= HIGHEST_PRESSURE_MPA:  # a NaN too
             raise InputError(
                 f"brake pressure must be a number within 0 to {HIGHEST_PRESSURE_MPA:g} MPa; it is {pressure_mpa}"
             )
-        first = self.step_count * self.ticks_per_step
-        known = LATE + PER_TICK * (first + self.ticks_per_step)
-        self._trace[known - PER_TICK * self.ticks_per_step : known] = pressure_mpa
+        self._held = self._held and pressure_mpa == 0.0
+        first, ticks = self.step_count * self.ticks_per_step, steps * self.ticks_per_step
+        known = LATE + PER_TICK * (first + ticks)
+        self._trace[known - PER_TICK * ticks : known] = pressure_mpa
         run = simulate(
-            self._vehicle, self._response, make_trace_input(self._trace[:known], INTERNAL_STEP_S), self._conditions,
+            self._vehicle, self._response,
+            make_trace_input(self._trace[:known], INTERNAL_STEP_S)._replace(hold_speed=self._held), self._conditions,
             Recording(
-                samples=self.ticks_per_step + 1, interval=1 / TICKS_PER_S, substeps=PER_TICK, keep_states=True
+                samples=ticks + 1, interval=1 / TICKS_PER_S, substeps=PER_TICK, keep_states=True
             ),
             start=self._state,
         )  # fmt: skip
-        self._history[first : first + self.ticks_per_step + 1] = run.history
+        self._history[first : first + ticks + 1] = run.history
         self._state, self._stop = run.states[-1], run.stop
-        self.step_count += 1
+        self.step_count += steps
 
     @property
     def time(self) -> float:
@@ -169,53 +205,42 @@ class SteppedDrive:
     def describe(self) -> Rollout:
         """Return the telemetry of a drive that has ended."""
         columns = {name: self._history[:, i].copy() for name, i in COLUMN.items()}
-        return describe_trace_drive(
-            self._vehicle, self._surface, columns, self._stop, duration_s=self._duration, grade=self._grade
-        )
+        return _describe_drive(self._vehicle, self._surface, self._settings, columns, self._stop)
 
 
 def simulate_pressures(
     vehicle: Vehicle,
     surface: SurfaceState,
-    pressures: Sequence[float],
-    *,
-    initial_speed: float,
-    duration_s: float,
-    rate_hz: float,
-    hazard: RoadHazard = FLAT_ROAD,
-    grade: RoadGrade = LEVEL_ROAD,
+    settings: DriveSettings,
+    pressures: Sequence[float] | NDArray[np.float64],
 ) -> Rollout:
     """Simulate the drive in which each step has its pressure: that of `SteppedDrive`, in one call.
 
     Parameters
     ----------
-    vehicle, surface, initial_speed, duration_s, rate_hz, hazard, grade : as of `SteppedDrive`
+    vehicle, surface, settings : as of `SteppedDrive`
     pressures : of the steps [MPa]
     """
-    ticks = round(duration_s * TICKS_PER_S)
-    response = compute_surface_response(vehicle, surface.kind, surface.friction)
+    per_step, told = settings.ticks_per_step, np.flatnonzero(np.asarray(pressures) > 0)
+    # half a step early: time is a whole number of steps, but for rounding
+    onset = (PER_TICK * per_step * int(told[0]) - 0.5) * INTERNAL_STEP_S if told.size else inf
+    drive = make_trace_input(trace_pressures(pressures, per_step), INTERNAL_STEP_S)
     run = simulate(
-        vehicle, response, make_trace_input(trace_pressures(pressures, count_ticks(rate_hz)), INTERNAL_STEP_S),
-        Conditions(hazard=hazard, snow_depth_mm=surface.snow_depth_mm, grade=grade, grip=surface.grip),
-        Recording(samples=ticks + 1, interval=1 / TICKS_PER_S, substeps=PER_TICK), initial_speed=initial_speed,
+        vehicle, compute_surface_response(vehicle, surface.kind, surface.friction),
+        drive._replace(hold_speed=settings.hold_speed, profile=drive.profile._replace(onset_time=onset)),
+        settings.set_conditions(surface),
+        Recording(samples=settings.ticks + 1, interval=1 / TICKS_PER_S, substeps=PER_TICK),
+        initial_speed=settings.initial_speed,
     )  # fmt: skip
     columns = dict(zip(COLUMNS, run.history.T.copy(), strict=True))
-    return describe_trace_drive(vehicle, surface, columns, run.stop, duration_s=duration_s, grade=grade)
+    return _describe_drive(vehicle, surface, settings, columns, run.stop)
 
 
-def describe_trace_drive(
-    vehicle: Vehicle, surface: SurfaceState, columns: dict[str, NDArray[np.float64]], stop: float, *,
-    duration_s: float, grade: RoadGrade,
+def _describe_drive(
+    vehicle: Vehicle, surface: SurfaceState, settings: DriveSettings, columns: dict[str, NDArray[np.float64]],
+    stop: float,
 ) -> Rollout:  # fmt: skip
-    """Return the telemetry of a drive by pressures; the brake's onset is the last tick before there is any.
-
-    Parameters
-    ----------
-    vehicle, surface, grade : as of `SteppedDrive`
-    columns : history by name, [N] each [its unit]
-    stop : when the car came to rest [s]
-    duration_s : of the drive [s]
-    """
+    """Return the telemetry of a drive by pressures; the brake's onset is the last tick before there is any."""
     pressed = np.flatnonzero(columns["brake_pressure_mpa"] > 0)
     first = max(int(pressed[0]) - 1, 0) if pressed.size else 0
     onset = first / TICKS_PER_S if pressed.size else inf
@@ -224,5 +249,5 @@ def describe_trace_drive(
     )
     return describe_rollout(
         history, vehicle, compute_surface_response(vehicle, surface.kind, surface.friction), surface.friction,
-        mode="coupled", duration_s=duration_s, grade=grade,
+        mode="coupled", duration_s=settings.duration_s, grade=settings.grade,
     )  # fmt: skip

@@ -1,9 +1,14 @@
 """What stands or moves ahead of the car, as a brake sees it: a rear end by its station, without a picture."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import cos, inf, isfinite, sin
 
+import numpy as np
+from numpy.typing import NDArray
+
 from tasks.errors import InputError
+from tasks.scene.road_users.track import Track, drive_track, limit_acceleration
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -13,7 +18,7 @@ class Target:
     Parameters
     ----------
     station : of the end that the car meets [m]
-    speed : along the route [m/s]
+    speed, acceleration : along the route [m/s, m/s2]
     lateral : of its middle, left of the car's path positive [m]
     lateral_speed : to the left [m/s]
     width : across the route [m]
@@ -21,6 +26,7 @@ class Target:
 
     station: float
     speed: float = 0.0
+    acceleration: float = 0.0
     lateral: float = 0.0
     lateral_speed: float = 0.0
     width: float = 1.8
@@ -71,17 +77,65 @@ class TargetTrack:
         if problems:
             raise InputError(problems)
 
+    @property
+    def settles_at(self) -> float:
+        """Time from which the speed no longer changes; 0 where it never does [s]."""
+        if self.change_at == inf:
+            return 0.0
+        change = self.final_speed - self.speed
+        return self.change_at + (change / self.acceleration if self.acceleration * change > 0 else 0.0)
+
+    def trace(
+        self, time: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return way along the heading [m], speed along it [m/s] and its rate [m/s2] at times, any shape each.
+
+        Parameters
+        ----------
+        time : since the start, 0 or more [s]
+        """
+        track = Track(
+            start=(self.station, self.lateral), heading=self.heading, speed=self.speed, change_at=self.change_at,
+            acceleration=self.acceleration, final_speed=self.final_speed,
+        )  # fmt: skip
+        return drive_track(track, time, friction=inf)
+
     def find(self, time: float) -> Target:
         """Return the target at a time since the start [s]."""
-        change = self.final_speed - self.speed
-        lasts = change / self.acceleration if self.acceleration * change > 0 else 0.0
-        since = max(time - self.change_at, 0.0)
-        within = min(since, lasts)
-        speed = self.speed + self.acceleration * within
-        way = self.speed * min(time, self.change_at) + 0.5 * (self.speed + speed) * within
-        way += speed * (since - within)
+        return next(self.follow(np.array([time])))
+
+    def follow(self, time: NDArray[np.float64]) -> Iterator[Target]:
+        """Yield the target at times since the start, float64 [N] [s]."""
         ahead, aside = cos(self.heading), sin(self.heading)
-        return Target(
-            station=self.station + ahead * way, speed=ahead * speed, lateral=self.lateral + aside * way,
-            lateral_speed=aside * speed, width=self.width,
-        )  # fmt: skip
+        for way, speed, rate in zip(*(column.tolist() for column in self.trace(time)), strict=True):
+            yield Target(
+                station=self.station + ahead * way, speed=ahead * speed, acceleration=ahead * rate,
+                lateral=self.lateral + aside * way, lateral_speed=aside * speed, width=self.width,
+            )  # fmt: skip
+
+
+def follow_track(track: Track, size: tuple[float, ...], friction: float) -> TargetTrack:
+    """Return the way of a road user as a brake sees it: that of the end that the car meets.
+
+    Parameters
+    ----------
+    track : of its middle, by stations
+    size : length, width and height of its body [m]
+    friction : mu of the surface, which bounds every change of speed [1]
+
+    Raises
+    ------
+    InputError
+        For a track in the world, whose stations nobody knows without its scene.
+    """
+    if track.in_world:
+        raise InputError(
+            "objects: a policy sees tracks by station_m or gap_m; one is given by world_m: write it so"
+        )
+    length, width = size[0], size[1]
+    ahead, aside = abs(cos(track.heading)), abs(sin(track.heading))
+    return TargetTrack(
+        station=track.start[0] - 0.5 * (ahead * length + aside * width), lateral=track.start[1], heading=track.heading,
+        speed=track.speed, change_at=track.change_at, acceleration=limit_acceleration(track.acceleration, friction),
+        final_speed=track.final_speed, width=aside * length + ahead * width,
+    )  # fmt: skip

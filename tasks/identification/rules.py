@@ -28,7 +28,8 @@ class DecisionRules:
     longest_lag : longest lag at which residual and brake pressure are correlated [s]
     step_misfit : misfit by halving the step from which a run counts as sensitive to the step and is left out [1]
     fewest_runs : number of other runs below which runs that are sensitive to the step are used too [1]
-    foreign_misfit : error of the held-out speed over its noise from which more is lacking than what is named [1]
+    foreign_misfit : error of the held-out speed over its noise, or pull of a number of the file over its tolerance,
+        from which more is lacking than what is named [1]
     hardly_known_tolerance : tolerance of the brake's gain from which a vehicle file hardly knows it [1]
     command_tolerance : tolerance of that gain where the brake signal is no pressure [1]
     hardly_known_grip : tolerance of the grip that all runs share, where a file hardly knows its car [1]

@@ -1,5 +1,6 @@
 """A clip's frames, one after the other, from rig poses to finished pictures in their weather."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -12,7 +13,8 @@ from tasks.render.composition import compose_over_sky, round_depth
 from tasks.render.display_bytes import encode_picture
 from tasks.render.environment import environment_view
 from tasks.render.grain import add_grain
-from tasks.render.labels import compute_clip_flow, compute_flow, compute_row_flow, label_frame
+from tasks.render.labels import MovedPixels, compute_clip_flow, compute_flow, compute_row_flow, label_frame
+from tasks.render.moving_bodies import BodiesInClip, MovingBody
 from tasks.render.rasterise.backend import Backend
 from tasks.render.readout import Field, sensor_field
 from tasks.render.road_edit import RoadRelief
@@ -26,18 +28,22 @@ from tasks.scene.scene import Scene
 
 @dataclass(frozen=True, kw_only=True)
 class RigMotion:
-    """Motion of the rig during a clip.
+    """Motion of the rig and of road users during a clip.
 
     Parameters
     ----------
     T_world_rig : float64 [F, 4, 4] rig poses with heave and pitch, one a frame [m]
     frame_rate_hz : frames per second [Hz]
     rig_at : rig poses about each frame; a camera that `moves` during a frame needs them
+    bodies : road users; during a frame they stand still, as in its middle
+    first_frame : number of the first frame, from which particles and noise count [1]
     """
 
     T_world_rig: NDArray[np.float64]
     frame_rate_hz: float
     rig_at: RigAt | None = None
+    bodies: Sequence[MovingBody] = ()
+    first_frame: int = 0
 
 
 def render_clip(
@@ -67,7 +73,8 @@ def render_clip(
     Returns
     -------
     ``rgb`` uint8 [F, H, W, 3] sRGB, ``depth`` float32 [F, H, W] camera z [m] (NaN where nothing is seen),
-    ``class`` uint8 [F, H, W] `SemanticClass`; with labels ``normal``, ``road``, ``marks`` and ``flow``
+    ``class`` uint8 [F, H, W] `SemanticClass`; with bodies ``instance`` uint16 [F, H, W], the number of the body that a
+    pixel shows or 0; with labels ``normal``, ``road``, ``marks`` and ``flow``
 
     Raises
     ------
@@ -78,6 +85,7 @@ def render_clip(
         gaussians=scene.gaussians,
         environment=scene.environment,
         route=scene.route,
+        lanes=scene.lanes,
         relief=relief,
         to_sun=scene.to_sun,
         daylight=scene.daylight,
@@ -86,14 +94,17 @@ def render_clip(
     prepared = backend.prepare_gaussians(weathered)
     field = sensor_field(camera)
     T_world_camera = motion.T_world_rig @ camera.T_rig_camera
-    T_world_rows = _row_poses(camera, T_world_camera, motion.rig_at)
+    T_world_rows = pose_rows(camera, T_world_camera, motion.rig_at)
+    moving = BodiesInClip(motion.bodies, scene, weathered, weather, backend, T_world_camera)
     velocity = np.gradient(T_world_camera[:, :3, 3], 1 / motion.frame_rate_hz, axis=0)
     clip: dict[str, NDArray[Any]] = {}
     for frame, pose in enumerate(T_world_camera):
         view = world_to_camera(pose)
         gbuffer = backend.rasterise_view(
-            prepared, view, field.K, field.width, field.height, normals=labels or weather.reads_normals
-        )
+            prepared, view, field.K, field.width, field.height,
+            normals=labels or weather.reads_normals,
+            bodies=moving.place(frame), shade=moving.shade(frame),
+        )  # fmt: skip
         if scene.daylight is not None:
             gbuffer = add_grain(gbuffer, pose, field.K)
         sky = environment_view(scene.environment, view, field.K, field.width, field.height)
@@ -103,7 +114,7 @@ def render_clip(
             width=field.width,
             height=field.height,
             velocity=velocity[frame],
-            time_s=frame / motion.frame_rate_hz,
+            time_s=(motion.first_frame + frame) / motion.frame_rate_hz,
             exposure_s=camera.exposure_s,
         )
         clear = compose_over_sky(gbuffer, sky, scene.gaussians.display_encoded)
@@ -116,13 +127,17 @@ def render_clip(
         developed = (
             paper_picture(finished)
             if composition == "paper"
-            else encode_picture(apply_sensor(seen.picture, camera.sensor, conditions.seed, frame))
+            else encode_picture(
+                apply_sensor(seen.picture, camera.sensor, conditions.seed, motion.first_frame + frame)
+            )
         )
         buffers: dict[str, NDArray[np.generic]] = {
             "rgb": developed,
             "depth": round_depth(seen.depth),
             "class": seen.class_id,
         }
+        if motion.bodies:
+            buffers["instance"] = seen.object_id
         if seen.points is not None and seen.changes is not None:
             elevation = None if relief is None else relief.elevation
             buffers |= label_frame(
@@ -133,13 +148,14 @@ def render_clip(
                 clip[name] = np.empty((len(T_world_camera), *values.shape), values.dtype)
             clip[name][frame] = values
     if labels:
-        clip["flow"], occluded = _label_flow(clip["depth"], camera, field, T_world_camera, T_world_rows)
+        clip["flow"], occluded = _label_flow(clip, motion.bodies, camera, field, T_world_camera, T_world_rows)
         clip["marks"] |= occluded
     return clip
 
 
 def _label_flow(
-    depth: NDArray[np.float32],
+    clip: Mapping[str, NDArray[Any]],
+    bodies: Sequence[MovingBody],
     camera: Camera,
     field: Field,
     T_world_camera: NDArray[np.float64],
@@ -147,16 +163,26 @@ def _label_flow(
 ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
     """Return flow and occlusion marks as `compute_clip_flow` does, for either kind of shutter."""
 
+    depth = clip["depth"]
+
     def flow_from(k: int) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
         pair = depth[k], depth[k + 1]
+        moved = [
+            MovedPixels(
+                shown=clip["instance"][k] == body.number,
+                T_later_earlier=body.T_world_body[k + 1] @ np.linalg.inv(body.T_world_body[k]),
+            )
+            for body in bodies
+        ]
         if T_world_rows is None:
-            return compute_flow(*pair, camera.K, T_world_camera[k], T_world_camera[k + 1])
-        return compute_row_flow(*pair, field.directions, camera, T_world_rows[k][1], T_world_rows[k + 1][1])
+            return compute_flow(*pair, camera.K, T_world_camera[k], T_world_camera[k + 1], moved)
+        rows = T_world_rows[k][1], T_world_rows[k + 1][1]
+        return compute_row_flow(*pair, field.directions, camera, *rows, moved)
 
     return compute_clip_flow(depth, flow_from)
 
 
-def _row_poses(
+def pose_rows(
     camera: Camera, T_world_camera: NDArray[np.float64], rig_at: RigAt | None
 ) -> list[NDArray[np.float64]] | None:
     """Return camera poses [3, H, 4, 4] of each frame at its rows' times; None where one pose serves all rows."""

@@ -89,7 +89,8 @@ def _modulate(rgb, depth, class_id, pose, K):  # type: ignore[no-untyped-def]
             else:
                 u, v = x, y + up
                 facing = max(abs(dz) / np.sqrt(dx * dx + dy * dy + dz * dz), 0.02)
-            pixel = z / K[0, 0] / np.sqrt(facing)
+            # between the pixel's width and its length on the surface: its length alone would blur the sides
+            pixel = z / K[0, 0] / facing**0.75
             total = 0.0
             for k in range(len(WAVES)):
                 share = min(WAVES[k] / pixel / _PIXELS_A_WAVE - 1, 1.0)

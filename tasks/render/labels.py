@@ -1,6 +1,7 @@
 """Ground truth of a frame beyond depth and class: road coordinates, flow, and marks of what changed a pixel."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,20 +25,36 @@ NORMAL_STEPS = 127
 """Steps of a stored normal's component from 0 to 1 [1]."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class MovedPixels:
+    """Pixels of a frame that show a moving body, and where the body goes.
+
+    Parameters
+    ----------
+    shown : bool [H, W]
+    T_later_earlier : float64 [4, 4] from world points of the body in this frame to where they are in the next [m]
+    """
+
+    shown: NDArray[np.bool_]
+    T_later_earlier: NDArray[np.float64]
+
+
 def compute_flow(
     depth: NDArray[np.float32],
     next_depth: NDArray[np.float32],
     K: NDArray[np.float64],
     T_world_camera: NDArray[np.float64],
     next_T_world_camera: NDArray[np.float64],
+    moved: Sequence[MovedPixels] = (),
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Return the optical flow to the next frame: the street does not move, so depth and poses determine it.
+    """Return the optical flow to the next frame: depth and the poses of camera and bodies determine it.
 
     Parameters
     ----------
     depth, next_depth : float32 [H, W] camera z, NaN where nothing is seen [m]
     K : float64 [3, 3] intrinsics, pixel centres at +0.5 [px]
     T_world_camera, next_T_world_camera : float64 [4, 4] poses [m]
+    moved : bodies that do not stand still as the street does
 
     Returns
     -------
@@ -47,8 +64,13 @@ def compute_flow(
     height, width = depth.shape
     u, v = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
     rays = np.stack(((u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones_like(u)), axis=-1)
-    T = np.linalg.inv(next_T_world_camera) @ T_world_camera
-    x, y, z = np.moveaxis((rays * depth[..., None]) @ T[:3, :3].T + T[:3, 3], -1, 0)
+    into_next = np.linalg.inv(next_T_world_camera)
+    T = into_next @ T_world_camera
+    points = (rays * depth[..., None]) @ T[:3, :3].T + T[:3, 3]
+    for body in moved:
+        T = into_next @ body.T_later_earlier @ T_world_camera
+        points[body.shown] = (rays * depth[..., None])[body.shown] @ T[:3, :3].T + T[:3, 3]
+    x, y, z = np.moveaxis(points, -1, 0)
     z = np.where(z > 0, z, np.nan)
     return compute_flow_and_occlusion(
         depth, next_depth, K[0, 0] * x / z + K[0, 2], K[1, 1] * y / z + K[1, 2], z
@@ -62,6 +84,7 @@ def compute_row_flow(
     camera: Camera,
     T_world_rows: NDArray[np.float64],
     next_T_world_rows: NDArray[np.float64],
+    moved: Sequence[MovedPixels] = (),
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     """Return `compute_flow` for a camera with a lens or a rolling shutter, between pixels as they are stored.
 
@@ -71,12 +94,16 @@ def compute_row_flow(
     directions : float64 [H, W, 2] right and down per forward of the pixels [1]
     camera : intrinsics and lens
     T_world_rows, next_T_world_rows : float64 [H, 4, 4] camera poses at the rows' times [m]
+    moved : as of `compute_flow`; a body stands still while a frame is read out
 
     Returns
     -------
     As `compute_flow`.
     """
     points = row_points(directions, depth, T_world_rows)
+    for body in moved:
+        T = body.T_later_earlier
+        points[body.shown] = points[body.shown] @ T[:3, :3].T + T[:3, 3]
     there = project_by_rows(points, next_T_world_rows, camera)
     return compute_flow_and_occlusion(depth, next_depth, there[..., 0], there[..., 1], there[..., 2])
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.render.road_edit import RoadRelief
@@ -10,6 +11,30 @@ from tasks.render.weather.ground_grid import read_between
 from tasks.render.weather.scene_light import ground_light, mean_colours, recolour_gaussians
 from tasks.render.weather.sky import LUMINANCE
 from tasks.scene.gaussians import Gaussians
+from tasks.scene.scene import mix_daylight
+
+
+@dataclass(frozen=True, kw_only=True)
+class WarningSign:
+    """A triangle on a post at the right of the carriageway, with a hump or a dip in black.
+
+    Parameters
+    ----------
+    side : of the triangle [m]
+    foot : height of its lower edge above the road [m]
+    offset : of its middle beyond the edge of the carriageway [m]
+    before : way from the sign to the feature [m]
+    border, field, symbol, metal : reflectance of its parts, linear red, green, blue [1]
+    """
+
+    side: float
+    foot: float
+    offset: float
+    before: float
+    border: tuple[float, float, float]
+    field: tuple[float, float, float]
+    symbol: tuple[float, float, float]
+    metal: tuple[float, float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,6 +49,7 @@ class HazardMarking:
     patch_margin : of the patch beyond the depression, before and behind [m]
     joint : reflectance of the sealed joints; None has none [1]
     joint_width : of a joint, whose middle is the end of the paint or of the patch [m]
+    sign : that announces the feature; None has none
     """
 
     stripe_width: float
@@ -33,6 +59,7 @@ class HazardMarking:
     patch_margin: float = 0.0
     joint: tuple[float, float, float] | None = None
     joint_width: float = 0.0
+    sign: WarningSign | None = None
 
 
 GRAIN = (0.75, 1.3)
@@ -46,6 +73,7 @@ def paint_feature(
     carriageway_left: float,
     carriageway_right: float,
     asphalt_albedo: float,
+    daylight: ArrayLike | None = None,
 ) -> Gaussians:
     """Return the flat street with the finish of a feature, in the light that falls on the road there.
 
@@ -59,6 +87,7 @@ def paint_feature(
     marking : its finish
     carriageway_left, carriageway_right : lateral extent of the carriageway, leftward positive [m]
     asphalt_albedo : reflectance of the road, from which the incident light follows [1]
+    daylight : [3, 3] as `Scene.daylight`; None where it is not known [1]
     """
     sinks = float(relief.elevation(np.array([(relief.near + relief.far) / 2]))[0]) < 0
     ground = marking.patch if sinks else marking.gap
@@ -78,15 +107,36 @@ def paint_feature(
     reflectance = np.where(mark[:, None], marking.paint, ground)
     if marking.joint is not None:
         reflectance[to_end < seam] = marking.joint
-    light = ground_light(gaussians, SemanticClass.ROAD)
-    here = read_between(light.grid, light.illumination, gaussians.means[index, :2])
+    white = measure_white(gaussians, index, asphalt_albedo, daylight)
+    own = mean_colours(gaussians)[index] @ LUMINANCE / (white @ LUMINANCE)
     plain = gaussians.class_id[index] == SemanticClass.ROAD
-    own = mean_colours(gaussians)[index] @ LUMINANCE / (here * float(light.lit @ LUMINANCE))
-    grain = np.where(plain, np.clip(own, *GRAIN), 1.0)
+    grain = np.where(plain, np.clip(own / max(np.median(own[plain]), 1e-9), *GRAIN), 1.0)
     gain, add = np.ones(len(gaussians)), np.zeros((len(gaussians), 3))
     gain[index] = 0
-    add[index] = reflectance * (grain * here)[:, None] * light.lit / asphalt_albedo
+    add[index] = reflectance * grain[:, None] * white
     sh, kind = gaussians.sh.copy(), gaussians.class_id.copy()
     sh[index] = recolour_gaussians(gaussians, gain, add).sh[index]
     kind[index[mark]] = SemanticClass.MARKING
     return replace(gaussians, sh=sh, class_id=kind)
+
+
+def measure_white(
+    gaussians: Gaussians, index: NDArray[np.int64], asphalt_albedo: float, daylight: ArrayLike | None
+) -> NDArray[np.float64]:
+    """Return the radiance of a white surface in place of Gaussians of the road, float64 [n, 3] [1].
+
+    Parameters
+    ----------
+    gaussians : the clear street
+    index : int64 [n] positions of the Gaussians [1]
+    asphalt_albedo : reflectance of the road [1]
+    daylight : [3, 3] as `Scene.daylight` [1]; None reads the light off the road
+    """
+    if gaussians.light is not None and daylight is not None:
+        here = mix_daylight(gaussians.light[index], daylight)
+        road = gaussians.class_id[index] == SemanticClass.ROAD
+        seen = (mean_colours(gaussians)[index[road]] @ LUMINANCE) / (here[road] @ LUMINANCE)
+        return here * float(np.median(seen)) / asphalt_albedo
+    light = ground_light(gaussians, SemanticClass.ROAD)
+    relative = read_between(light.grid, light.illumination, gaussians.means[index, :2])
+    return relative[:, None] * light.lit / asphalt_albedo

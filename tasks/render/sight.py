@@ -24,6 +24,7 @@ class SensorFrame:
     picture : float32 [H, W, 3] linear light [1]
     depth : float32 [H, W] z in the camera at the pixel's own time; NaN where nothing is seen [m]
     class_id : uint8 [H, W] `SemanticClass`
+    object_id : uint16 [H, W] number of the moving body; 0 for none
     normal : float32 [H, W, 3] world normal [1]
     points : [H, W, 3] points that the pixels show, world frame; NaN where there are none. None without labels [m]
     changes : uint8 [H, W] bits of the layers that changed the pixel; None without labels
@@ -32,6 +33,7 @@ class SensorFrame:
     picture: NDArray[np.float32]
     depth: NDArray[np.float32]
     class_id: NDArray[np.uint8]
+    object_id: NDArray[np.uint16]
     normal: NDArray[np.float32]
     points: NDArray[np.floating] | None
     changes: NDArray[np.uint8] | None
@@ -52,6 +54,7 @@ def take_drawn_frame(
         picture=finished.picture,
         depth=gbuffer.depth,
         class_id=gbuffer.class_id,
+        object_id=gbuffer.object_id,
         normal=gbuffer.normal,
         points=eye + gbuffer.depth[..., None] * pixel_rays(shutter) if labelled else None,
         changes=attribute_pixels(weather, finished, gbuffer, shutter) if labelled else None,
@@ -106,6 +109,7 @@ def take_frame_through_sensor(
         picture=picture,
         depth=seen.depth,
         class_id=gbuffer.class_id.ravel()[seen.source],
+        object_id=gbuffer.object_id.ravel()[seen.source],
         normal=gbuffer.normal.reshape(-1, 3)[seen.source],
         points=row_points(field.directions, seen.depth, T_world_rows[1]) if labelled else None,
         changes=changes,

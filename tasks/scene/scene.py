@@ -8,6 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.route import Route
 
+NARROWEST_LANE_M = 2.5
+"""Least distance between the middles of two lanes [m]: RASt 06, carriageways of 4.75 m and more take two cars."""
 LOWEST_SUN_DEG = 1.0
 """A lower sun gives the flat road less than a fiftieth of its light, which cannot be measured on the road [deg]."""
 
@@ -40,6 +42,13 @@ class Scene:
     carriageway_right: float
     sun_direction_deg: tuple[float, float] | None = None
     daylight: tuple[tuple[float, float, float], ...] | None = None
+
+    @property
+    def lanes(self) -> tuple[float, ...]:
+        """Lateral positions of the lanes: the route's own, and the one on the other side of the carriageway's middle
+        where the carriageway is wide enough for it [m]."""
+        other = self.carriageway_left + self.carriageway_right
+        return (0.0, other) if abs(other) >= NARROWEST_LANE_M else (0.0,)
 
     @property
     def to_sun(self) -> NDArray[np.float64] | None:

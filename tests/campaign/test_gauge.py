@@ -5,8 +5,6 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from catalogs.decision_rules import load_decision_rules
-from catalogs.effects import load_effects
 from catalogs.entries import load
 from studies.closing_benchmark.harder import load_harder
 from tasks.campaign.gauge import denoise_pressure, estimate_gauge_noise
@@ -68,5 +66,11 @@ def test_stops_of_one_kind_and_a_noisy_gauge_are_no_discovery() -> None:
     """Judged with the pressure as read, a form at the brake is found in it."""
     model, surface = load("vehicle", "paper-reference"), load("surface", "dense-asphalt")
     campaign = make_synthetic_campaign(model, surface, {}, 700_100, design=load_harder().drives())
-    lag = tuple(effect for effect in load_effects() if effect.name in {"brake_lag", "pressure_nonlinearity"})
-    assert judge_runs(campaign, model, surface, lag, load_decision_rules()).verdict.verdict == "NOTHING"
+    lag = tuple(
+        effect
+        for effect in load("library of effects")
+        if effect.name in {"brake_lag", "pressure_nonlinearity"}
+    )
+    assert (
+        judge_runs(campaign, model, surface, lag, load("set of decision rules")).verdict.verdict == "NOTHING"
+    )

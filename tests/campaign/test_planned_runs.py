@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from tasks.campaign.channels import say_brake
+from tasks.campaign.channels import describe_brake
 from tasks.campaign.planned_runs import RunPlan, make_planned_run, plan_experiments
 
 GAIN = 2.389
@@ -33,7 +33,7 @@ def test_a_car_with_weaker_brakes_is_asked_for_more_pressure_and_the_same_stops(
 def test_a_stop_is_asked_for_by_the_signal_that_the_driver_sees() -> None:
     signals = ("brake_pressure", "brake_command", "pedal_force", "v")
     said = ["2.4 MPa", "0.24 of the brake command", "120 N of the pedal force", "2.4 MPa"]
-    assert [say_brake(2.4, signal) for signal in signals] == said
+    assert [describe_brake(2.4, signal) for signal in signals] == said
 
 
 @pytest.mark.parametrize("interval", [0.01, 0.05])

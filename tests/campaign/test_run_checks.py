@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 from numpy.typing import NDArray
 
-from catalogs.effects import load_effects
+from catalogs.entries import load
 from tasks.campaign.assembly import judge_columns
 from tasks.campaign.campaign import CHANNELS, Run
 from tasks.campaign.channels import SPEED_UNITS, UNITS
@@ -183,7 +183,7 @@ def columns_of(run: Run, theta: Values) -> Columns:
     return {"time": run.interval * np.arange(len(response)), "brake_pressure": run.pressure, **columns}
 
 
-@pytest.mark.parametrize("effect", load_effects(), ids=lambda effect: effect.name)
+@pytest.mark.parametrize("effect", load("library of effects"), ids=lambda effect: effect.name)
 @pytest.mark.parametrize("share", [-0.5, 0.5])
 def test_an_effect_that_the_model_lacks_is_no_fault(effect: Effect, share: float) -> None:
     theta = np.zeros(len(EFFECT_TABLE))

@@ -42,9 +42,6 @@ def test_no_run_stands_in_a_campaign_under_two_names(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("dry,0.0", "rain,0.0", "run-01: weather rain needs precipitation_mm_h above 0"),
-        ("dry,0.0", "dry,25.0", "run-01: weather dry has no precipitation"),
-        ("dry,0.0", "rain,-2.0", "run-01: precipitation_mm_h must not be negative"),
         ("dry,0.0", "rain,1e9", "run-01: precipitation_mm_h must be at most 1872"),
         ("dry,0.0,0.0", "snow,3.0,0.0", "run-01: weather snow needs an accumulation time"),
     ],
@@ -178,24 +175,17 @@ def test_a_hole_in_a_slow_channel_is_a_gap(folder: Path) -> None:
             lambda x: np.where(np.arange(300) == 7, np.nan, x),
             "channel pitch: has 1 samples that are",
         ),
-        ("speed", lambda x: x * 3.6, "channels speed and wheel_speed_front give a rolling radius"),
-        ("brake_pressure", lambda x: x * 1e3, "channel brake_pressure reaches"),
         ("time", lambda x: x + 0.5 * (np.arange(300) > 100), "channel time must advance"),
-        ("pitch_rate", lambda x: np.full(300, 0.1), "channel pitch_rate: is frozen"),
         ("time", lambda x: 1.02 * x, "300 samples take"),
-        ("pitch", lambda x: -x, "0.02 to 2: turn its sign over"),
-        ("longitudinal_acceleration", lambda x: -x, "the rate of speed: turn its sign over"),
-        ("longitudinal_acceleration", lambda x: x / 9.81, "it looks like g"),
-        ("brake_pressure", lambda x: x * 10, "channel brake_pressure gives 0.2"),
+        ("brake_pressure", lambda x: x * 10, "channel brake_pressure gives 0.2"),  # a check of all runs
         ("brake_pressure", lambda x: np.full(300, 0.7), "channel brake_pressure is frozen: it holds 0.7 MPa"),
         ("brake_pressure", lambda x: np.zeros(300), "channel brake_pressure is 0 over the whole run"),
-        ("speed", lambda x: np.where(abs(np.arange(300) - 170) < 20, x[150], x), "channel speed: is frozen"),
-        ("vertical_acceleration", lambda x: x + 9.81, "must exclude gravity"),
-        ("wheel_speed_rear", lambda x: x * 3.6, "channels speed and wheel_speed_rear give"),
         ("wheel_speed_rear", lambda x: x * 0.32 * 3.6, "(one looks like km/h)"),
     ],
 )
-def test_what_is_wrong_is_named_with_run_and_channel(folder: Path, channel: str, damage, words: str) -> None:  # type: ignore[no-untyped-def]
+def test_what_a_check_finds_is_named_with_run_and_channel(
+    folder: Path, channel: str, damage, words: str
+) -> None:  # type: ignore[no-untyped-def]
     columns = braking_columns(1)
     columns[channel] = damage(columns[channel])
     write_run(folder, "run-02", columns)
@@ -213,18 +203,6 @@ def test_what_only_several_channels_tell_is_found(folder: Path) -> None:
     write_run(folder, "run-03", torn)
     text = list_problems(folder)
     assert "run-02: channel pitch gives 0.00" in text and "run-03: channel speed must not jump" in text
-
-
-def test_all_faults_of_a_run_are_told_at_once(folder: Path) -> None:
-    columns = braking_columns(1)
-    columns["pitch"][7] = np.nan
-    columns["vertical_acceleration"] += 9.81
-    columns["wheel_speed_rear"] *= 3.6
-    columns["time"] += 0.4 * (np.arange(300) > 100)
-    write_run(folder, "run-02", columns)
-    text = list_problems(folder)
-    for words in ("pitch: has 1 samples", "exclude gravity", "wheel_speed_rear give", "time must advance"):
-        assert words in text
 
 
 def test_coarse_sensors_and_locked_wheels_are_no_faults(folder: Path) -> None:

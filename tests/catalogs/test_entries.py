@@ -54,4 +54,4 @@ def test_every_name_of_a_kind_is_found_in_its_folder(kind):
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if entry_folder(kind).is_file()])
 def test_the_only_entry_of_a_kind_is_read_once_and_another_file_in_its_place_whenever_it_is_named(kind):
     assert load(kind) is load(kind)
-    assert load(kind, entry_folder(kind)) == load(kind)
+    assert repr(load(kind, entry_folder(kind))) == repr(load(kind))  # some hold arrays

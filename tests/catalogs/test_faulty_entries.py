@@ -9,10 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from catalogs.decision_rules import load_decision_rules
-from catalogs.effects import load_effects
-from catalogs.effects.truths import load_sizes, load_truths
-from catalogs.entries import CATALOGUE, load
+from catalogs.entries import CATALOGUE, find_entry, load
 from catalogs.learned_judges import load_judges
 from catalogs.vehicles.frozen import frozen_text
 from catalogs.weather.grip import WEATHER, WeatherFolder
@@ -23,73 +20,63 @@ Change = Callable[[Any], None]
 
 
 @pytest.mark.parametrize(
-    ("file", "read", "change", "words"),
+    ("kind", "name", "change", "words"),
     [
-        ("effects/library.yaml", load_effects, lambda c: c[7].update(parameters=3), "7.parameters: must be"),
-        ("effects/library.yaml", load_effects, lambda c: c[7].pop("name"), "7.name is missing"),
-        ("effects/library.yaml", load_effects, lambda c: c.append(c[0]), "an effect must stand once; twice stand"),
+        ("library of effects", None, lambda c: c[7].update(parameters=3), "7.parameters: must be"),
+        ("library of effects", None, lambda c: c[7].pop("name"), "7.name is missing"),
+        ("library of effects", None, lambda c: c.append(c[0]), "an effect must stand once; twice stand"),
         (
-            "effects/library.yaml",
-            load_effects,
+            "library of effects",
+            None,
             lambda c: c[0].update(parameters=["turbo"]),
             "0.parameters: the table of effects has no parameter turbo; there are: pressure_gain",
         ),
-        ("effects/library.yaml", load_effects, lambda c: c.insert(0, None), "0: must be a table"),
-        ("effects/library.yaml", load_effects, lambda c: c[7].pop("because"), "7.because is missing"),
-        ("effects/library.yaml", load_effects, lambda c: c[7].update(matters=0), "7.matters"),
-        ("decision_rules.yaml", load_decision_rules, lambda c: c.pop("named_odds"), "named_odds is missing"),
-        ("decision_rules.yaml", load_decision_rules, lambda c: c["spike_width"].update(value=2), "spike_width"),
-        ("decision_rules.yaml", load_decision_rules, lambda c: c["longest_lag"].update(unit="ms"), "longest_lag"),
-        ("effects/truths.yaml", load_truths, lambda c: c.pop("outside"), "outside is missing"),
-        ("effects/truths.yaml", load_truths, lambda c: c["library"].update(magic={"a": 1}), "magic: the library"),
-        ("effects/truths.yaml", load_sizes, lambda c: c["sizes"].update(idle_creep=[1]), "sizes.idle_creep: must be"),
+        ("library of effects", None, lambda c: c.insert(0, None), "0: must be a table"),
+        ("library of effects", None, lambda c: c[7].pop("because"), "7.because is missing"),
+        ("library of effects", None, lambda c: c[7].update(matters=0), "7.matters"),
+        ("set of decision rules", None, lambda c: c.pop("named_odds"), "named_odds is missing"),
+        ("set of decision rules", None, lambda c: c["spike_width"].update(value=2), "spike_width"),
+        ("set of decision rules", None, lambda c: c["longest_lag"].update(unit="ms"), "longest_lag"),
+        ("list of truths", None, lambda c: c.pop("outside"), "outside is missing"),
+        ("list of truths", None, lambda c: c["library"].update(magic={"a": 1}), "magic: the library"),
+        ("list of sizes", None, lambda c: c["sizes"].update(idle_creep=[1]), "sizes.idle_creep: must be"),
         (
-            "effects/truths.yaml",
-            load_truths,
+            "list of truths",
+            None,
             lambda c: c["outside"]["strut_step"].update(at=[0, 1]),
             "outside.strut_step: value must have one number for each of at",
         ),
         (
-            "effects/truths.yaml",
-            load_truths,
+            "list of truths",
+            None,
             lambda c: c["outside"]["strut_step"].update(at=[0, 0, 1, 2, 4]),
             "outside.strut_step: at must ascend in equal steps",
         ),
         (
-            "calibration/coupled-grown.yaml",
-            partial(load, "calibration procedure"),
+            "calibration procedure",
+            "coupled-grown",
             lambda c: c["bounds"]["static_pitch"].update(unit="rad"),
             "bounds: unit of static_pitch must be deg; it is rad",
         ),
         (
-            "hazard_markings/zebra-yellow-black.yaml",
-            partial(load, "hazard marking"),
+            "hazard marking",
+            "zebra-yellow-black",
             lambda c: c["paint"].update(value=[0.5, 0.5]),
             "paint: must be red, green and blue; it has 2 values",
         ),
-        (
-            "channel_maps/bmw-m8.yaml",
-            partial(load, "channel map"),
-            lambda c: c.update(sample_rate_hz=1e300),
-            "rate_hz: must be",
-        ),
-        (
-            "vehicles/multibody-grown.yaml",
-            partial(load, "vehicle"),
-            lambda c: c["wheel_radius"].update(value=9),
-            "frozen",
-        ),
+        ("channel map", "bmw-m8", lambda c: c.update(sample_rate_hz=1e300), "rate_hz: must be"),
+        ("vehicle", "multibody-grown", lambda c: c["wheel_radius"].update(value=9), "frozen"),
     ],
-)  # fmt: skip
+)
 def test_a_broken_rule_is_named_with_its_place(
-    tmp_path: Path, file: str, read: Callable[[Path], object], change: Change, words: str
+    tmp_path: Path, kind: str, name: str | None, change: Change, words: str
 ) -> None:
-    content = yaml.safe_load((CATALOGUE / file).read_text())
+    content = yaml.safe_load(find_entry(kind, name).read_text())
     change(content)
     path = tmp_path / "entry.yaml"
     path.write_text(yaml.safe_dump(content, sort_keys=False))
     with pytest.raises(InputError) as caught:
-        read(path)
+        load(kind, path)
     assert words in str(caught.value)
     assert all(str(path) in problem for problem in caught.value.problems)
 
@@ -98,9 +85,9 @@ def test_a_broken_rule_is_named_with_its_place(
 @pytest.mark.parametrize(
     "read",
     [
-        load_effects,
-        load_truths,
-        load_sizes,
+        partial(load, "library of effects"),
+        partial(load, "list of truths"),
+        partial(load, "list of sizes"),
         partial(load, "vehicle"),
         partial(load, "channel map"),
         load_judges,

@@ -142,6 +142,16 @@ def test_a_maker_that_is_killed_holds_nobody_up_and_leaves_nothing(cache):
     assert names(cache) == [folder.name, "street.lock"]
 
 
+def test_of_many_streets_that_used_least_recently_goes(cache, monkeypatch):
+    monkeypatch.setattr(street_cache, "KEPT", 2)
+    first, second = (cached_street(seed=seed) for seed in (1, 2))
+    os.utime(first, (1, 1))
+    os.utime(second, (2, 2))
+    assert cached_street(seed=1) == first
+    third = cached_street(seed=3)
+    assert names(cache) == sorted([first.name, third.name, "street.lock"])
+
+
 @pytest.mark.parametrize("place", ["file/cache", "x" * 5_000])
 def test_a_cache_that_cannot_be_written_is_one_sentence(tmp_path, monkeypatch, place):
     (tmp_path / "file").touch()

@@ -3,10 +3,11 @@
 import pytest
 
 from catalogs.grids import build_grid
-from catalogs.scenes import find_recipe, is_built_in
+from catalogs.scenes import find_recipe, is_built_in, load_route, write_scene
 from catalogs.scenes.street import STREET_FILE, load_street_layout
 from catalogs.street_names import KINDS, find_default_split, parse_street_name
 from tasks.errors import InputError
+from tests.toy_street import toy_street
 
 
 def grid_of(tmp_path, text: str):
@@ -73,3 +74,10 @@ def test_a_seed_draws_every_range_of_its_kind_again(kind):
         changes, drawn = find_recipe(f"{kind}-{seed}")
         layouts.append(load_street_layout(STREET_FILE, *changes, seed=drawn))
     assert layouts[0] == layouts[1] != layouts[2]
+
+
+def test_a_route_is_that_of_the_scene_without_its_gaussians(monkeypatch, tmp_path):
+    write_scene(toy_street(), tmp_path / "toy", {})
+    assert load_route(str(tmp_path / "toy")).length == toy_street().route.length
+    monkeypatch.setattr("catalogs.scenes.cached_street", None)
+    assert load_route("town-7").length == 180.0

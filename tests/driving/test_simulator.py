@@ -17,6 +17,7 @@ from flows.store.layout import Layout
 from flows.store.sealed import read_manifest
 from tasks.driving.targets import TargetTrack
 from tasks.errors import InputError
+from tests.toy_street import write_toy_grid
 
 WET = {"weather": "rain", "precipitation_mm_h": 20.0, "initial_speed_km_h": 70.0}
 GRID = """
@@ -29,7 +30,7 @@ frame_rate_hz: 10
 duration_s: 2
 visual_seeds: 2
 scenarios:
-  dry: {initial_speed_km_h: 50}
+  dry: {initial_speed_km_h: 50, hold_speed: true}
   wet:
     {weather: rain, precipitation_mm_h: 50, initial_speed_km_h: 90, hazard_center_m: 20, hazard_length_m: 3.6,
      hazard_height_m: 0.05}
@@ -38,6 +39,8 @@ POLICY = """
 from time import sleep
 
 def brake(seen):
+    if seen.time < 0.4:
+        return 0
     return min(3.0, 2.0 * seen.time) if seen.speed > 10 else 0.5
 
 class Once:
@@ -68,6 +71,8 @@ def folder(tmp_path, monkeypatch):
     name = f"policy_{abs(hash(tmp_path))}"
     (tmp_path / f"{name}.py").write_text(POLICY)
     (tmp_path / "grid.yaml").write_text(GRID)
+    ahead = "{initial_speed_km_h: 50, objects: [{kind: car, track: {gap_m: 12}}]}"
+    (tmp_path / "car.yaml").write_text(GRID.replace("{initial_speed_km_h: 50, hold_speed: true}", ahead))
     monkeypatch.chdir(tmp_path)
     return name
 
@@ -91,9 +96,40 @@ def test_a_drive_begins_anew_the_same_and_sees_what_is_ahead():
     assert musync.Simulator is Simulator
 
 
+def test_pictures_are_those_of_the_drive_and_the_same_again(tmp_path):
+    write_toy_grid(tmp_path, frames=3)
+    car = {"kind": "car", "track": {"gap_m": 12.0}}
+    given = {"scene": str(tmp_path / "scene"), "initial_speed_km_h": 40.0, "objects": [car]}
+    drives = []
+    for _ in range(2):
+        simulator = Simulator(given, duration_s=0.2, rate_hz=10, camera=str(tmp_path / "camera.yaml"))
+        drives.append([simulator.reset(), *(simulator.step(0.0) for _ in range(2))])
+    first, again = ([seen.frame for seen in drive] for drive in drives)
+    assert first[0].shape == (64, 96, 3) and first[0].dtype == np.uint8
+    assert all((a == b).all() for a, b in zip(first, again, strict=True))
+    assert np.abs(first[2].astype(int) - first[0]).mean() > 1.0
+
+
+def test_the_objects_of_a_scenario_are_seen_by_the_end_that_the_car_meets():
+    objects = [
+        {"kind": "car", "track": {"gap_m": 20.0, "speed_km_h": 36.0, "change_at_s": 0.5, "acceleration_m_s2": -20.0}},
+        {"kind": "adult", "track": {"station_m": 30.0, "lateral_m": -3.0, "heading_deg": 90.0, "speed_km_h": 5.4}},
+    ]  # fmt: skip
+    simulator = Simulator(WET | {"objects": objects}, duration_s=1.0, rate_hz=20)
+    lead, walker = simulator.reset().targets
+    assert (lead.station, lead.speed, lead.lateral) == pytest.approx((20.0, 10.0, 0.0))
+    assert (walker.station, walker.lateral, walker.lateral_speed) == pytest.approx((30.0, -3.0, 1.5), abs=0.4)
+    for _ in range(20):
+        seen = simulator.step(0.0)
+    slows = 9.80665 * simulator.state.friction
+    assert seen.targets[0].speed == pytest.approx(10.0 - 0.5 * slows, abs=0.01)
+
+
 @pytest.mark.parametrize(
     ("scenario", "sentence"),
     [
+        (WET | {"objects": [{"kind": "tram", "track": {"gap_m": 20.0}}]}, "scenario: objects"),
+        (WET | {"objects": [{"kind": "car", "track": {"world_m": [9.0, 0.0]}}]}, "one is given by world_m"),
         (WET | {"peak_pressure_mpa": 3.0}, "peak_pressure_mpa is the controller's"),
         (WET | {"colour": "red"}, "there is no field 'colour'"),
         (WET | {"precipitation_mm_h": -1.0}, "precipitation_mm_h must not be negative"),
@@ -155,6 +191,14 @@ def test_a_policy_that_fails_gets_one_sentence_and_nothing_is_written(folder, mo
     with pytest.raises(InputError, match=re.escape(sentence)) as told:
         drive_grid("grid.yaml", f"{folder}:{name}", "data", runner="threads", workers=1)
     assert len(told.value.problems) == 1 and not Path("data").exists()
+
+
+def test_a_policy_sees_the_road_users_of_a_grid_and_the_result_says_what_became_of_them(folder):
+    result = drive_grid("car.yaml", f"{folder}:Once", "data", pictures=False, runner="threads", workers=1)
+    (outcome,) = result["outcomes"]
+    assert (outcome["scenario"], outcome["number"], outcome["kind"]) == ("dry", 1, "car")
+    assert outcome["collided"] and 40 < outcome["impact_speed_km_h"] < 50
+    assert outcome["avoided_km_h"] == pytest.approx(50 - outcome["impact_speed_km_h"], abs=0.02)
 
 
 def test_a_grid_that_brakes_by_itself_is_refused(folder, tmp_path):

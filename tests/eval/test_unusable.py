@@ -3,7 +3,7 @@
 import numpy as np
 
 from tasks.conventions import SemanticClass
-from tasks.eval.poses.unusable import glossy_pixels, unusable_pixels
+from tasks.eval.poses.checks import glossy_pixels, unusable_pixels
 
 CLASSES = np.array(
     [

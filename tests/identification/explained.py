@@ -7,11 +7,11 @@ from math import nan
 import numpy as np
 from numpy.typing import NDArray
 
-from catalogs.effects import load_effects
+from catalogs.entries import load
 from tasks.identification.decision.candidates import Candidate, Columns
 from tasks.identification.decision.odds import RunGrams
 
-EFFECTS = {effect.name: effect for effect in load_effects()}
+EFFECTS = {effect.name: effect for effect in load("library of effects")}
 SESSION = 8
 """Numbers of the session, which stand last among the columns."""
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from catalogs.effects.truths import load_sizes, load_truths
 from catalogs.entries import load
 from flows.measured.closing_error_rates import JUDGES
 from manifests.provenance import source_hashes
@@ -52,7 +51,7 @@ def test_the_exact_interval_is_clopper_and_pearsons() -> None:
 
 
 def test_every_truth_is_of_the_library_or_a_form_outside_it() -> None:
-    truths = load_truths()
+    truths = load("list of truths")
     assert sum(t.in_library for t in truths) >= 20 and sum(not t.in_library for t in truths) >= 6
     assert all((t.form is None) == t.in_library for t in truths)
 
@@ -92,12 +91,12 @@ def test_a_benchmark_goes_on_where_it_was_stopped_and_starts_anew_with_another_e
     result = closing_benchmark.close_loop_benchmark(out=str(tmp_path), seeds=2, nulls=4, harder=1)
     seeds = [row["seed"] for row in result["campaigns"]]
     assert len(judged) == len(seeds) + 1 and len(set(seeds)) == len(seeds)
-    library = [truth for truth in load_truths() if truth.in_library]
+    library = [truth for truth in load("list of truths") if truth.in_library]
     harder = 3 * len(library)  # as many pairs as truths, and each truth and a null on the poor design
-    assert len(seeds) == 4 + 2 * len(load_truths()) + 2 * len(load_sizes()) + harder
+    assert len(seeds) == 4 + 2 * len(load("list of truths")) + 2 * len(load("list of sizes")) + harder
     # round by round: no truth has its second campaign before all have their first
     order = [row["truth"] for row in result["campaigns"] if row["kind"] in ("library", "outside")]
-    assert order[: len(load_truths())] == [t.name for t in load_truths()]
+    assert order[: len(load("list of truths"))] == [t.name for t in load("list of truths")]
     tables = (tmp_path / "closing-benchmark.md").read_text()
     assert "| false discoveries on nulls | 0 | 4 of 4 |" in tables
     assert "| brake_fade | fade 0.005 | 2 of 2 | 1.00 |" in tables
@@ -161,7 +160,7 @@ def test_a_form_counts_by_its_port_and_variable_and_a_set_by_the_truth_in_it(
 
 
 def test_every_truth_is_in_two_pairs_and_no_pair_comes_twice() -> None:
-    library = tuple(truth for truth in load_truths() if truth.in_library)
+    library = tuple(truth for truth in load("list of truths") if truth.in_library)
     pairs = [frozenset(truth.name for truth in pair) for pair in load_harder().pairs(library)]
     assert len(set(pairs)) == len(pairs) == len(library)
     assert {name: sum(name in pair for pair in pairs) for name in set().union(*pairs)} == {
@@ -198,7 +197,7 @@ def test_a_later_first_seed_makes_other_campaigns_of_the_same_truths_and_the_sam
 
 
 NO_JUDGE = (
-    "catalogs/__init__", "catalogs/citations", "catalogs/documents", "catalogs/entries", "catalogs/names",
+    "catalogs/__init__", "catalogs/documents", "catalogs/entries", "catalogs/names",
     "catalogs/physical_limits", "catalogs/quantities", "catalogs/sentences", "catalogs/studies/__init__",
     "catalogs/variants", "catalogs/vehicles/added", "catalogs/vehicles/frozen", "catalogs/yaml_text", "flows/__init__",
     "flows/measured/__init__", "manifests/", "tasks/__init__", "tasks/errors", "tasks/kernel_cache",

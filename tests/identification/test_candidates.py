@@ -6,15 +6,14 @@ from math import exp, isfinite
 import numpy as np
 import pytest
 
-from catalogs.decision_rules import load_decision_rules
-from catalogs.effects import load_effects
+from catalogs.entries import load
 from tasks.campaign.campaign import CHANNELS, FILE_NUMBERS, SESSION
-from tasks.identification.decision.candidates import CLASSES, can_show, list_columns, tell_limit
+from tasks.identification.decision.candidates import CLASSES, can_show, determines_limit, list_columns
 from tasks.identification.inference.forward import prepare_run
 from tests.identification.synthetic import SURFACE, TOLERANCES, VEHICLE, plain_run
 
-RULES = load_decision_rules()
-EFFECTS = load_effects()
+RULES = load("set of decision rules")
+EFFECTS = load("library of effects")
 OWN = tuple(e for e in EFFECTS if e.parameters[0].name not in SESSION)
 RETUNED = [e for e in EFFECTS if e.parameters[0].name in SESSION]
 COLUMNS = list_columns(OWN, RETUNED, np.array(TOLERANCES.file_numbers), RULES)
@@ -87,5 +86,5 @@ def test_the_friction_of_a_weather_is_told_by_a_run_of_it_that_reaches_the_limit
     run = plain_run(25.0, peak, seconds=2.5)
     rain = {"weather": weather, "precipitation_mm_h": 8.0 if weather == "rain" else 0.0}
     model = prepare_run(replace(run, **rain), VEHICLE, SURFACE)
-    assert tell_limit(wet, [model], 0.0, RULES) is shown
-    assert tell_limit(lag, [model], 0.0, RULES)
+    assert determines_limit(wet, [model], 0.0, RULES) is shown
+    assert determines_limit(lag, [model], 0.0, RULES)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catalogs.decision_rules import load_decision_rules
+from catalogs.entries import load
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.derivatives import differentiate_run
 from tasks.identification.inference.discrepancy import estimate_run_noise, set_run_noise
@@ -33,7 +33,7 @@ def evidence_of(*runs: RunModel) -> Evidence:
     derived = tuple(differentiate_run(r, np.zeros(7), NOISE, NOTHING, (), TOLERANCES, QUIET) for r in runs)
     return Evidence(
         train=derived, held_out=(), effects=(), tolerances=TOLERANCES, disturbance=QUIET,
-        sensors=(np.zeros(7), NOISE), rules=load_decision_rules(),
+        sensors=(np.zeros(7), NOISE), rules=load("set of decision rules"),
     )  # fmt: skip
 
 

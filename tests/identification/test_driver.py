@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catalogs.decision_rules import load_decision_rules
-from catalogs.effects import load_effects
+from catalogs.entries import load
 from tasks.campaign.campaign import CHANNELS, Campaign
 from tasks.campaign.planned_runs import plan_experiments
 from tasks.identification.decision import experiment
@@ -17,7 +16,7 @@ from tasks.vehicle.effects.grown import apply_effects
 from tasks.vehicle.effects.table import EFFECT_TABLE, build_parameter_vector
 from tests.identification.synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, plain_run
 
-RULES = load_decision_rules()
+RULES = load("set of decision rules")
 SHARE = RULES.brake_onset_share
 RESISTANCE = {"drag_area": 0.8, "rolling_coefficient": 0.012}
 KNOWN = apply_effects(VEHICLE, RESISTANCE)
@@ -86,7 +85,9 @@ def test_runs_begin_as_the_foot_changes_to_the_brake_and_coasting_runs_stay_whol
 
 
 def test_an_effect_of_the_brake_is_found_although_the_speed_was_held_and_the_verdict_says_from_where():
-    library = tuple(e for e in load_effects() if e.name in ("brake_lag", "aerodynamic_drag", "pad_drag"))
+    library = tuple(
+        e for e in load("library of effects") if e.name in ("brake_lag", "aerodynamic_drag", "pad_drag")
+    )
     campaign = make_campaign(LAG, held=True)
     outcome = judge_runs(campaign, KNOWN, SURFACE, library, RULES)
     (found,) = outcome.verdict.effects

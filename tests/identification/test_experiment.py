@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catalogs.decision_rules import load_decision_rules
-from catalogs.effects import load_effects
+from catalogs.entries import load
 from tasks.campaign.planned_runs import RICH, RunPlan, make_planned_run, plan_experiments
 from tasks.identification.decision import experiment
 from tasks.identification.decision.experiment import plan_next_experiment
@@ -23,7 +22,7 @@ from tests.identification.synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, 
 
 NOTHING = np.zeros(len(EFFECT_TABLE))
 QUIET = Disturbance(scale=(5.0, 0.001, 5.0), time=(1.0, 0.3, 0.3))
-LIBRARY = {e.name: e for e in load_effects()}
+LIBRARY = {e.name: e for e in load("library of effects")}
 BETWEEN = ("brake_fade", "the model as it stands")
 
 
@@ -44,13 +43,13 @@ def evidence_of(theta: np.ndarray, *names: str) -> Evidence:
         tolerances=TOLERANCES,
         disturbance=QUIET,
         sensors=(np.zeros(7), NOISE),
-        rules=load_decision_rules(),
+        rules=load("set of decision rules"),
     )
 
 
 def test_a_run_that_depends_on_the_step_is_told_from_sound_ones() -> None:
     """Light wheels and an anti-lock band a quarter as wide: steps of 2 ms swing the wheels through it."""
-    limit = load_decision_rules().step_misfit
+    limit = load("set of decision rules").step_misfit
     hard = replace(RICH[2], speed=12.0, peak=12.0)
     narrow = replace(VEHICLE, abs_release_width=0.05, wheel_inertia_f=0.3 * VEHICLE.wheel_inertia_f)
     sound, coarse = (

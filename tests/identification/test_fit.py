@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catalogs.decision_rules import load_decision_rules
-from catalogs.effects import load_effects
+from catalogs.entries import load
 from tasks.campaign.campaign import SESSION
 from tasks.errors import InputError
 from tasks.identification.decision.candidates import Candidate, list_columns
@@ -45,7 +44,7 @@ from tasks.vehicle.effects.table import EFFECT_TABLE, build_parameter_vector
 from tests.identification.synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
 QUIET = Disturbance(scale=(5.0, 0.001, 5.0), time=(1.0, 0.3, 0.3))
-LIBRARY = {e.name: e for e in load_effects()}
+LIBRARY = {e.name: e for e in load("library of effects")}
 PLAIN = np.zeros(len(EFFECT_TABLE))
 
 
@@ -54,7 +53,7 @@ def evidence_of(models: list[RunModel], effects: tuple[Effect, ...]) -> Evidence
     return Evidence(
         train=runs, held_out=(), effects=effects, tolerances=TOLERANCES, disturbance=QUIET,
         sensors=(np.zeros(7), NOISE),
-        rules=load_decision_rules(),
+        rules=load("set of decision rules"),
     )  # fmt: skip
 
 
@@ -187,7 +186,7 @@ def hump_in_the_brake() -> Evidence:
 
 def find_best_form(evidence: Evidence, null: Fit) -> tuple[Candidate, list[Hypothesis]]:
     """The form that alone explains most of what a fit leaves over, and the shapes that follow it best."""
-    rules = load_decision_rules()
+    rules = load("set of decision rules")
     columns = list_columns(evidence.effects, (), evidence.session_sigma, rules)
     grams = gather_grams(evidence, null, differentiate_by_splines(evidence, null), columns)
     best = search_explanations(grams, most=1, width=1, spread=False)[0]

@@ -6,10 +6,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from catalogs.decision_rules import load_decision_rules
-from catalogs.effects import load_effects
+from catalogs.entries import load
 from tasks.campaign.campaign import CHANNELS, FILE_NUMBERS, SESSION, Campaign
-from tasks.identification.decision.candidates import tell_curve
+from tasks.identification.decision.candidates import determines_curve
 from tasks.identification.decision.verdict import Outcome, judge_runs
 from tasks.identification.inference.driver import leave_out_driving
 from tasks.identification.inference.forward import prepare_run
@@ -19,9 +18,9 @@ from tasks.vehicle.effects.table import build_parameter_vector
 from tasks.vehicle.parameters import Vehicle
 from tests.identification.synthetic import SURFACE, TOLERANCES, VEHICLE, measured, plain_run
 
-RULES = load_decision_rules()
+RULES = load("set of decision rules")
 FEW = ("brake_lag", "brake_dead_time", "push_out_pressure", "aerodynamic_drag", "retuned_pressure_gain")
-LIBRARY = tuple(e for e in load_effects() if e.name in FEW)
+LIBRARY = tuple(e for e in load("library of effects") if e.name in FEW)
 STOPS = ((29.0, 0.9), (17.0, 2.0), (22.0, 2.0))
 """Speed [m/s] and brake pressure [MPa] of the runs; the last is held out."""
 SEEN = np.isin(CHANNELS, ("speed", "longitudinal_acceleration"))
@@ -119,7 +118,9 @@ def test_a_run_begins_where_its_throttle_closes_and_starts_with_the_speed_before
 def test_one_stop_shows_no_curve_of_the_brake() -> None:
     models = [prepare_run(run, VEHICLE, SURFACE) for run in campaign_of({}).train]
     curve, lag = (next(e for e in LIBRARY if e.name == n) for n in ("push_out_pressure", "brake_lag"))
-    assert [tell_curve(curve, models[:n]) for n in (1, 2)] == [False, True] and tell_curve(lag, models[:1])
+    assert [determines_curve(curve, models[:n]) for n in (1, 2)] == [False, True] and determines_curve(
+        lag, models[:1]
+    )
 
 
 def test_no_sensor_is_quieter_than_a_model_is_right_and_one_signal_for_both_axles_counts_once() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 
 from tasks.campaign.campaign import Campaign
 from tasks.identification.decision.answer import NamedEffect, Parameter
-from tasks.identification.decision.log_faults import tell_log_faults
+from tasks.identification.decision.log_faults import describe_log_faults
 from tests.identification.synthetic import TOLERANCES, plain_run
 
 
@@ -28,40 +28,40 @@ def campaign_at_rest(pressure: float) -> Campaign:
 def test_a_gauge_that_drifts_is_told_and_a_zero_that_was_taken_off_is_too() -> None:
     drifting = campaign_at_rest(0.0)
     runs = tuple(replace(run, pressure=run.pressure + 0.04 * k) for k, run in enumerate(drifting.runs))
-    (told,) = tell_log_faults(replace(drifting, runs=runs), (), ())
+    (told,) = describe_log_faults(replace(drifting, runs=runs), (), ())
     assert "rests at 0.000 (run-1) to 0.080 MPa (run-3)" in told
-    (told,) = tell_log_faults(replace(drifting, brake_rest=0.08), (), ())
+    (told,) = describe_log_faults(replace(drifting, brake_rest=0.08), (), ())
     assert "rests at 0.080 MPa" in told and "begin would look the same" in told
-    (told,) = tell_log_faults(replace(drifting, brake_rest=1.5, brake_signal="brake_command"), (), ())
+    (told,) = describe_log_faults(replace(drifting, brake_rest=1.5, brake_signal="brake_command"), (), ())
     assert told.startswith("the brake command rests at 0.150 while the car")
-    (told,) = tell_log_faults(replace(drifting, throttle_rest=0.155), (), ())
+    (told,) = describe_log_faults(replace(drifting, throttle_rest=0.155), (), ())
     assert told == "the throttle rests at 0.155 while the brake is applied: counted from there"
     # one training run does not tell a gauge's zero, and none is taken off
     alike = [
         replace(run, pressure=run.pressure + 0.05, held_out=k > 0) for k, run in enumerate(drifting.runs)
     ]
-    (told,) = tell_log_faults(replace(drifting, runs=tuple(alike)), (), ())
+    (told,) = describe_log_faults(replace(drifting, runs=tuple(alike)), (), ())
     assert "the model brakes with it" in told
-    assert tell_log_faults(drifting, (), ()) == []
-    assert tell_log_faults(replace(drifting, runs=runs, brake_signal="brake_command"), (), ()) == []
+    assert describe_log_faults(drifting, (), ()) == []
+    assert describe_log_faults(replace(drifting, runs=runs, brake_signal="brake_command"), (), ()) == []
 
 
 def test_a_late_brake_is_told_to_look_like_a_late_clock_unless_the_speeds_own_delay_is_a_rival() -> None:
     campaign, late = campaign_at_rest(0.0), [make_effect("brake_dead_time")]
-    (told,) = tell_log_faults(campaign, late, ["brake_lag"])
+    (told,) = describe_log_faults(campaign, late, ["brake_lag"])
     assert "share a clock" in told
-    assert tell_log_faults(campaign, late, ["sensor_speed_delay"]) == []
-    assert tell_log_faults(campaign, [make_effect("brake_lag")], ()) == []
+    assert describe_log_faults(campaign, late, ["sensor_speed_delay"]) == []
+    assert describe_log_faults(campaign, [make_effect("brake_lag")], ()) == []
 
 
 def test_a_fade_by_discs_that_nobody_measured_says_so() -> None:
     cold = campaign_at_rest(0.0)
     hot = replace(cold, runs=tuple(replace(run, disc_rise=310.0, braking_heat=2300.0) for run in cold.runs))
-    (told,) = tell_log_faults(hot, [make_effect("brake_fade")], ())
+    (told,) = describe_log_faults(hot, [make_effect("brake_fade")], ())
     assert told.startswith("no disc temperature was measured: the runs begin up to 310 K above ambient")
-    assert tell_log_faults(hot, [make_effect("brake_lag")], ["brake_fade"]) == [told]
-    assert tell_log_faults(hot, [make_effect("brake_lag")], ()) == []
-    assert tell_log_faults(cold, [make_effect("brake_fade")], ()) == []
+    assert describe_log_faults(hot, [make_effect("brake_lag")], ["brake_fade"]) == [told]
+    assert describe_log_faults(hot, [make_effect("brake_lag")], ()) == []
+    assert describe_log_faults(cold, [make_effect("brake_fade")], ()) == []
 
 
 def test_slopes_that_only_the_accelerometer_feels_are_told() -> None:
@@ -70,7 +70,7 @@ def test_slopes_that_only_the_accelerometer_feels_are_told() -> None:
         flat,
         runs=tuple(replace(run, felt_slope=s) for run, s in zip(flat.runs, (-0.01, 0.0, 0.02), strict=True)),
     )
-    (told,) = tell_log_faults(hilly, (), ())
+    (told,) = describe_log_faults(hilly, (), ())
     assert told.startswith("no slope of the road was mapped") and "slopes of -1.0 to 2.0 %" in told
     mapped = tuple(replace(run, road_slope=np.zeros(len(run.pressure))) for run in hilly.runs)
-    assert tell_log_faults(replace(hilly, runs=mapped), (), ()) == []
+    assert describe_log_faults(replace(hilly, runs=mapped), (), ()) == []

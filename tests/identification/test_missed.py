@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import pytest
 
-from catalogs.effects import load_effects
+from catalogs.entries import load
 from tasks.identification.decision.answer import ChannelError, Verdict
-from tasks.identification.decision.missed import tell_miss
+from tasks.identification.decision.verdict import report_miss
 from tests.flows.measured.findings import found_effect, verdict_of
 
-LAG = found_effect(next(e for e in load_effects() if e.name == "brake_lag"), {"lag": 0.08})
+LAG = found_effect(next(e for e in load("library of effects") if e.name == "brake_lag"), {"lag": 0.08})
 
 
 def missing(error: float, verdict: Verdict) -> Verdict:
@@ -18,7 +18,7 @@ def missing(error: float, verdict: Verdict) -> Verdict:
         frozen=1.0, retuned=1.0, after=error, ci_low=0.0, ci_high=1.0, change_low=-1.0, change_high=0.0, wins=1,
         worst_run="r", unit="m/s",
     )  # fmt: skip
-    return tell_miss(replace(verdict, error={"speed": speed}, noise={"speed": (0.6, 0.02)}), 5.0)
+    return report_miss(replace(verdict, error={"speed": speed}, noise={"speed": (0.6, 0.02)}), 5.0)
 
 
 @pytest.mark.parametrize(("error", "missed"), [(0.099, False), (0.101, True)])

@@ -5,14 +5,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from catalogs.decision_rules import load_decision_rules
+from catalogs.entries import load
 from tasks.campaign.campaign import SESSION
 from tasks.identification.decision import naming
 from tasks.identification.decision.odds import search_explanations
-from tasks.identification.decision.told import list_open_explanations
+from tasks.identification.decision.open_explanations import list_open_explanations
 from tests.identification.explained import effect_of, form_of, grams_of
 
-RULES = load_decision_rules()
+RULES = load("set of decision rules")
 
 
 def settle(monkeypatch, grams, most=1, **fit):
@@ -45,7 +45,7 @@ def test_no_form_is_named_whose_interval_holds_no_form_at_all(monkeypatch, value
         values=np.array([value]),
         scatter=np.array([scatter, *np.zeros(8)]),
     )
-    assert len(opened[0].told) == told
+    assert len(opened[0].named) == told
 
 
 @pytest.mark.parametrize(
@@ -93,9 +93,9 @@ def test_a_number_of_the_file_is_held_against_a_form_of_its_port_through_the_sim
     grams = grams_of([level, form], designs, [np.array([9.0, 6.6])] * 4)
 
     def fit(finding, opened):
-        varies = opened.told[0] is form
+        varies = opened.named[0] is form
         part = SimpleNamespace(
-            name=opened.told[0].name, effect_class="form" if varies else "retune", port="friction", names=("a",),
+            name=opened.named[0].name, effect_class="form" if varies else "retune", port="friction", names=("a",),
             lower=(-9.0,), upper=(9.0,), units=("1",),
         )  # fmt: skip
         return SimpleNamespace(

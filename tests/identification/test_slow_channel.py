@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catalogs.decision_rules import load_decision_rules
-from catalogs.effects import load_effects
+from catalogs.entries import load
 from tasks.campaign.campaign import CHANNELS, Campaign
 from tasks.identification.decision.forms import differentiate_by_splines
 from tasks.identification.inference.campaign_evidence import Evidence
@@ -42,8 +41,10 @@ def slow_campaign() -> Campaign:
 
 @pytest.fixture(scope="module")
 def prepared_evidence(slow_campaign: Campaign) -> tuple[Evidence, Fit]:
-    effects = tuple(effect for effect in load_effects() if effect.name in ("headwind", "brake_lag"))
-    return prepare_evidence(slow_campaign, VEHICLE, SURFACE, effects, load_decision_rules())
+    effects = tuple(
+        effect for effect in load("library of effects") if effect.name in ("headwind", "brake_lag")
+    )
+    return prepare_evidence(slow_campaign, VEHICLE, SURFACE, effects, load("set of decision rules"))
 
 
 def test_residuals_and_derivatives_are_zero_between_samples(prepared_evidence: tuple[Evidence, Fit]) -> None:

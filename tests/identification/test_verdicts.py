@@ -7,9 +7,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from catalogs.decision_rules import load_decision_rules
-from catalogs.effects import load_effects
-from catalogs.effects.truths import load_truths
 from catalogs.entries import load
 from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
 from tasks.campaign.planned_runs import RICH, RunPlan, make_planned_run, plan_experiments
@@ -40,9 +37,9 @@ BUMPS = (
     RunPlan(speed=8.9, peak=0.8, duration=2.0, hazard=(9.0, 3.7, 0.05)),
 )  # fmt: skip
 """What the suspension does: five runs train, two are held out."""
-OUTSIDE = {truth.name: truth for truth in load_truths() if not truth.in_library}
+OUTSIDE = {truth.name: truth for truth in load("list of truths") if not truth.in_library}
 SEED = 31
-RULES = load_decision_rules()
+RULES = load("set of decision rules")
 
 
 def judged(
@@ -61,7 +58,7 @@ def judged(
     campaign = make_synthetic_campaign(driven, SURFACE, values, SEED, slots=slots, design=design)
     last = 3 * len(design) // 4
     runs = tuple(replace(run, held_out=number >= last) for number, run in enumerate(campaign.runs))
-    effects = tuple(effect for effect in load_effects() if effect.name in library)
+    effects = tuple(effect for effect in load("library of effects") if effect.name in library)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(experiment, "plan_experiments", lambda gain: plan_experiments(gain)[first_experiment:])
         return judge_runs(change(replace(campaign, runs=runs)), vehicle, SURFACE, effects, RULES).verdict

@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 import pytest
 
 import musync
-from flows.store.arrays import arrays_of
+from flows.store.arrays import EVERY_ARRAY
 from reference_pages.modules import PAGES, write_module_page
 from reference_pages.schema import write_schema_page
 from tasks.conventions import CHANNELS_BY_NAME
@@ -29,7 +29,7 @@ def test_all_that_musync_offers_is_described_under_its_public_name():
 
 def test_the_schema_has_every_column_and_every_array():
     page = write_schema_page()
-    names = [*CHANNELS_BY_NAME, *arrays_of(labels=True)]
+    names = [*CHANNELS_BY_NAME, *EVERY_ARRAY]
     assert [name for name in names if f"| `{name}` |" not in page] == []
     assert "| `pitch` | rad | theta | platform\\_pitch\\_fore\\_down |" in page
 

@@ -4,8 +4,7 @@ import re
 
 import yaml
 
-from catalogs.decision_rules import DECISION_RULES
-from catalogs.effects import LIBRARY_FILE
+from catalogs.entries import find_entry
 from reference_pages.markdown import format_cell
 from reference_pages.pages import ASKED, TABLES, insert_tables
 from reference_pages.verdict_rules import read_meanings
@@ -24,7 +23,10 @@ def rows_of(heading: str) -> dict[str, list[str]]:
 
 
 def test_every_number_of_a_decision_stands_on_the_page_with_meaning_and_reason() -> None:
-    numbers, meanings = yaml.safe_load(DECISION_RULES.read_text()), read_meanings(DecisionRules)
+    numbers, meanings = (
+        yaml.safe_load(find_entry("set of decision rules").read_text()),
+        read_meanings(DecisionRules),
+    )
     rows = rows_of("Numbers of the decision")
     assert rows.keys() == numbers.keys() == meanings.keys() and len(numbers) <= 30
     for name, entry in numbers.items():
@@ -36,7 +38,7 @@ def test_every_number_of_a_decision_stands_on_the_page_with_meaning_and_reason()
 
 def test_every_effect_has_the_size_that_matters_and_why() -> None:
     rows = rows_of("Sizes that matter")
-    for effect in yaml.safe_load(LIBRARY_FILE.read_text()):
+    for effect in yaml.safe_load(find_entry("library of effects").read_text()):
         number, size, _, reason = rows[effect["name"]]
         assert [number, size] == [f"`{effect['parameters'][0]}`", format_cell(effect["matters"])]
         assert reason == format_cell(effect["because"])

@@ -35,6 +35,7 @@ def make_buffer(alpha: float) -> GBuffer:
         expected_depth=np.ones(shape, np.float32), alpha=np.full(shape, alpha, np.float32),
         normal=np.zeros((*shape, 3), np.float32),
         class_id=np.zeros(shape, np.uint8),
+        object_id=np.zeros(shape, np.uint16),
     )  # fmt: skip
 
 

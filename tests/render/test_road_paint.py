@@ -64,6 +64,21 @@ def test_paint_in_the_shade_is_as_much_darker_as_the_road_there():
     np.testing.assert_allclose(dark / bright, 0.4, rtol=0.02)
 
 
+def test_paint_where_the_light_is_known_has_the_colour_of_the_light_there():
+    """In the shade a white surface is blue: paint keeps its reflectance, and its light can be changed."""
+    daylight = np.array([[1.9, 1.8, 1.6], [0.2, 0.3, 0.5], [0.2, 0.2, 0.2]])
+    flat = road()
+    shares = np.zeros((len(flat), 4), np.float32)
+    shares[:, 0] = flat.means[:, 1] > 0
+    shares[:, 1] = 0.8
+    white = shares[:, :1] * daylight[0] + 0.8 * daylight[1]
+    sh = ((ASPHALT * white - 0.5) / 0.28209479)[:, None].astype(np.float32)
+    lit = replace(flat, sh=sh, light=shares)
+    out = paint_feature(lit, relief_of(HAZARD), MARKING, 3.0, -3.0, ASPHALT, daylight)
+    mark = out.class_id == SemanticClass.MARKING
+    np.testing.assert_allclose(read_colours(out)[mark], np.array(MARKING.paint) * white[mark], rtol=0.05)
+
+
 def test_a_depression_is_a_patch_with_joints_under_the_road_s_own_markings():
     flat = road()
     line = np.abs(flat.means[:, 1] - 1.0) < 0.1

@@ -28,7 +28,7 @@ def detail(street, stations, focal):
 
 
 def test_near_cars_are_fine_in_their_place_and_all_else_is_bitwise_unchanged(street):
-    coarse, fine = street.gaussians, detail(street, (0.0, 6.0), 400.0)
+    coarse, fine = street.gaussians, detail(street, (0.0, 6.0, 12.0), 1200.0)
     check_gaussians(fine)
     other = [np.flatnonzero(cloud.class_id != SemanticClass.VEHICLE) for cloud in (coarse, fine)]
     for name in ("means", "sh", "class_id", "light"):
@@ -41,7 +41,7 @@ def test_near_cars_are_fine_in_their_place_and_all_else_is_bitwise_unchanged(str
 
 
 def test_fine_cars_have_the_light_of_the_coarse_ones(street):
-    fine = detail(street, (0.0, 6.0), 400.0)
+    fine = detail(street, (0.0, 6.0, 12.0), 1200.0)
     means = []
     for cloud in (street.gaussians, fine):
         car = cloud.class_id == SemanticClass.VEHICLE

@@ -47,7 +47,12 @@ def test_a_bend_asks_for_speed_squared_over_its_radius_and_for_nothing_beyond_th
 
 
 def test_the_street_s_grade_is_a_field_of_its_layout():
-    layout = replace(load_street_layout(), grade=0.08)
+    street = load_street_layout()
+    course = replace(
+        street.course, length=(10, 30, 140, 130), curvature=(0, 0, 1 / 450, 1 / 110), grade=(0, 0.08, 0.08, 0.08),
+        transition=(0, 30, 60, 60),
+    )  # fmt: skip
+    layout = replace(street, course=course)
     route = lay_route(layout, integrate_course(layout))
     grade = sample_grade(route)
     assert np.allclose(grade.rise[:2], 0) and grade.rise[-1] == pytest.approx(0.08, abs=1e-9)

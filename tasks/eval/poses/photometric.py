@@ -117,7 +117,7 @@ def recover_motion_photometric(
     depth : float32 [F, H, W] camera z, NaN where there is nothing [m]
     K : float64 [3, 3] intrinsics, pixel centres at whole numbers [px]
     T_rig_camera : float64 [4, 4] camera mount [m]
-    unusable : bool [F, H, W] pixels to leave out, see `tasks.eval.poses.unusable` [1]
+    unusable : bool [F, H, W] pixels to leave out, see `tasks.eval.poses.checks` [1]
     route_rotations : float64 [F, 3, 3] route-to-world rotations of the undisturbed rig, for a route that
         is not level [1]
     settings : thresholds of the check

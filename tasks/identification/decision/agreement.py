@@ -7,7 +7,7 @@ import numpy as np
 from tasks.identification.decision.candidates import Candidate
 from tasks.identification.decision.odds import FEWEST, INFORMED, Explanation, RunGrams
 
-TOLD = 0.5
+LEAST_SIZE = 0.5
 """Square of the smallest size that matters, over its variance by one run, from which the run tells a number [1]."""
 SURE = 3.0
 """Standard errors by which a scatter of the runs is more than noise [1]."""
@@ -55,8 +55,8 @@ def measure_disagreement(grams: RunGrams, explanation: Explanation) -> float:
     matters = np.array(
         [next(c.matters for c in grams.columns.candidates if c.columns == (n,)) for n in numbers]
     )
-    told = size * matters**2 > TOLD
-    square = np.where(told, left**2 / np.maximum(size, 1e-300), 0.0).sum(axis=0)
-    count = told.sum(axis=0)
+    large = size * matters**2 > LEAST_SIZE
+    square = np.where(large, left**2 / np.maximum(size, 1e-300), 0.0).sum(axis=0)
+    count = large.sum(axis=0)
     enough = count > FEWEST
     return float(np.median(square[enough] / count[enough])) if enough.any() else 1.0

@@ -105,7 +105,7 @@ def can_show(effect: Effect, vehicle: Vehicle, channels: Sequence[str]) -> bool:
     return not has_already and (effect.variable != "slip" or sees_slip) and (not pitches or sees_pitch)
 
 
-def tell_limit(effect: Effect, models: Sequence[RunModel], gain: float, rules: DecisionRules) -> bool:
+def determines_limit(effect: Effect, models: Sequence[RunModel], gain: float, rules: DecisionRules) -> bool:
     """Return whether runs tell the tyres' limit, if an effect is a number of that: one of its weather must reach it.
 
     Parameters
@@ -122,7 +122,7 @@ def tell_limit(effect: Effect, models: Sequence[RunModel], gain: float, rules: D
     return any(saturates_tyres(model, rules) or reaches_limit(model, gain, rules) for model in own)
 
 
-def tell_curve(effect: Effect, models: Sequence[RunModel]) -> bool:
+def determines_curve(effect: Effect, models: Sequence[RunModel]) -> bool:
     """Return whether runs tell the curve of the brake, if an effect is one: one stop shows a gain and a delay alone.
 
     Parameters

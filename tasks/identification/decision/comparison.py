@@ -19,7 +19,7 @@ def compare_explanations(
     """Return the logarithm of the odds of one explanation against another [1].
 
     What the runs disagree about on the line from one to the other counts as a random effect there: two explanations
-    that half of the runs decide either way are not told apart, however much each run gains. The run that speaks most
+    that half of the runs decide either way are not distinguished, however much each run gains. The run that speaks most
     for the better one does not count. No model has the signature of an effect exactly as the car does; what its
     relative error leaves over is no evidence (model discrepancy, Kennedy and O'Hagan 2001,
     doi:10.1111/1467-9868.00294).

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tasks.campaign.channels import say_brake
+from tasks.campaign.channels import describe_brake
 from tasks.campaign.planned_runs import make_planned_run, plan_experiments
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.derivatives import differentiate_run
@@ -58,7 +58,7 @@ def plan_next_experiment(
     planned = []
     brake_gain = vehicle.brake_gain * (1.0 + theta[PARAMETER_INDEX["pressure_gain"]])
     for plan, drive in plan_experiments(brake_gain / (vehicle.wheel_radius * vehicle.mass)):
-        plan += f", {say_brake(abs(drive.peak), brake_signal)}" if drive.peak else ""
+        plan += f", {describe_brake(abs(drive.peak), brake_signal)}" if drive.peak else ""
         run = make_planned_run(drive, plan, interval=evidence.train[0].model.run.interval)
         if (sampled := evidence.train[0].model.sampled) is not None:
             run = replace(run, sampled=np.resize(sampled, run.response.shape))

@@ -23,8 +23,8 @@ from tasks.identification.decision.odds import (
     keep_members,
     weigh_explanation,
 )
+from tasks.identification.decision.open_explanations import OpenExplanation
 from tasks.identification.decision.search import Finding, make_hypotheses, widen_session
-from tasks.identification.decision.told import OpenExplanation
 from tasks.identification.inference.fit import SETTLED, Fit, fit_hypotheses
 from tasks.identification.inference.forward import predict_channels
 from tasks.identification.inference.hypothesis import Hypothesis, compose_parameters
@@ -51,7 +51,7 @@ def fit_told(finding: Finding, opened: OpenExplanation) -> Fit:
     finding : the runs and what was fitted to them
     opened : the explanation
     """
-    kept = keep_members(opened.explanation, opened.told)
+    kept = keep_members(opened.explanation, opened.named)
     evidence, parts = finding.evidence, make_hypotheses(kept, finding.evidence, finding.fitted)
     sigma = widen_session(kept, evidence.session_sigma)
 
@@ -64,7 +64,7 @@ def fit_told(finding: Finding, opened: OpenExplanation) -> Fit:
     trials = [parts]
     for i, part in enumerate(parts):
         if part.effect_class == "form":
-            member = next(m for m in opened.told if m.name == part.name)
+            member = next(m for m in opened.named if m.name == part.name)
             places = kept.find_places(member)
             grid = np.linspace(*ranges[part.variable], KNOTS)
             shapes = make_form_hypotheses(
@@ -79,13 +79,13 @@ def settle_told(
 ) -> tuple[list[OpenExplanation], Fit]:
     """Return the open explanations and the fit of the first, whose members are surely large when fitted alone too.
 
-    Nothing is told whose interval holds 0, the file's value: of an effect its first number's, of a form every one. A
+    Nothing is named whose interval holds 0, the file's value: of an effect its first number's, of a form every one. A
     number of the file that this fit pulls far beyond its tolerance stays open beside it.
 
     Parameters
     ----------
     finding : the runs and what was fitted to them
-    opened : the explanations that are open, the first being the one that is told
+    opened : the explanations that are open, the first being the one that is named
     rules : the odds of a name
     """
     first, *others = opened
@@ -93,11 +93,11 @@ def settle_told(
     share = estimate_signature_share(finding, first, rules)
     while True:
         fitted = fit_told(finding, first)
-        if not first.told and knows_brakes(fitted, rules):
+        if not first.named and knows_brakes(fitted, rules):
             return [first], fitted  # there is nothing whose size a closer fit would tell
         fitted = refine_fit(finding, fitted)
         large = []
-        for member in first.told:
+        for member in first.named:
             _, numbers = _list_parameters(member, first.explanation, fitted, share)
             if member.effect is not None:
                 value, error, _ = _find_first_number(member, member.effect, first.explanation, fitted)
@@ -106,9 +106,9 @@ def settle_told(
                 numbers = numbers[:1]
             if not all(number.ci_low <= 0.0 <= number.ci_high for number in numbers):
                 large.append(member)
-        if len(large) == len(first.told):
+        if len(large) == len(first.named):
             break
-        first = replace(first, told=tuple(large))
+        first = replace(first, named=tuple(large))
     others = [other for other in others if not other.numbers >= first.numbers]
     varying = _find_varying(finding, first)
     if varying is not None:
@@ -122,21 +122,21 @@ def settle_told(
 
 
 def _find_varying(finding: Finding, first: OpenExplanation) -> OpenExplanation | None:
-    """Return what is told with the best form in place of a level; None where no level is told.
+    """Return what is named with the best form in place of a level; None where no level is named.
 
     Derivatives about the fit of one value undervalue what varies at its port: a run's own friction decides when its
     tyres let go.
     """
     grams = finding.grams
     varying = [
-        weigh_explanation(grams, [*(m for m in first.told if m is not level), form], spread=False)
-        for level in first.told
+        weigh_explanation(grams, [*(m for m in first.named if m is not level), form], spread=False)
+        for level in first.named
         if level.name in LEVELS
         for form in grams.columns.candidates
         if form.effect is None and can_stand_for(form, level)
     ]
     found = max((e for e in varying if e), key=lambda e: compute_likelihood(grams, e), default=None)
-    return None if found is None else OpenExplanation(explanation=found, told=found.members, log_odds=0.0)
+    return None if found is None else OpenExplanation(explanation=found, named=found.members, log_odds=0.0)
 
 
 def _compare_fits(
@@ -145,7 +145,7 @@ def _compare_fits(
     finding: Finding,
     rules: DecisionRules,
 ) -> float:
-    """Return the logarithm of the odds of one told fit against another, each about its own values [1].
+    """Return the logarithm of the odds of one named fit against another, each about its own values [1].
 
     Every number costs what a run tells of it (Schwarz 1978, doi:10.1214/aos/1176344136).
     """
@@ -153,30 +153,32 @@ def _compare_fits(
     for fitted, opened in (one, other):
         gains.append(0.5 * (finding.null.objective - fitted.objective))
         numbers = len(fitted.values) + sum(n in SESSION for n in opened.numbers)
-        odds.append(gains[-1] + sum(m.log_prior for m in opened.told) - 0.5 * numbers * log(runs))
+        odds.append(gains[-1] + sum(m.log_prior for m in opened.named) - 0.5 * numbers * log(runs))
     return temper_odds(odds[0] - odds[1], max(gains), 0.0, rules.signature_error)
 
 
 def _list_strained(
     finding: Finding, first: OpenExplanation, fitted: Fit, rules: DecisionRules
 ) -> list[OpenExplanation]:
-    """Return explanations with a number of the file besides, of those that what is told pulls far beyond its tolerance.
+    """Return explanations with a number of the file besides, where what is named pulls it far from its value.
 
     Data that contradict a prior (Box 1980, doi:10.2307/2982063) leave open that the number itself is another.
     """
-    told, grams = first.explanation.members, finding.grams
+    members, grams = first.explanation.members, finding.grams
     strained = []
-    for candidate in grams.columns.candidates if first.told else ():
+    for candidate in grams.columns.candidates if first.named else ():
         number = candidate.effect.parameters[0].name if candidate.effect else ""
         if number not in SESSION or fitted.pulls[SESSION.index(number)] <= rules.foreign_misfit:
             continue
-        explanation = weigh_explanation(grams, [*told, candidate]) if candidate not in told else None
+        if any(member.effect is None and can_stand_for(member, candidate) for member in first.named):
+            continue  # a form at its port holds it
+        explanation = weigh_explanation(grams, [*members, candidate]) if candidate not in members else None
         if explanation is not None:
             odds = min(
                 compare_explanations(grams, explanation, first.explanation, rules.signature_error),
                 log(rules.named_odds),
             )
-            more = OpenExplanation(explanation=explanation, told=(*first.told, candidate), log_odds=odds)
+            more = OpenExplanation(explanation=explanation, named=(*first.named, candidate), log_odds=odds)
             strained.append(more)
     return strained
 
@@ -231,7 +233,7 @@ def estimate_signature_share(finding: Finding, opened: OpenExplanation, rules: D
     Parameters
     ----------
     finding : what the runs say
-    opened : the explanation that is told
+    opened : the explanation that is named
     rules : the error of a signature
     """
     excess = measure_disagreement(finding.grams, opened.explanation) - 1.0
@@ -251,7 +253,7 @@ def name_members(
     share : `estimate_signature_share` [1]
     """
     named = []
-    for member in opened.told:
+    for member in opened.named:
         rest = [m for m in opened.explanation.members if m is not member]
         without = weigh_explanation(grams, rest)
         score = opened.explanation.log_odds - (0.0 if without is None else without.log_odds)
@@ -300,11 +302,11 @@ def list_calibrated(
     """
     if knows_brakes(fitted, rules):
         return []
-    told = {effect.parameters[0].name for effect in named}
+    taken = {effect.parameters[0].name for effect in named}
     numbers = {e.parameters[0].name: e for e in library if e.effect_class == "retune"}
     calibrated = []
     for name, value, error in zip(FILE_NUMBERS, fitted.session, fitted.session_error, strict=True):
-        if name in numbers and name not in told and abs(value) > NORMAL_QUANTILE * error:
+        if name in numbers and name not in taken and abs(value) > NORMAL_QUANTILE * error:
             row = numbers[name].parameters[0]
             estimate = _make_parameter(name, value, error, row.lower, row.upper, row.unit)
             calibrated.append(make_estimate(numbers[name], estimate, float(error)))

@@ -11,9 +11,9 @@ from tasks.identification.decision.candidates import (
     Candidate,
     Columns,
     can_show,
+    determines_curve,
+    determines_limit,
     list_columns,
-    tell_curve,
-    tell_limit,
 )
 from tasks.identification.decision.comparison import compare_explanations
 from tasks.identification.decision.forms import (
@@ -31,7 +31,7 @@ from tasks.identification.decision.odds import (
     keep_members,
     search_explanations,
 )
-from tasks.identification.decision.told import tell_members
+from tasks.identification.decision.open_explanations import select_members
 from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.discrepancy import estimate_run_noise, set_run_noise
 from tasks.identification.inference.fit import Fit, fit_hypotheses
@@ -131,8 +131,8 @@ def find_explanations(
         for effect in library
         if can_show(effect, vehicle, campaign.channels)
         and not (effect.parameters[0].name == GRIP and is_grip_free(campaign))
-        and tell_limit(effect, models, gain, rules)
-        and tell_curve(effect, models)
+        and determines_limit(effect, models, gain, rules)
+        and determines_curve(effect, models)
     ]
     retuned = [effect for effect in shown if effect.parameters[0].name in SESSION]
     numbers = tuple(effect for effect in shown if effect.parameters[0].name not in SESSION)
@@ -147,7 +147,7 @@ def find_explanations(
     first = _refine_first(singles, place, null, rules)
     if first is not None:
         place = _settle_scales(_move_to(first, place, null))
-    # the shape of a form is not told by a run or two
+    # the shape of a form does not follow from a run or two
     for forms in (False, True) if len(models) >= FEWEST else (False,):
         place, grams, found = _settle_explanation(place, null, columns, rules, forms=forms)
     return Finding(
@@ -195,13 +195,15 @@ def _settle_explanation(
         if place.refuted and here is not None:
             # far from a fit without its effect, derivatives about that fit promise what no simulation keeps
             found = [e for e in found if e.log_odds <= here.log_odds or not _leaves_out(e, here)]
-        told = keep_members(found[0], tell_members(grams, found[0], rules))
-        if turn == rules.most_turns - 1 or _is_fitted(told, place.fitted):
+        named = keep_members(found[0], select_members(grams, found[0], rules))
+        if turn == rules.most_turns - 1 or _is_fitted(named, place.fitted):
             break
         if forms and here is not None and not _is_worth_it(found[0], here, grams, rules):
             break
-        moved = _move_to(told, place, null)
-        lost = _compute_cost(moved.fitted, told) - _compute_cost(place.fitted, told if here is None else here)
+        moved = _move_to(named, place, null)
+        lost = _compute_cost(moved.fitted, named) - _compute_cost(
+            place.fitted, named if here is None else here
+        )
         refuted = here is not None and lost > REFUTED * here.gain + log(rules.named_odds)
         place = replace(place, refuted=True) if refuted else moved
     return place, grams, found

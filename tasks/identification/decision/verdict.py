@@ -1,7 +1,7 @@
 """The verdict: what the training runs tell, in odds, and what that does to runs that no fit and no choice has read."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,7 @@ from tasks.identification.decision.comparison import find_odds
 from tasks.identification.decision.correlation import correlate_residual_with_pressure
 from tasks.identification.decision.experiment import Experiment, plan_next_experiment
 from tasks.identification.decision.held_out import compute_held_out_errors
-from tasks.identification.decision.log_faults import tell_inputs, tell_log_faults
-from tasks.identification.decision.missed import tell_miss
+from tasks.identification.decision.log_faults import describe_inputs, describe_log_faults
 from tasks.identification.decision.naming import (
     estimate_signature_share,
     find_detectable_sizes,
@@ -23,14 +22,18 @@ from tasks.identification.decision.naming import (
     name_members,
     settle_told,
 )
+from tasks.identification.decision.open_explanations import (
+    OpenExplanation,
+    list_open_explanations,
+    select_members,
+)
 from tasks.identification.decision.search import Finding, find_explanations
-from tasks.identification.decision.told import OpenExplanation, list_open_explanations, tell_members
 from tasks.identification.decision.words import (
-    say_foreign,
-    say_not_named,
-    tell_driven,
-    tell_open_explanations,
-    tell_present_effects,
+    describe_driven,
+    describe_foreign,
+    describe_open_explanations,
+    describe_present_effects,
+    describe_unnamed,
 )
 from tasks.identification.inference.driver import leave_out_driving
 from tasks.identification.inference.fit import Fit
@@ -54,8 +57,8 @@ class Outcome:
     ----------
     verdict : the answer
     finding : the runs, and what they say about every explanation
-    opened : the explanations that they leave open, the first being the one that is told
-    fitted : fit of what is told
+    opened : the explanations that they leave open, the first being the one that is named
+    fitted : fit of what is named
     calibrated : numbers that the file hardly knew and that are no discovery
     """
 
@@ -66,7 +69,7 @@ class Outcome:
     calibrated: tuple[NamedEffect, ...] = ()
 
     def predict_readings(self, runs: Sequence[RunModel]) -> list[NDArray[np.float64]]:
-        """Return what the model predicts with what is told, float64 [N, 7] a run.
+        """Return what the model predicts with what is named, float64 [N, 7] a run.
 
         Parameters
         ----------
@@ -98,10 +101,10 @@ def judge_runs(
     finding = find_explanations(runs, vehicle, surface, library, rules)
     opened = list_open_explanations(finding.grams, finding.explanations, rules)
     disagreement = measure_disagreement(finding.grams, opened[0].explanation)
-    foreign = bool(opened[0].told) and disagreement > rules.foreign_disagreement
+    foreign = bool(opened[0].named) and disagreement > rules.foreign_disagreement
     if foreign:
         nothing = next(e for e in finding.explanations if not e.members)
-        opened = [OpenExplanation(explanation=nothing, told=(), log_odds=0.0)]
+        opened = [OpenExplanation(explanation=nothing, named=(), log_odds=0.0)]
     opened, fitted = settle_told(finding, opened, rules)
     first, *others = opened
     evidence = finding.evidence
@@ -109,16 +112,18 @@ def judge_runs(
     named = name_members(first, finding.grams, fitted, share)
     rivals = _list_rivals(first, others, finding, share)
     tried = _list_tried(finding, first)
-    reasons = tell_open_explanations(opened, finding.explanations, rules)
-    why = say_foreign(disagreement, rules) if foreign else ""
+    reasons = describe_open_explanations(opened, finding.explanations, rules)
+    why = describe_foreign(disagreement, rules) if foreign else ""
     if foreign:
         reasons.append(why)
     elif not named:
-        reasons += say_not_named(tried, finding.best, tell_members(finding.grams, finding.best, rules), rules)
-    reasons += tell_inputs(campaign, evidence.train)
-    reasons += [tell_driven(drive)] if drive else []
-    reasons += tell_log_faults(campaign, named, [rival.name for _, rival in rivals])
-    reasons += tell_present_effects(vehicle)
+        reasons += describe_unnamed(
+            tried, finding.best, select_members(finding.grams, finding.best, rules), rules
+        )
+    reasons += describe_inputs(campaign, evidence.train)
+    reasons += [describe_driven(drive)] if drive else []
+    reasons += describe_log_faults(campaign, named, [rival.name for _, rival in rivals])
+    reasons += describe_present_effects(vehicle)
     error, manoeuvres = compute_held_out_errors(finding, fitted, rules)
     theta, slots = compose_parameters(fitted.parts, fitted.values, np.zeros(len(FILE_NUMBERS)))
     pulls = zip(
@@ -155,7 +160,7 @@ def judge_runs(
         reasons=tuple(reasons),
         disagreement=why,
     )
-    verdict = tell_miss(verdict, rules.foreign_misfit)
+    verdict = report_miss(verdict, rules.foreign_misfit)
     calibrated = list_calibrated(fitted, named, library, rules)
     return Outcome(
         verdict=verdict, finding=finding, opened=tuple(opened), fitted=fitted, calibrated=tuple(calibrated)
@@ -168,7 +173,7 @@ def _list_rivals(
     """Return what the other explanations name instead, each with what it stands in for."""
     rivals: dict[str, tuple[str, NamedEffect]] = {}
     for other in others:
-        replaced = [m.name for m in first.told if m.name not in other.names] or ["nothing"]
+        replaced = [m.name for m in first.named if m.name not in other.names] or ["nothing"]
         for effect in name_members(other, finding.grams, None, share):
             if effect.name not in first.names:
                 rivals.setdefault(effect.name, (replaced[0], effect))
@@ -176,16 +181,16 @@ def _list_rivals(
 
 
 def _list_tried(finding: Finding, first: OpenExplanation) -> list[NamedEffect]:
-    """Return the best candidates beside what is told that are not told themselves."""
+    """Return the best candidates beside what is named that are not named themselves."""
     tried: dict[str, NamedEffect] = {}
     for explanation in finding.explanations:
         further = [m for m in explanation.members if m.name not in first.names]
         if (
             len(further) == 1
             and further[0].name not in tried
-            and len(explanation.members) == 1 + len(first.told)
+            and len(explanation.members) == 1 + len(first.named)
         ):
-            shown = OpenExplanation(explanation=explanation, told=tuple(further), log_odds=0.0)
+            shown = OpenExplanation(explanation=explanation, named=tuple(further), log_odds=0.0)
             tried |= {effect.name: effect for effect in name_members(shown, finding.grams, None)}
         if len(tried) == MOST_TRIED:
             break
@@ -205,13 +210,13 @@ def _plan(
         first, other = (explanation.names for explanation in opened[:2])
         between = tuple(" and ".join(sorted(own)) or "nothing" for own in (first - other, other - first))
         pair = (fitted, fit_told(finding, opened[1]))
-    elif opened[0].told:
+    elif opened[0].named:
         return None
     else:
         suggested = _find_suggested(finding)
         if suggested is None:
             return None
-        between = (suggested.told[0].name, "the model as it stands")
+        between = (suggested.named[0].name, "the model as it stands")
         pair = (fit_told(finding, suggested), finding.null)
     return plan_next_experiment(
         finding.evidence, *pair, (between[0], between[1]), vehicle, surface, brake_signal
@@ -219,8 +224,33 @@ def _plan(
 
 
 def _find_suggested(finding: Finding) -> OpenExplanation | None:
-    """Return the best explanation of one member, where it gains something though it is not told."""
+    """Return the best explanation of one member, where it gains something though it is not named."""
     for explanation in finding.explanations:
         if len(explanation.members) == 1 and explanation.log_odds > 0.0:
-            return OpenExplanation(explanation=explanation, told=explanation.members, log_odds=0.0)
+            return OpenExplanation(explanation=explanation, named=explanation.members, log_odds=0.0)
     return None
+
+
+def report_miss(verdict: Verdict, limit: float) -> Verdict:
+    """Return a verdict that says by how much the speed of held-out runs is missed, where that is more than noise.
+
+    Parameters
+    ----------
+    verdict : the answer
+    limit : error over noise from which a run is missed [1]
+    """
+    error, (_, noise) = verdict.error["speed"].after, verdict.noise["speed"]
+    # a disagreement says that nothing could be named, and not that what is named is not all
+    if error <= limit * noise or (verdict.disagreement and not verdict.effects):
+        return verdict
+    missed = (
+        f"the speed of the held-out runs is missed by {error:.3g} m/s, {error / noise:.3g} times its noise (at most"
+        f" {limit:g})"
+    )
+    if not verdict.effects:
+        return replace(verdict, misses=True, disagreement=missed, reasons=(missed, *verdict.reasons))
+    return replace(
+        verdict,
+        misses=True,
+        reasons=(*verdict.reasons, f"{missed}: what is named is not all that the model lacks"),
+    )

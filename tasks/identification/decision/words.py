@@ -8,10 +8,10 @@ from tasks.identification.decision.candidates import Candidate
 from tasks.identification.decision.comparison import find_odds
 from tasks.identification.decision.held_out import is_lowered
 from tasks.identification.decision.odds import ALONG_ROAD, PORT_OF_NUMBER, Explanation
-from tasks.identification.decision.told import OpenExplanation
+from tasks.identification.decision.open_explanations import OpenExplanation
 from tasks.identification.inference.hypothesis import moves_speed
 from tasks.identification.rules import DecisionRules
-from tasks.vehicle.effects.library import Effect, say_interval, say_number
+from tasks.vehicle.effects.library import Effect, format_interval, format_number
 from tasks.vehicle.parameters import Vehicle
 
 MOST_WORDS = 30
@@ -26,7 +26,7 @@ SAID_OF_PORTS = {
 """What is said of effects that act at the same ports."""
 
 
-def say_effect(effect: NamedEffect, library: Sequence[Effect]) -> str:
+def describe_effect(effect: NamedEffect, library: Sequence[Effect]) -> str:
     """Return what a named effect says of the car, with the intervals of its numbers.
 
     Parameters
@@ -44,7 +44,7 @@ def say_effect(effect: NamedEffect, library: Sequence[Effect]) -> str:
     return f"the {port} depends on {variable} in a way that no effect of the library has"
 
 
-def tell_verdict(
+def describe_verdict(
     verdict: Verdict,
     library: Sequence[Effect],
     suggested: NamedEffect | None = None,
@@ -72,18 +72,18 @@ def tell_verdict(
         if suggested is not None:
             nothing = (
                 "These runs prove nothing that the model lacks. They suggest that"
-                f" {say_effect(suggested, library)}, at odds that are too small for a name"
+                f" {describe_effect(suggested, library)}, at odds that are too small for a name"
             )
         if not own or not is_lowered(error["speed"]) or not _is_told_apart(error["speed"]):
             return f"{nothing}."
         return (
             f"{nothing}. Its own numbers, fitted to these runs ({own}), take the error"
-            f" {_say_errors({'speed': error['speed'], **manoeuvres})}, on runs to which no number was fitted."
+            f" {_describe_errors({'speed': error['speed'], **manoeuvres})}, on runs to which no number was fitted."
         )
     text = (
-        _tell_open(verdict, library, force)
+        _describe_open(verdict, library, force)
         if verdict.rivals
-        else _tell_in_sentences([say_effect(effect, library) for effect in effects])
+        else _join_sentences([describe_effect(effect, library) for effect in effects])
     )
     figures = {"speed": error["speed"], **manoeuvres}
     if not any(moves_speed(effect.effect_class, effect.variable) for effect in effects):
@@ -97,7 +97,7 @@ def tell_verdict(
         figures = {worth: error[worth]} | figures
     rest = " The speed is still missed by more than its noise: more is lacking than that." if misses else ""
     beside = f"With the vehicle's own numbers fitted too ({own}), that " if own else "That "
-    done = f"{beside}{_say_change(figures)}, on runs to which no number was fitted."
+    done = f"{beside}{_describe_change(figures)}, on runs to which no number was fitted."
     return f"{text} {done}{rest}"
 
 
@@ -117,29 +117,29 @@ def _find_name(effect: NamedEffect) -> str:
     return f"form {effect.port}({effect.variable})" if effect.effect_class == "form" else effect.name
 
 
-def _tell_open(verdict: Verdict, library: Sequence[Effect], force: float) -> str:
+def _describe_open(verdict: Verdict, library: Sequence[Effect], force: float) -> str:
     """Return sentences on a set: what all its explanations share, then each of them with its odds."""
     effects, rivals, opened = verdict.effects, [rival for _, rival in verdict.rivals], verdict.odds
     left = list_unshared(effects, opened)
-    shared = [say_effect(effect, library) for effect in effects if effect not in left]
+    shared = [describe_effect(effect, library) for effect in effects if effect not in left]
     known = {_find_name(effect): effect for effect in (*rivals, *effects)}
-    told = [[known[name] for name in other.names] for other in opened]
+    named = [[known[name] for name in other.names] for other in opened]
     # a form of another shape at the same port reads the same
     said: dict[str, float] = {}
-    for own, other in zip(told, opened, strict=True):
+    for own, other in zip(named, opened, strict=True):
         rest = [effect for effect in own if effect not in effects or effect in left]
-        phrase = join_phrases(say_effect(effect, library) for effect in rest) if rest else "nothing more"
+        phrase = join_phrases(describe_effect(effect, library) for effect in rest) if rest else "nothing more"
         said.setdefault(phrase, other.odds)
     if len(said) < 2:
-        return _tell_in_sentences([say_effect(effect, library) for effect in effects])
-    common = _say_common([e for own in told for e in own if e not in effects or e in left], left, force)
+        return _join_sentences([describe_effect(effect, library) for effect in effects])
+    common = _describe_common([e for own in named for e in own if e not in effects or e in left], left, force)
     nothing = f"These runs show something that the model lacks, and leave {len(said)} explanations open."
-    first = _tell_in_sentences([*shared, *common]) or nothing
-    listed = "; or ".join(f"{phrase} ({say_number(odds)} : 1)" for phrase, odds in said.items())
+    first = _join_sentences([*shared, *common]) or nothing
+    listed = "; or ".join(f"{phrase} ({format_number(odds)} : 1)" for phrase, odds in said.items())
     return f"{first} They cannot tell apart: {listed}."
 
 
-def _say_common(rest: Sequence[NamedEffect], left: Sequence[NamedEffect], force: float) -> list[str]:
+def _describe_common(rest: Sequence[NamedEffect], left: Sequence[NamedEffect], force: float) -> list[str]:
     """Return what effects that stand in for one another have in common, as at most one phrase."""
     ports = {PORT_OF_NUMBER.get(effect.name, effect.port) for effect in rest}
     if ports == {"brake_torque"} and {effect.variable for effect in rest} <= LATE:
@@ -151,13 +151,13 @@ def _say_common(rest: Sequence[NamedEffect], left: Sequence[NamedEffect], force:
             number = left[0].parameters[0]
             ends = sorted(abs(force) * end / number.value for end in (number.ci_low, number.ci_high))
             interval = (ends[0], ends[1])
-        return [f"a further {say_interval(abs(force), interval)} m/s2 on average {way}, whatever its law"]
+        return [f"a further {format_interval(abs(force), interval)} m/s2 on average {way}, whatever its law"]
     return [
         f"{phrase}, whatever the law" for group, phrase in SAID_OF_PORTS.items() if ports and ports <= group
     ]
 
 
-def _tell_in_sentences(phrases: Sequence[str]) -> str:
+def _join_sentences(phrases: Sequence[str]) -> str:
     """Return phrases as one sentence, or as two where one would be too long; none is no sentence."""
     first = list(phrases)
     while len(first) > 1 and len(join_phrases(first).split()) > MOST_WORDS:
@@ -169,44 +169,46 @@ def _tell_in_sentences(phrases: Sequence[str]) -> str:
 
 def _is_told_apart(error: ChannelError) -> bool:
     """Whether a sentence says another number after than before."""
-    return say_number(error.frozen) != say_number(error.after)
+    return format_number(error.frozen) != format_number(error.after)
 
 
-def _say_errors(figures: Mapping[str, ChannelError], *, retuned: bool = False) -> str:
+def _describe_errors(figures: Mapping[str, ChannelError], *, retuned: bool = False) -> str:
     """Return from what to what errors go, and with ``retuned`` to what the vehicle's own numbers alone take them."""
     return join_phrases(
-        f"of the {name.replace('_', ' ')} from {say_number(e.frozen)}"
-        f"{f' (re-tuned {say_number(e.retuned)})' if retuned else ''} to {say_number(e.after)} {e.unit}"
+        f"of the {name.replace('_', ' ')} from {format_number(e.frozen)}"
+        f"{f' (re-tuned {format_number(e.retuned)})' if retuned else ''} to {format_number(e.after)} {e.unit}"
         for name, e in figures.items()
     )
 
 
-def _say_change(figures: Mapping[str, ChannelError]) -> str:
+def _describe_change(figures: Mapping[str, ChannelError]) -> str:
     """Return which errors fall and which grow: "lowers the error of the speed from 1 to 0.1 m/s"."""
     lower = {name: e for name, e in figures.items() if e.after <= e.frozen}
     higher = {name: e for name, e in figures.items() if e.after > e.frozen}
-    phrases = [f"lowers the error {_say_errors(lower, retuned=True)}"] if lower else []
+    phrases = [f"lowers the error {_describe_errors(lower, retuned=True)}"] if lower else []
     phrases += (
-        [f"raises {'that' if lower else 'the error'} {_say_errors(higher, retuned=True)}"] if higher else []
+        [f"raises {'that' if lower else 'the error'} {_describe_errors(higher, retuned=True)}"]
+        if higher
+        else []
     )
     return join_phrases(phrases)
 
 
-def tell_open_explanations(
+def describe_open_explanations(
     opened: Sequence[OpenExplanation], explanations: Sequence[Explanation], rules: DecisionRules
 ) -> list[str]:
     """Return a sentence on the explanations that the runs leave open, with their odds.
 
     Parameters
     ----------
-    opened : the first being the one that is told
+    opened : the first being the one that is named
     explanations : all that were weighed, the best first
     rules : the odds of a name
     """
     if len(opened) < 2:
         return []
     listed = [
-        f"{join_phrases(sorted(o.names)) if o.names else 'nothing'} ({say_number(find_odds(o.log_odds))} : 1)"
+        f"{join_phrases(sorted(o.names)) if o.names else 'nothing'} ({format_number(find_odds(o.log_odds))} : 1)"
         for o in opened[1:]
     ]
     first = join_phrases(sorted(opened[0].names)) if opened[0].names else "nothing"
@@ -216,7 +218,7 @@ def tell_open_explanations(
     ]
 
 
-def say_foreign(disagreement: float, rules: DecisionRules) -> str:
+def describe_foreign(disagreement: float, rules: DecisionRules) -> str:
     """Return that the runs disagree with the model whatever is named: the car's equations are not the model's.
 
     Parameters
@@ -230,8 +232,8 @@ def say_foreign(disagreement: float, rules: DecisionRules) -> str:
     )
 
 
-def say_not_named(
-    tried: Sequence[NamedEffect], best: Explanation, told: Sequence[Candidate], rules: DecisionRules
+def describe_unnamed(
+    tried: Sequence[NamedEffect], best: Explanation, named: Sequence[Candidate], rules: DecisionRules
 ) -> list[str]:
     """Return why nothing is named: the best candidate's odds, or that it is smaller than what matters.
 
@@ -239,10 +241,10 @@ def say_not_named(
     ----------
     tried : candidates that are not named, the best first
     best : the explanation with the largest odds
-    told : its members that are large enough to be told
+    named : its members that are large enough to be named
     rules : the odds of a name
     """
-    small = [member.name for member in best.members if member not in told]
+    small = [member.name for member in best.members if member not in named]
     if small and best.log_odds > log(rules.named_odds):
         return [
             f"the runs show {join_phrases(small)}, smaller than what matters, or not surely larger: not named"
@@ -251,12 +253,12 @@ def say_not_named(
         return ["no effect of the library explains anything of what the model leaves over"]
     odds = find_odds(tried[0].score)
     return [
-        f"the best candidate, {tried[0].name}, has odds of {say_number(odds)} : 1 against nothing; a name needs"
+        f"the best candidate, {tried[0].name}, has odds of {format_number(odds)} : 1 against nothing; a name needs"
         f" {rules.named_odds:g} : 1"
     ]
 
 
-def tell_driven(drive: float) -> str:
+def describe_driven(drive: float) -> str:
     """Return the sentence on runs that begin at their brake.
 
     Parameters
@@ -269,7 +271,7 @@ def tell_driven(drive: float) -> str:
     )
 
 
-def tell_present_effects(vehicle: Vehicle) -> list[str]:
+def describe_present_effects(vehicle: Vehicle) -> list[str]:
     """Return a sentence where a vehicle has effects or forms already, on top of which others are named.
 
     Parameters

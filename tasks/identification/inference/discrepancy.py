@@ -23,7 +23,7 @@ from tasks.identification.inference.noise import (
 )
 
 MOST_CORRELATION = 0.98
-"""Correlation from sample to sample beyond which more is not told apart: 99 samples then count as one [1]."""
+"""Correlation from sample to sample beyond which more is not distinguished: 99 samples then count as one [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)

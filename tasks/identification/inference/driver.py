@@ -1,7 +1,7 @@
 """What drove the car before the brake, where no engine torque was logged: that part of a run is left out.
 
 With a throttle in the log a run begins where it closes. Without one a driver who holds his speed until he brakes is
-told by that speed. Taken for coasting, it hides a resistance, or makes it fit the stop alone.
+known by that speed. Taken for coasting, it hides a resistance, or makes it fit the stop alone.
 """
 
 from collections.abc import Callable, Sequence

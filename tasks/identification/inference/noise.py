@@ -114,13 +114,13 @@ def _compute_variogram(stretches: list[Stretch]) -> NDArray[np.float64]:
 
     NaN at lags for which there are too few samples.
     """
-    told = np.zeros((len(LAGS), len(CHANNELS)), dtype=bool)
+    measured = np.zeros((len(LAGS), len(CHANNELS)), dtype=bool)
     for stretch in stretches:
-        told[:, stretch.channels] |= (stretch.quiet > 3 * np.array(LAGS))[:, np.newaxis]
+        measured[:, stretch.channels] |= (stretch.quiet > 3 * np.array(LAGS))[:, np.newaxis]
     sums, counts = np.zeros((len(LAGS), len(CHANNELS))), np.zeros((len(LAGS), len(CHANNELS)))
     for stretch in stretches:
         # a receiver of 10 Hz has a dozen samples before the brake: fewer lags of what is quiet, and no braking
-        enough = np.count_nonzero(told[:, stretch.channels], axis=0) >= FEWEST_LAGS
+        enough = np.count_nonzero(measured[:, stretch.channels], axis=0) >= FEWEST_LAGS
         for taken, end in ((enough, stretch.quiet), (~enough, len(stretch.values))):
             channels, values = stretch.channels[taken], stretch.values[:end].compress(taken, axis=1)
             for i, lag in enumerate(LAGS):
@@ -259,7 +259,7 @@ def correlate_with_next(x: NDArray[np.float64], most: float) -> float:
     Parameters
     ----------
     x : float64 [N] of mean 0
-    most : beyond which more is not told apart
+    most : beyond which more is not distinguished
     """
     power = float(x @ x)
     return min(max(float(x[1:] @ x[:-1]) / power, 0.0), most) if power > 0.0 else 0.0

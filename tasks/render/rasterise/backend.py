@@ -1,5 +1,6 @@
 """Choice of the rasteriser: this project's on the CPU, or gsplat where its picture on a GPU agrees with the CPU's."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, Protocol, get_args
@@ -11,6 +12,8 @@ from tasks.conventions import SemanticClass
 from tasks.errors import InputError
 from tasks.render.rasterise import rasteriser
 from tasks.render.rasterise.gbuffer import GBuffer
+from tasks.render.rasterise.placed_body import PlacedBody, Shade
+from tasks.render.rasterise.preparation import recolour_prepared
 from tasks.scene.gaussians import Gaussians
 
 BackendName = Literal["auto", "cpu", "gsplat"]
@@ -33,6 +36,9 @@ class Backend(Protocol):
     def prepare_gaussians(self, gaussians: Gaussians) -> Any:
         """Pack a cloud the way this backend draws it; see `tasks.render.rasterise.rasteriser.prepare_gaussians`."""
 
+    def recolour(self, prepared: Any, sh: NDArray[np.float32]) -> Any:
+        """Return a prepared cloud with other colours, float32 [N, K, 3] in the order of the cloud."""
+
     def rasterise_view(
         self,
         prepared: Any,
@@ -41,6 +47,8 @@ class Backend(Protocol):
         width: int,
         height: int,
         normals: bool = True,
+        bodies: Sequence[PlacedBody] = (),
+        shade: Shade | None = None,
     ) -> GBuffer:
         """Draw one view; see `tasks.render.rasterise.rasteriser.rasterise_view`; normals may be there unasked."""
 
@@ -50,6 +58,7 @@ class CpuBackend:
 
     name = "cpu"
     prepare_gaussians = staticmethod(rasteriser.prepare_gaussians)
+    recolour = staticmethod(recolour_prepared)
     rasterise_view = staticmethod(rasteriser.rasterise_view)
 
 

@@ -10,6 +10,7 @@ from tasks.render.rasterise.binning import TILE_HEIGHT, TILE_WIDTH
 from tasks.render.rasterise.projection import (
     BLUE,
     CLASS,
+    CODES,
     COLUMN_FALLOFF,
     DEPTH,
     DISTANCE,
@@ -52,6 +53,7 @@ class Buffers(NamedTuple):
     alpha: NDArray[np.float32]
     normal: NDArray[np.float32]
     class_id: NDArray[np.uint8]
+    object_id: NDArray[np.uint16]
 
 
 def _compile_blend_strips(normals):  # type: ignore[no-untyped-def]
@@ -112,7 +114,7 @@ def blend_tiles(records, rays, starts, splats, normals, buffers):  # type: ignor
     normals : False leaves the normals as they are, for a tenth less time
     buffers : overwritten
     """
-    rgb, depth, expected_depth, alpha, normal, class_id = buffers
+    rgb, depth, expected_depth, alpha, normal, class_id, object_id = buffers
     height, width = alpha.shape
     across = -(-width // TILE_WIDTH)
     s = np.empty(_STATE, dtype=np.float32)
@@ -137,10 +139,11 @@ def blend_tiles(records, rays, starts, splats, normals, buffers):  # type: ignor
                 alpha[i, j] = s[_ALPHA + l]
                 z = s[_DEPTH + l] / s[_ALPHA + l]  # NaN where no splat contributes
                 expected_depth[i, j] = z
-                class_id[i, j] = 0
+                class_id[i, j] = object_id[i, j] = 0
                 front = np.int64(s[_FRONT + l]) - 1
                 if front >= 0:
-                    class_id[i, j] = np.uint8(records[front, CLASS])
+                    code = np.int64(records[front, CLASS])
+                    class_id[i, j], object_id[i, j] = code & (CODES - 1), code // CODES
                     z = _plane_depth(records[front], rays, np.float32(j) + _HALF, np.float32(i) + _HALF)
                 depth[i, j] = z
                 rgb[i, j, 0], rgb[i, j, 1], rgb[i, j, 2] = s[_RED + l], s[_GREEN + l], s[_BLUE + l]

@@ -21,6 +21,7 @@ class GBuffer:
     normal : float32 [H, W, 3] blended unit normal, world frame, facing the camera; 0 where alpha is 0
     class_id : uint8 [H, W] class of the Gaussian at which the transmittance falls below one half;
         0 (`SemanticClass.SKY`) where it never does
+    object_id : uint16 [H, W] number of the body that this Gaussian belongs to; 0 for the scene
     """
 
     rgb: NDArray[np.float32]
@@ -29,3 +30,4 @@ class GBuffer:
     alpha: NDArray[np.float32]
     normal: NDArray[np.float32]
     class_id: NDArray[np.uint8]
+    object_id: NDArray[np.uint16]

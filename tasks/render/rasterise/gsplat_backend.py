@@ -5,18 +5,21 @@ three of light and three of the normal, and expected depth. Class and surface de
 list of (Gaussian, pixel) pairs that it returns.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import gsplat
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from tasks.render.rasterise.blending import SURFACE_RATIO
 from tasks.render.rasterise.front_torch import find_first_below_half
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.rasterise.painters_bias_torch import move_nearer
+from tasks.render.rasterise.placed_body import PlacedBody, Shade
 from tasks.render.rasterise.preparation import morton_order
 from tasks.render.rasterise.projection import NEAR, low_pass
 from tasks.render.rasterise.strips import MAX_ALPHA
@@ -37,6 +40,8 @@ class DeviceGaussians:
     sh: torch.Tensor
     normals: torch.Tensor
     class_id: torch.Tensor
+    object_id: torch.Tensor
+    places: torch.Tensor
     surroundings: torch.Tensor | None
     antialiased: bool
 
@@ -75,11 +80,17 @@ class GsplatBackend:
             sh=self._to_tensor(gaussians.sh[order]),
             normals=self._to_tensor(gaussians.normals[order]),
             class_id=self._to_tensor(gaussians.class_id[order]),
+            places=self._to_tensor(np.argsort(order)),
+            object_id=torch.zeros(len(order), dtype=torch.int32, device=self.device),
             surroundings=None
             if gaussians.surroundings is None
             else self._to_tensor(gaussians.surroundings[order]),
             antialiased=gaussians.antialiased,
         )
+
+    def recolour(self, prepared: DeviceGaussians, sh: NDArray[np.float32]) -> DeviceGaussians:
+        """Return a prepared cloud with other colours; see `Backend.recolour`."""
+        return replace(prepared, sh=self._to_tensor(sh[np.argsort(prepared.places.cpu().numpy())]))
 
     @torch.no_grad()
     def rasterise_view(
@@ -90,12 +101,19 @@ class GsplatBackend:
         width: int,
         height: int,
         normals: bool = True,
+        bodies: Sequence[PlacedBody] = (),
+        shade: Shade | None = None,
     ) -> GBuffer:
         """Draw one view, always with its normals; see `tasks.render.rasterise.rasteriser.rasterise_view`."""
+        light = torch.ones(len(prepared.means), device=self.device)
+        if shade is not None:
+            light[prepared.places[self._to_tensor(shade.index)]] = self._to_tensor(shade.share)
+        scene, prepared = len(prepared.means), self._add_bodies(prepared, bodies)
         view = view_of(viewmat, K, width, height)
         direction = prepared.means - self._to_tensor(view.eye.astype(np.float32))
         degree = int(prepared.sh.shape[1] ** 0.5) - 1
         colours = (gsplat.spherical_harmonics(degree, direction, prepared.sh) + 0.5).clamp_min(0)
+        colours[len(colours) - scene :] *= light[:, None]
         away = (prepared.normals * direction).sum(dim=1, keepdim=True) > 0
         facing = torch.where(away, -prepared.normals, prepared.normals)
         means, covariances = prepared.means, None
@@ -138,6 +156,7 @@ class GsplatBackend:
         tilted = (plane < centre * SURFACE_RATIO) & (centre < plane * SURFACE_RATIO)
         depth = torch.where(seen, torch.where(tilted, plane, centre), expected)
         class_id = torch.where(seen, prepared.class_id[splat], 0)
+        object_id = torch.where(seen, prepared.object_id[splat], 0)
         return GBuffer(
             rgb=blended[0, ..., :3].cpu().numpy(),
             depth=depth.cpu().numpy(),
@@ -145,6 +164,35 @@ class GsplatBackend:
             alpha=alpha.cpu().numpy(),
             normal=normal.cpu().numpy(),
             class_id=class_id.cpu().numpy(),
+            object_id=object_id.cpu().numpy().astype(np.uint16),
+        )
+
+    def _add_bodies(self, prepared: DeviceGaussians, bodies: Sequence[PlacedBody]) -> DeviceGaussians:
+        """Return the cloud with the bodies where they stand; their colour must not depend on the direction."""
+        if not bodies:
+            return prepared
+        clouds = [*(self._stand(body, prepared.sh.shape[1]) for body in bodies), prepared]
+        tensors = {
+            field.name: torch.cat([getattr(cloud, field.name) for cloud in clouds])
+            for field in fields(DeviceGaussians)
+            if isinstance(getattr(prepared, field.name), torch.Tensor)
+        }
+        return replace(prepared, **tensors)
+
+    def _stand(self, body: PlacedBody, harmonics: int) -> DeviceGaussians:
+        own: DeviceGaussians = body.prepared
+        R = self._to_tensor(body.T_world_body[:3, :3].astype(np.float32))
+        turn = Rotation.from_matrix(body.T_world_body[:3, :3])
+        quats = turn * Rotation.from_quat(own.quats.cpu().numpy(), scalar_first=True)
+        sh = torch.zeros((len(own.means), harmonics, 3), device=self.device)
+        sh[:, :1] = own.sh[:, :1]
+        return replace(
+            own,
+            means=own.means @ R.T + self._to_tensor(body.T_world_body[:3, 3].astype(np.float32)),
+            quats=self._to_tensor(quats.as_quat(scalar_first=True).astype(np.float32)),
+            normals=own.normals @ R.T,
+            sh=sh,
+            object_id=own.object_id + body.number,
         )
 
     def _find_front(self, splats: dict[str, Any], width: int, height: int) -> torch.Tensor:

@@ -1,6 +1,6 @@
 """Preparation of a cloud of Gaussians: the packed blocks that the rasteriser reads."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numba
@@ -171,6 +171,21 @@ def prepare_gaussians(gaussians: Gaussians) -> PreparedGaussians:
         antialiased=gaussians.antialiased,
         display_encoded=gaussians.display_encoded,
     )
+
+
+def recolour_prepared(prepared: PreparedGaussians, sh: NDArray[np.float32]) -> PreparedGaussians:
+    """Return a prepared cloud with other colours.
+
+    Parameters
+    ----------
+    prepared : the cloud
+    sh : float32 [N, K, 3] spherical harmonics, in the order of the original cloud [1]
+    """
+    blocks = prepared.blocks.copy()
+    planes = np.zeros((len(blocks) * BLOCK, blocks.shape[1] - SH), np.float32)
+    planes[: len(prepared)] = sh.reshape(len(sh), -1)[prepared.order]
+    blocks[:, SH:] = planes.reshape(len(blocks), BLOCK, -1).swapaxes(1, 2)
+    return replace(prepared, blocks=blocks)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")

@@ -42,10 +42,15 @@ LOG_CUT = float(np.log(1 / 255))
 X, Y, SLOPE, COLUMN_FALLOFF, ROW_FALLOFF, LOG_ALPHA, DISTANCE, HALF_HEIGHT = range(8)
 DEPTH, RED, GREEN, BLUE, NORMAL_X, NORMAL_Y, NORMAL_Z, CLASS = range(8, 16)
 RECORD = 16
-"""Columns of a splat record: one cache line of float32. ``DISTANCE`` is from the eye to the splat's plane along
-its normal [m], negative as it faces the eye: at a pixel, the camera z of that plane is
-``distance / (normal . ray)``."""
+"""Columns of a splat record: one cache line of float32. ``CLASS`` is the class, and `CODES` times the number of the
+body. ``DISTANCE`` is from the eye to the splat's plane along its normal [m], negative as it faces the eye: at a pixel,
+the camera z of that plane is ``distance / (normal . ray)``."""
 
+CODES = 256
+"""Classes that a code of ``CLASS`` can hold: with numbers below 2^16 it is exact in single precision."""
+
+NOTHING = np.empty((0, RECORD), np.float32)
+"""No records."""
 _EDGE_ON = np.float32(1e-12)
 _NEAR, _LOG_CUT = np.float32(NEAR), np.float32(LOG_CUT)
 _LARGEST_DET = np.float32(1e37)
@@ -101,7 +106,7 @@ def visible_blocks(prepared: PreparedGaussians, view: View) -> NDArray[np.int64]
 
 
 def project_gaussians(
-    prepared: PreparedGaussians, view: View
+    prepared: PreparedGaussians, view: View, before: NDArray[np.float32] = NOTHING
 ) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
     """Return the splat records of the Gaussians that touch the picture, along the Morton curve.
 
@@ -109,10 +114,11 @@ def project_gaussians(
     ----------
     prepared : the cloud
     view : the camera
+    before : float32 [P, 16] records of other clouds, which come first; they have no slots
 
     Returns
     -------
-    records : float32 [V, 16] columns as named in this module, the first at a cache line's start [px, m, 1]
+    records : float32 [P + V, 16] columns as named in this module, the first at a cache line's start [px, m, 1]
     slots : int64 [V] place of each along the curve [1]
     """
     wanted = visible_blocks(prepared, view)
@@ -123,13 +129,18 @@ def project_gaussians(
     cloud = _Cloud(prepared.blocks, prepared.class_id, prepared.antialiased, prepared.corrects_bias)
     camera = _Camera(rotation, lens, np.float32(view.width), np.float32(view.height))
     from_eye = prepared.origins[wanted] - view.eye
-    room = np.empty((len(wanted) * BLOCK + 1) * RECORD, dtype=np.float32)
+    first = len(before)
+    count = first + len(wanted) * BLOCK
+    room = np.empty((count + 1) * RECORD, dtype=np.float32)
     line = -room.ctypes.data // room.itemsize % RECORD
-    records = room[line : line + len(wanted) * BLOCK * RECORD].reshape(-1, RECORD)
-    slots = np.empty(len(records), dtype=np.int64)
+    records = room[line : line + count * RECORD].reshape(-1, RECORD)
+    records[:first] = before
+    slots = np.empty(count - first, dtype=np.int64)
     in_camera = view.to_camera(prepared.origins[wanted]).astype(np.float32)
-    count = _project_blocks(cloud, wanted, in_camera, from_eye.astype(np.float32), camera, records, slots)
-    return records[:count], slots[:count]
+    count = _project_blocks(
+        cloud, wanted, in_camera, from_eye.astype(np.float32), camera, records[first:], slots
+    )
+    return records[: first + count], slots[:count]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")

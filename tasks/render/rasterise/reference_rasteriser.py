@@ -191,4 +191,5 @@ def rasterise_reference(
         alpha=alpha.astype(np.float32),
         normal=normal.astype(np.float32),
         class_id=class_id,
+        object_id=np.zeros((height, width), np.uint16),
     )

@@ -13,7 +13,8 @@ from tasks.render.weather.layer import Layer, recompose_layers
 from tasks.render.weather.layers import ClipWeather, WeatherFrame
 from tasks.render.weather.rays import pixel_rays
 from tasks.render.weather.snow.bearing import GROUND_CLASSES, steepest_bearing
-from tasks.render.weather.snow.field import coverage_rank, tracks_at
+from tasks.render.weather.snow.field import coverage_rank, locate_snow
+from tasks.render.weather.snow.layer import hidden_share
 
 LAYER_BITS = {"light": 1, "wet": 2, "air": 4, "particles": 8, "snow": 16}
 """Bit of each layer in an attribution picture."""
@@ -60,6 +61,10 @@ def mark_changed_pixels(
     return np.where(step >= 0.5 / 255, LAYER_BITS[layer.name], 0).astype(np.uint8)
 
 
+HALF = 0.5
+"""Share of the ground beside the road that snow hides from which on it counts as covered [1]."""
+
+
 def snow_on(
     classes: Collection[int], weather: ClipWeather, gbuffer: GBuffer, shutter: Shutter
 ) -> NDArray[np.bool_]:
@@ -83,10 +88,12 @@ def snow_on(
     road = np.isin(gbuffer.class_id, ROAD_CLASSES)
     bears = road | (gbuffer.normal[..., 2] > steepest_bearing(outside.look.snow_cover.anchors))
     ground = np.isin(gbuffer.class_id, list(classes)) & bears & (gbuffer.alpha > 0.5)
-    place = shutter.T_world_camera[:3, 3] + gbuffer.depth[ground, None] * pixel_rays(shutter)[ground]
-    field, x, y = outside.snow, place[:, 0], place[:, 1]
-    tracks = np.where(road[ground], tracks_at(field, x, y), 0.0)
-    mask[ground] = coverage_rank(field, x, y, tracks) <= weather.state.snow_coverage
+    on_road = ground & road
+    place = shutter.T_world_camera[:3, 3] + gbuffer.depth[on_road, None] * pixel_rays(shutter)[on_road]
+    xi = coverage_rank(outside.snow, locate_snow(outside.snow, place))
+    mask[on_road] = xi <= weather.state.snow_coverage
+    hidden = hidden_share(np.array(weather.state.snow_depth_mm), outside.look.snow_cover)
+    mask[ground & ~road] = hidden > HALF
     return mask
 
 

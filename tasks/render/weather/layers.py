@@ -53,6 +53,7 @@ class ClearScene:
     gaussians : the clear scene with the clip's road edit
     environment : float32 [h, w, 3] its clear environment, as in `Scene.environment` [1]
     route : path of the wheels that left tracks in the snow; None for snow without tracks
+    lanes : lateral positions of the lanes that are driven [m]
     relief : road feature of the clip, which is relit by the weather's light; None for a flat road
     to_sun : [3] unit vector to the clear sky's sun, as in `Scene.to_sun` [1]
     daylight : colours of its light, as in `Scene.daylight` [1]; None where they are not known
@@ -61,6 +62,7 @@ class ClearScene:
     gaussians: Gaussians
     environment: NDArray[np.float32]
     route: Route | None = None
+    lanes: tuple[float, ...] = (0.0,)
     relief: RoadRelief | None = None
     to_sun: NDArray[np.float64] | None = None
     daylight: tuple[tuple[float, float, float], ...] | None = None
@@ -197,7 +199,16 @@ def weather_scene(
         lit = LitScene(environment=environment, white=white, daylight=light, strength=strength)
     field = None
     if (cover := look.snow_cover) is not None:
-        field = snow_field(gaussians, cover.patches, cover.tracks, cover.anchors, clear.route, seed)
+        field = snow_field(
+            gaussians,
+            cover.patches,
+            cover.stretch,
+            cover.tracks,
+            cover.anchors,
+            clear.route,
+            seed,
+            clear.lanes,
+        )
         xi_road = road_controls(state, look)
         amount = LyingSnow(
             coverage=xi_road.snow_coverage,

@@ -10,12 +10,15 @@ from tasks.render.weather.clouds import draw_closed_sky, draw_sunny_sky
 from tasks.render.weather.controls import AirControls, RoadControls, air_controls, road_controls
 from tasks.render.weather.falling.precipitation import Population
 from tasks.render.weather.parameters import KindLook, WeatherParameters
+from tasks.render.weather.random_streams import unit_number
 from tasks.render.weather.skies import Daylight
 from tasks.render.weather.sky import (
     SkyLight,
+    draw_camera_colours,
     expose_light,
     replace_sky,
     row_elevations,
+    see_in_colours,
     sky_light,
     sunny_light,
 )
@@ -114,16 +117,28 @@ def make_outside(
     elevation = row_elevations(len(environment))
     above = elevation[elevation > 0], environment.shape[1]
     strength = xi_atm.transmittance if daylight is None else scene.strength
-    opened = expose_light(strength, p.sky)
+    opened = expose_light(strength, p.sky, seed)
     if daylight is not None and daylight.has_sun:
         rows = np.float32(opened) * draw_sunny_sky(daylight, p.sky.clouds, seed, *above)
         sky = sunny_light(white, strength * opened, rows, ground)
     else:
+        rise = p.sky.zenith_gradient * (1 + p.sky.gradient_spread * (2 * unit_number(seed, "gradient") - 1))
+        true = daylight is not None
         sky = sky_light(
-            white, strength * opened, xi_atm.extinction, ground, p.sky, true_colours=daylight is not None
+            white,
+            strength * opened,
+            xi_atm.extinction,
+            ground,
+            p.sky,
+            true_colours=true,
+            zenith_gradient=rise,
         )
         fade = xi_atm.extinction * p.sky.cloud_base_m
         rows = draw_closed_sky(sky.airlight, sky.gradient, fade, p.sky.clouds, seed, *above)
+    colours = draw_camera_colours(p.sky, seed)
+    sky = see_in_colours(sky, colours)
+    seen = [sum(np.float32(row[c]) * rows[..., c] for c in range(3)) for row in colours]
+    rows = np.maximum(np.stack(seen, axis=-1), np.float32(0))
     return Outside(
         look=look,
         road=xi_road,

@@ -6,7 +6,7 @@ Under cloud this light loses its sun, keeps a share of its strength, and comes f
 part of what the light loses, once for the clip, as one that meters road and street does: a bright sky may clip.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 
 import numpy as np
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from tasks.render.composition import LUMINANCE
 from tasks.render.weather.clouds import CloudParameters
+from tasks.render.weather.random_streams import unit_number
 from tasks.render.weather.skies import Skies, SunParameters
 
 
@@ -27,12 +28,16 @@ class SkyParameters:
     sun : how sunlight comes through the air
     clouds : how sky and cloud look
     exposure_compensation : share of the light's loss, in stops, by which the camera opens [1]
+    least_vividness, largest_vividness : range of the saturation that a clip's camera gives, by that of the light [1]
+    exposure_spread_ev : largest error of the camera's metering, which a clip draws [EV]
+    white_balance_spread : largest error of its red gain, which a clip draws; that of blue is its opposite [1]
     cloud_transmittance : light under full cloud by light under clear sky, where hardly anything falls [1]
     rain_cloud_transmittance : the same under the thick cloud of heavy precipitation [1]
     thickening_mm_h : rate over which the cloud grows from the one to the other [mm/h]
     tint : colour of daylight under cloud by that of clear daylight, linear red, green, blue [1]
     saturation : share of the clear picture's colour saturation that is left [1]
-    zenith_gradient : zenith by horizon radiance of the overcast sky, less 1 [1]
+    zenith_gradient : zenith by horizon radiance of the overcast sky, less 1, on average [1]
+    gradient_spread : largest relative deviation of a clip's gradient from it [1]
     cloud_base_m : height of the cloud, below which precipitation scatters the gradient away [m]
     sky_view : share of the upper hemisphere that is open sky in a street [1]
     asphalt_albedo : reflectance of dry road, from which the light is read [1]
@@ -45,12 +50,17 @@ class SkyParameters:
     sun: SunParameters
     clouds: CloudParameters
     exposure_compensation: float
+    exposure_spread_ev: float
+    white_balance_spread: float
+    least_vividness: float
+    largest_vividness: float
     cloud_transmittance: float
     rain_cloud_transmittance: float
     thickening_mm_h: float
     tint: tuple[float, float, float]
     saturation: float
     zenith_gradient: float
+    gradient_spread: float
     cloud_base_m: float
     sky_view: float
     asphalt_albedo: float
@@ -109,6 +119,7 @@ def sky_light(
     parameters: SkyParameters,
     *,
     true_colours: bool = False,
+    zenith_gradient: float | None = None,
 ) -> SkyLight:
     """Return the light under closed cloud.
 
@@ -124,6 +135,7 @@ def sky_light(
     ground_albedo : mean reflectance of the ground: wet asphalt, or snow [1]
     parameters : how cloud changes the light
     true_colours : the scene's colours are those of its surfaces, without those of sun and shade
+    zenith_gradient : of the clip; None for the mean one [1]
 
     Returns
     -------
@@ -135,7 +147,8 @@ def sky_light(
     relight = level * np.diag(p.tint) @ (kept * np.eye(3) + (1 - kept) * grey)
     # light under cloud has no colour but the tint
     white = level * np.array(p.tint) * float(LUMINANCE @ clear_white)
-    b = p.zenith_gradient * float(np.exp(-extinction * p.cloud_base_m))
+    rise = p.zenith_gradient if zenith_gradient is None else zenith_gradient
+    b = rise * float(np.exp(-extinction * p.cloud_base_m))
     zenith = white * (1 + b) / (1 + 2 * b / 3)
     return SkyLight(
         clear_white=np.asarray(clear_white, dtype=np.float64),
@@ -192,15 +205,47 @@ def sunny_light(
     )
 
 
-def expose_light(strength: float, parameters: SkyParameters) -> float:
+def expose_light(strength: float, parameters: SkyParameters, seed: int) -> float:
     """Return how much further the camera opens under a light than in the scene's own [1].
 
     Parameters
     ----------
     strength : light on the road by that of the scene's own light [1]
-    parameters : share of the loss that the camera makes up for
+    parameters : share of the loss that the camera makes up for, and the error of its metering
+    seed : visual seed of the clip [1]
     """
-    return float(strength**-parameters.exposure_compensation)
+    error = parameters.exposure_spread_ev * (2 * unit_number(seed, "exposure") - 1)
+    return float(strength**-parameters.exposure_compensation * 2**error)
+
+
+def draw_camera_colours(parameters: SkyParameters, seed: int) -> NDArray[np.float64]:
+    """Return how a clip's camera renders colours: linear light to linear light, float64 [3, 3] [1].
+
+    Parameters
+    ----------
+    parameters : largest error of its white balance, and its vividness
+    seed : visual seed of the clip [1]
+    """
+    p = parameters
+    warmer = p.white_balance_spread * (2 * unit_number(seed, "white balance") - 1)
+    vivid = p.least_vividness + (p.largest_vividness - p.least_vividness) * unit_number(seed, "vividness")
+    grey = np.outer(np.ones(3), LUMINANCE)
+    return np.array((1 + warmer, 1.0, 1 - warmer))[:, None] * (vivid * np.eye(3) + (1 - vivid) * grey)
+
+
+def see_in_colours(sky: SkyLight, colours: NDArray[np.float64]) -> SkyLight:
+    """Return the light as a camera renders it.
+
+    Parameters
+    ----------
+    sky : the light
+    colours : of `draw_camera_colours`
+    """
+    seen = {
+        name: np.maximum(colours @ getattr(sky, name), 0)
+        for name in ("white", "zenith", "airlight", "ground")
+    }
+    return replace(sky, relight=colours @ sky.relight, **seen)
 
 
 def replace_sky(

@@ -130,12 +130,15 @@ def build_bicyclist(
 
 def _dress(discs: Discs, colour: ArrayLike, size: tuple[float, float, float]) -> Body:
     red, green, blue = np.asarray(colour, dtype=np.float64)
-    finishes = FINISHES | {Part.SHIRT: Finish(albedo=(float(red), float(green), float(blue)))}
+    finishes: dict[int, Finish] = {
+        **FINISHES,
+        Part.SHIRT: Finish(albedo=(float(red), float(green), float(blue))),
+    }
     openness = np.clip(0.45 + 0.4 * discs.centre[:, 2] / size[2] + 0.2 * discs.normal[:, 2], 0.15, 1.0)
     return make_body(discs, finishes, SemanticClass.OTHER, size, openness)
 
 
-FINISHES = {
+FINISHES: dict[int, Finish] = {
     Part.SKIN: Finish(albedo=(0.42, 0.26, 0.19)),
     Part.HAIR: Finish(albedo=(0.045, 0.030, 0.020)),
     Part.TROUSERS: Finish(albedo=(0.035, 0.045, 0.075)),

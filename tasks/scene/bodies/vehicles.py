@@ -125,7 +125,7 @@ def build_vehicle(
     kind : of `SHAPES`, or "car", which is a hatchback
     length, width, height : outer dimensions; None takes the kind's own [m]
     colour : [3] reflectance of its paint, linear light [1]
-    cell : spacing of its discs: 0.055 makes some 10,000 of a car, and their number goes with its square [m]
+    cell : spacing of its discs: 0.055 makes some 16,000 of a car, and their number goes with its square [m]
     seed : draws the number on its plates [1]
 
     Returns
@@ -134,20 +134,22 @@ def build_vehicle(
         Class vehicle. The same arguments give the same bytes.
     """
     shape = SHAPES["hatchback" if kind == "car" else kind]
-    size = tuple(
-        own if given is None else float(given)
-        for given, own in zip((length, width, height), shape.size, strict=True)
+    own = shape.size
+    size = (
+        own[0] if length is None else float(length),
+        own[1] if width is None else float(width),
+        own[2] if height is None else float(height),
     )
-    discs = _build_discs("hatchback" if kind == "car" else kind, size, float(cell), int(seed))  # type: ignore[arg-type]
+    discs = _build_discs("hatchback" if kind == "car" else kind, size, float(cell), int(seed))
     red, green, blue = np.asarray(colour, dtype=np.float64)
     finishes = FINISHES | {Part.PAINT: Finish(albedo=(float(red), float(green), float(blue)), gloss=0.045)}
     z = discs.centre[:, 2]
     openness = np.where(discs.material == Part.DARK, 0.12, np.clip(0.30 + 1.0 * z, 0.0, 1.0))
     openness = np.where(discs.normal[:, 2] < -0.5, 0.15, openness)
-    return make_body(discs, finishes, SemanticClass.VEHICLE, size, openness)  # type: ignore[arg-type]
+    return make_body(discs, finishes, SemanticClass.VEHICLE, size, openness)
 
 
-FINISHES = {
+FINISHES: dict[int, Finish] = {
     Part.GLASS: Finish(albedo=(0.012, 0.013, 0.014), gloss=0.10),
     Part.PLASTIC: Finish(albedo=(0.024, 0.024, 0.026)),
     Part.HEAD_LAMP: Finish(albedo=(0.62, 0.66, 0.68), gloss=0.10),

@@ -123,12 +123,12 @@ def draw_stretches(ranges: CourseRanges, route_length: float, beyond: float, see
         rows.append(
             (curvature, grade, bend_transition if start in [row[0] for row in bends] else hill_transition)
         )
-    curvature, grade, transition = (tuple(map(float, column)) for column in zip(*rows, strict=True))
+    curvatures, grades, transitions = (tuple(map(float, column)) for column in zip(*rows, strict=True))
     return Stretches(
         length=(*np.diff(starts).tolist(), route_length + beyond - float(starts[-1])),
-        curvature=curvature,
-        grade=grade,
-        transition=transition,
+        curvature=curvatures,
+        grade=grades,
+        transition=transitions,
         bloss_share=0.0,
     )
 

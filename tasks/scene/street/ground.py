@@ -53,6 +53,11 @@ def ground_albedo(layout: StreetLayout, seed: int, s: Floats, away: Floats) -> F
     dead = np.clip(layout.dead_grass_share + 0.25 * patch, 0, 1)[:, None]
     tone = np.exp(0.25 * fractal_noise(named_generator(seed, "grass"), s, away, 2.3, 4))[:, None]
     grass = (palette.GRASS + (palette.DEAD_GRASS - palette.GRASS) * dead) * tone
+    # under trees lie leaves, and little grows
+    shaded = (
+        np.clip(layout.ground_trees_scale / 60, 0, 1) * smooth_step((away - 2.0) / 3.0) * (0.75 + 0.2 * patch)
+    )
+    grass += (palette.LITTER * tone - grass) * np.clip(shaded, 0, 1)[:, None]
     bare = fractal_noise(named_generator(seed, "bare earth"), s, away, 1.1, 3) - 1.5 * away
     grass += (0.8 * palette.EARTH - grass) * np.clip(bare + 0.4, 0, 0.8)[:, None]
     strips = palette.FIELDS[rng.integers(len(palette.FIELDS), size=(64, 4))]

@@ -46,6 +46,7 @@ class StreetLayout:
     open_ground : grass beyond the pavement, under gardens and houses and behind them; 0 without [m]
     slab : edge of a paving slab [m]
     ground_storey_height, storey_height : floor to floor [m]
+    built_share : share of the lots with a house [1]
     fewest_storeys, most_storeys : of a house, the ground floor among them [1]
     fewest_bays, most_bays : window bays of a front [1]
     gap_share : share of the houses after which there is a gap [1]
@@ -97,6 +98,7 @@ class StreetLayout:
     slab: float
     ground_storey_height: float
     storey_height: float
+    built_share: float
     fewest_storeys: float
     most_storeys: float
     fewest_bays: float

@@ -67,6 +67,8 @@ SIGN_RED = _linear_light("#b01c22")[0]
 SIGN_YELLOW = _linear_light("#e3bd2a")[0]
 FENCES = _linear_light("#c9c6bd", "#7a5f45", "#8f8a80", "#4f5a4a", "#a08a68")
 CLADDING = _linear_light("#a9afb3", "#8c9499", "#c3c4c0", "#5c6b7a", "#9a8f7a", "#6e7f72", "#b5b0a2")
+LITTER = _linear_light("#7a5c3e")[0]
+"""Dead leaves on the ground of a wood."""
 DEAD_GRASS = _linear_light("#9c9064")[0]
 AUTUMN = _linear_light("#a8742c", "#8f4d24", "#b99a35", "#7d6a30", "#9c5a2a")
 CONCRETE = _linear_light("#a8a49b")[0]

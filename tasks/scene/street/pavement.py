@@ -12,7 +12,7 @@ from tasks.scene.street.noise import fractal_noise, named_generator
 from tasks.scene.street.plan import Tree
 from tasks.scene.street.surfels import Surfels, join_surfels, tile_surface
 
-_CELL = 4.5
+_CELL = 5.2
 """Width of a paving cell where it is seen closest [px]."""
 _SLAB = np.array([0.23, 0.215, 0.195])
 _GRANITE = np.array([0.26, 0.255, 0.25])

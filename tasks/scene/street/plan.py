@@ -177,6 +177,10 @@ def _row_of_houses(layout: StreetLayout, seed: int, side: int) -> list[Building]
         )
         gap = rng.uniform(layout.shortest_gap, layout.longest_gap) if rng.random() < layout.gap_share else 0.0
         station += bay * bays + gap
+    built = named_generator(seed, f"lots {side}")
+    houses = [house for house in houses if built.random() < layout.built_share]
+    if not houses:
+        return []
     touching = [0.0 if b.start - a.start - a.width > 0.5 else 1.0 for a, b in pairwise(houses)]
     before = [
         0.0,
@@ -224,12 +228,13 @@ def _scatter_trees(layout: StreetLayout, seed: int, side: int, buildings: tuple[
     trees: list[Tree] = []
     count = round(layout.ground_trees_scale * (last - first) / 100)
     while count > 0:
-        group = int(min(rng.integers(1, 7), count))
+        group = min(int(rng.integers(1, 7)), count)
         count -= group
-        middle, away = rng.uniform(first, last), rng.uniform(5.0, 0.85 * layout.open_ground)
+        # most stand near the road
+        middle, away = rng.uniform(first, last), 5.0 + 0.8 * layout.open_ground * rng.random() ** 1.7
         for _ in range(group):
             station = float(middle + rng.normal(0, 6.0))
-            back = float(max(away + rng.normal(0, 4.0), 4.0))
+            back = float(max(away + rng.normal(0, 3.0), 4.2))
             lateral = edge + side * back
             crown = _draw_crown(rng, station, lateral, layout)
             near = any(

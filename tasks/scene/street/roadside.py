@@ -121,8 +121,10 @@ def _build_rails(layout: StreetLayout, seed: int) -> list[Surfels]:
                     tile_surface(centre, [side * 0.4, 0, 0], [0, 0, 0.085], kind, steel * shade * tone)
                 )
             posts = np.arange(start + 1.0, stop, 4.0)
-            z = layout.kerb_height + np.array([0.12, 0.36])
-            upright = np.stack(np.broadcast_arrays(posts[:, None], lateral + side * 0.08, z[None]), axis=-1)
+            heights = layout.kerb_height + np.array([0.12, 0.36])
+            upright = np.stack(
+                np.broadcast_arrays(posts[:, None], lateral + side * 0.08, heights[None]), axis=-1
+            )
             parts.append(tile_surface(upright, [side * 0.12, 0, 0], [0, 0, 0.25], kind, 0.7 * steel))
     return parts
 

@@ -86,7 +86,7 @@ def find_foliage(day: float) -> dict[str, float]:
     """Return the shares of leaves, of autumn colour and of dead grass on a day [d] of the northern year [1]."""
     days = (0, 95, 125, 270, 300, 330, 365)
     return {
-        "leaf_share": float(np.interp(day, days, (0.0, 0.05, 1.0, 1.0, 0.75, 0.0, 0.0))),
+        "leaf_share": float(np.interp(day, days, (0.0, 0.0, 1.0, 1.0, 0.75, 0.0, 0.0))),
         "autumn_share": float(np.interp(day, (255, 295, 330), (0.0, 0.9, 1.0))) if day > 180 else 0.0,
         "dead_grass_share": float(
             np.interp(day, (0, 80, 120, 220, 330, 365), (0.75, 0.6, 0.0, 0.35, 0.6, 0.75))

@@ -26,6 +26,8 @@ LEAF_EXTINCTION = 0.9
 """Extinction of sunlight in a crown: about a quarter passes through 1.5 m of leaves [m-1]."""
 _LEAF = 7.3
 """Length of a tuft of leaves where it is seen closest [px]."""
+_NEAR_TWIGS = 0.2
+"""Length of a tuft below which a bare crown is drawn in full [m]."""
 _LAYERS = 1.7
 """Tufts over each other on the crown's surface [1]."""
 
@@ -135,28 +137,29 @@ def _build_wood(tree: Tree, ground: float, rng: np.random.Generator) -> list[Sur
 def _build_twigs(tree: Tree, size: float, rng: np.random.Generator) -> Surfels:
     """Build the thin branches of a crown without leaves: from the fork to each ball, and out to its surface."""
     fork = np.array([tree.station, tree.lateral, tree.balls[:, 2].min() - 0.3])
-    parts = []
-    t = np.linspace(0, 1, 8)[:, None]
-    for ball in tree.balls:
-        path = fork + t * (ball[:3] - fork) - [0, 0, 0.25] * (t * (1 - t))
-        parts.append(
-            build_tube(path, 0.03 - 0.018 * t[:, 0], 3, SemanticClass.VEGETATION, 0.8 * palette.BARK)
+    # of a tree that is seen from afar a few wide discs are enough
+    is_near = size < _NEAR_TWIGS
+    t = np.linspace(0, 1, 8 if is_near else 4)[:, None]
+    bark, kind = 0.8 * palette.BARK, SemanticClass.VEGETATION
+    parts = [
+        build_tube(
+            fork + t * (ball[:3] - fork) - [0, 0, 0.25] * (t * (1 - t)), 0.03 - 0.018 * t[:, 0], 3, kind, bark
         )
-    twigs = 16
-    which = np.repeat(np.arange(len(tree.balls)), twigs)
+        for ball in tree.balls[:: 1 if is_near else 3]
+    ]
+    which = np.repeat(np.arange(len(tree.balls)), 16 if is_near else 5)
     out = rng.standard_normal((len(which), 3)) + np.array([0, 0, 0.5])
     out /= np.linalg.norm(out, axis=1, keepdims=True)
-    reach = tree.balls[which, 3:] * 1.3
-    begin, along = tree.balls[which, :3], out * reach
+    begin, along = tree.balls[which, :3], out * tree.balls[which, 3:] * 1.3
     side = np.cross(out, rng.standard_normal(out.shape))
     side /= np.linalg.norm(side, axis=1, keepdims=True)
-    width, cover = max(0.02, 0.16 * size), Cover(0.55, 0.85)
+    count, width = (3, 0.16 * size) if is_near else (1, 0.22 * size)
     pieces = [
         tile_surface(
-            begin + (k + 0.5) / 3 * along, along / 3, side * width, SemanticClass.VEGETATION, 0.75 * palette.BARK,
-            cover=cover,
+            begin + (k + 0.5) / count * along, along / count, side * max(0.02, width), kind, 0.94 * bark,
+            cover=Cover(0.55, 0.85),
         )
-        for k in range(3)
+        for k in range(count)
     ]  # fmt: skip
     return join_surfels([*parts, *pieces])
 

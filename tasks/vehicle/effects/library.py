@@ -58,7 +58,7 @@ class Effect:
         )
 
 
-def say_number(number: float) -> str:
+def format_number(number: float) -> str:
     """Return a number as a sentence says it, with two digits or all those before the point: 0.056, 5.6, 56, 559.
 
     Parameters
@@ -68,7 +68,7 @@ def say_number(number: float) -> str:
     return f"{number:.2g}" if abs(number) < 99.5 else f"{number:.0f}"
 
 
-def say_interval(number: float, interval: tuple[float, float] | None) -> str:
+def format_interval(number: float, interval: tuple[float, float] | None) -> str:
     """Return a number with its interval, if there is one: 0.079 [0.077, 0.081].
 
     Parameters
@@ -76,8 +76,8 @@ def say_interval(number: float, interval: tuple[float, float] | None) -> str:
     number : in any unit
     interval : its lower and upper end [the same unit]
     """
-    ends = "" if interval is None else f" [{', '.join(say_number(end) for end in interval)}]"
-    return f"{say_number(number)}{ends}"
+    ends = "" if interval is None else f" [{', '.join(format_number(end) for end in interval)}]"
+    return f"{format_number(number)}{ends}"
 
 
 class _Said(float):
@@ -92,13 +92,13 @@ class _Said(float):
 
     def __format__(self, spec: str) -> str:
         if not spec:
-            return say_interval(float(self), self.interval)
+            return format_interval(float(self), self.interval)
         # of what is below another the size is said, and its interval turns round
         scale = -100.0 if spec != "percent" and self < 0.0 else 100.0
         low, high = sorted(scale * end for end in self.interval or (0.0, 0.0))
-        said = f"{say_number(scale * float(self))} %"
+        said = f"{format_number(scale * float(self))} %"
         if self.interval is not None:
-            said += f" [{say_number(low)}, {say_number(high)}]"
+            said += f" [{format_number(low)}, {format_number(high)}]"
         if spec == "share":
             return f"{said} {'above' if scale > 0.0 else 'below'}"
         return f"{'falls' if scale > 0.0 else 'grows'} by {said}" if spec == "fall" else said

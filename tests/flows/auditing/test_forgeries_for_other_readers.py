@@ -221,8 +221,8 @@ MORE: dict[str, tuple[Forge, str, str]] = {
         "must have the bytes",
     ),
     "one more input": (
-        add_file("inputs/hazard_marking.yaml", recorded=False),
-        "inputs/hazard_marking.yaml",
+        add_file("inputs/colour.yaml", recorded=False),
+        "inputs/colour.yaml",
         "not recorded",
     ),
     "one more preview": (

@@ -259,7 +259,7 @@ def test_a_library_shows_the_standards_functions_alone_so_that_two_cars_can_shar
 
 def test_the_example_of_the_page_stops_on_snow(fmu, monkeypatch, capsys):
     monkeypatch.chdir(fmu.parent)
-    (example,) = re.findall(r"^```python\n(.*?)^```$", PAGE, flags=re.M | re.S)
+    (example,) = re.findall(r"^```python\n(import fmpy.*?|from fmpy.*?)^```$", PAGE, flags=re.M | re.S)
     exec(compile(example, "page", "exec"), {})  # noqa: S102
     speed, pitch = map(float, re.findall(r"[\d.]+", capsys.readouterr().out))
     assert 2.0 < speed < 8.0 and 0.3 < pitch < 3.0

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from catalogs.effects import load_effects
+from catalogs.entries import load
 from flows.auditing.dataset_diff import compare_datasets
 from flows.making.generate import generate_dataset
 from tasks.identification.decision.answer import NamedEffect
@@ -28,7 +28,7 @@ axes:
     brakes: {{initial_speed_km_h: 40, peak_pressure_mpa: 2.0, brake_onset_s: 0.2}}
     coasts: {{initial_speed_km_h: 40}}
 """
-LIBRARY = {effect.name: effect for effect in load_effects()}
+LIBRARY = {effect.name: effect for effect in load("library of effects")}
 BRAKED, COASTED = (
     {f"{weather}/{drive}" for weather in ("dry", "rain", "snow")} for drive in ("brakes", "coasts")
 )

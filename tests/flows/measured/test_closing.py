@@ -26,8 +26,8 @@ from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS, SESSION, Campaign
 from tasks.campaign.planned_runs import RunPlan
 from tasks.errors import InputError
 from tasks.identification.benchmark import TOLERANCES, make_synthetic_campaign
-from tasks.identification.decision.answer import ChannelError, NamedEffect, OpenOdds, Parameter, Verdict
-from tasks.identification.inference.disturbance import Disturbance
+from tasks.identification.decision.answer import ChannelError, NamedEffect, OpenOdds, Parameter
+from tests.flows.measured.findings import verdict_of
 
 VEHICLE, SURFACE = load("vehicle", "paper-reference"), load("surface", "dense-asphalt")
 HOSTILE = "lagging <img src=x onerror=alert(1)>"
@@ -290,22 +290,17 @@ def named(name: str, kind: str, *parameters: Parameter) -> NamedEffect:
     )  # fmt: skip
 
 
-def verdict_of(*effects: NamedEffect) -> Verdict:
+def test_the_verdict_has_the_keys_that_others_read_and_is_plain_json() -> None:
     error = ChannelError(
         frozen=2.0, retuned=3.0, after=1.0, ci_low=0.5, ci_high=1.5, change_low=-2.0, change_high=-0.5, wins=3,
         worst_run="run-01", unit="m/s",
     )  # fmt: skip
-    return Verdict(
-        verdict="FOUND", effects=effects, rivals=(), odds=(), tried=(), error=dict.fromkeys(CHANNELS, error),
-        manoeuvre_error={"peak_pitch": error}, correlation={},
+    found = replace(
+        verdict_of(named("aerodynamic_drag", "effect", parameter("drag_area", 0.7, "m2"))),
+        error=dict.fromkeys(CHANNELS, error), manoeuvre_error={"peak_pitch": error},
         session_pulls=dict.fromkeys(SESSION, (0.0, 0.0)), noise=dict.fromkeys(CHANNELS, (0.0, 1.0)),
-        disturbance=Disturbance(), detectable={"bump_stop": float("inf")}, campaign="toy", content_hash="c" * 64,
-        split_hash="d" * 64, theta=np.zeros(1), slots=(), experiment=None, step_sensitive=(), reasons=(),
+        detectable={"bump_stop": float("inf")},
     )  # fmt: skip
-
-
-def test_the_verdict_has_the_keys_that_others_read_and_is_plain_json() -> None:
-    found = verdict_of(named("aerodynamic_drag", "effect", parameter("drag_area", 0.7, "m2")))
     odds = (OpenOdds(names=("aerodynamic_drag",), odds=1.0), OpenOdds(names=(), odds=0.25))
     content = verdict_json(replace(found, odds=odds))
     assert {"verdict", "effects", "rivals", "discriminating_experiment", "error"} <= set(content)

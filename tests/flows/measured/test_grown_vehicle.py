@@ -5,7 +5,6 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from catalogs.entries import entry_folder, find_entry, load
@@ -13,7 +12,7 @@ from catalogs.vehicles import open_vehicle
 from flows.measured.grown_vehicle import grown_vehicle, tyre_beside
 from manifests.canonical import sha256_of_file
 from tasks.identification.decision.answer import NamedEffect, Parameter, Verdict
-from tasks.identification.inference.disturbance import Disturbance
+from tests.flows.measured.findings import verdict_of
 
 
 def drag(value: float, name: str = "aerodynamic_drag") -> NamedEffect:
@@ -32,16 +31,9 @@ def drag(value: float, name: str = "aerodynamic_drag") -> NamedEffect:
     )  # fmt: skip
 
 
-def verdict_of(
-    effect: NamedEffect, campaign: str, rivals: tuple[tuple[str, NamedEffect], ...] = ()
-) -> Verdict:
-    return Verdict(
-        verdict="SET" if rivals else "FOUND", effects=(effect,), rivals=rivals, odds=(), tried=(), error={},
-        manoeuvre_error={}, correlation={}, session_pulls={}, noise={}, disturbance=Disturbance(), detectable={},
-        campaign=campaign,
-        content_hash="c" * 64, split_hash="d" * 64, theta=np.zeros(1), slots=(), experiment=None, reasons=(),
-        step_sensitive=(),
-    )  # fmt: skip
+def found(effect: NamedEffect, campaign: str, rivals: tuple[tuple[str, NamedEffect], ...] = ()) -> Verdict:
+    kind = "SET" if rivals else "FOUND"
+    return replace(verdict_of(effect), verdict=kind, rivals=rivals, campaign=campaign)
 
 
 def grown(base: str, verdict: Verdict, path: Path) -> Path:
@@ -52,8 +44,8 @@ def grown(base: str, verdict: Verdict, path: Path) -> Path:
 
 
 def test_what_a_second_campaign_finds_comes_on_top_of_what_the_first_found(tmp_path: Path) -> None:
-    once = grown("paper-reference", verdict_of(drag(0.5), "spring"), tmp_path / "once.yaml")
-    twice = grown(str(once), verdict_of(drag(0.2), "autumn"), tmp_path / "twice.yaml")
+    once = grown("paper-reference", found(drag(0.5), "spring"), tmp_path / "once.yaml")
+    twice = grown(str(once), found(drag(0.2), "autumn"), tmp_path / "twice.yaml")
     assert load("vehicle", twice).effects["drag_area"] == 0.7
     assert "spring" in twice.read_text() and "autumn" in twice.read_text()
 
@@ -63,7 +55,7 @@ def test_what_no_vehicle_can_carry_is_missing_from_it_and_the_rest_is_there(numb
     foreign = replace(
         drag(0.3), name="of the road", parameters=(replace(drag(0.3).parameters[0], name=number),)
     )
-    verdict = replace(verdict_of(drag(0.5), "spring"), effects=(foreign, drag(0.5)))
+    verdict = replace(found(drag(0.5), "spring"), effects=(foreign, drag(0.5)))
     text, missing = grown_vehicle("paper-reference", verdict, {})
     assert missing == [f"of the road: {number}"]
     assert text is not None and "drag_area" in text
@@ -72,7 +64,7 @@ def test_what_no_vehicle_can_carry_is_missing_from_it_and_the_rest_is_there(numb
 
 def test_what_the_runs_could_not_tell_from_it_stands_in_its_provenance(tmp_path: Path) -> None:
     rivals = (("aerodynamic_drag", drag(0.1, "headwind")),)
-    path = grown("paper-reference", verdict_of(drag(0.5), "spring", rivals), tmp_path / "set.yaml")
+    path = grown("paper-reference", found(drag(0.5), "spring", rivals), tmp_path / "set.yaml")
     assert "the runs cannot tell it from headwind" in " ".join(path.read_text().split())
 
 
@@ -82,7 +74,7 @@ def test_what_grows_from_a_vehicle_that_extends_another_is_whole_and_has_the_has
     car, elsewhere = tmp_path / "car.yaml", tmp_path / "elsewhere"
     car.write_text("extends: paper-reference\nsprung_mass: {value: 1500, unit: kg, source: scales}\n")
     elsewhere.mkdir()
-    path = grown(str(car), verdict_of(drag(0.5), "spring"), elsewhere / "grown.yaml")
+    path = grown(str(car), found(drag(0.5), "spring"), elsewhere / "grown.yaml")
     base = open_vehicle(path).provenance.base_sha256
     assert b"extends" not in path.read_bytes()
     assert load("vehicle", path) == replace(load("vehicle", car), name="grown", effects={"drag_area": 0.5})

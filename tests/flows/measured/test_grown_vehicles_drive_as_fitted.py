@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 import yaml
 
-from catalogs.effects import LIBRARY_FILE, load_effects
-from catalogs.entries import load
+from catalogs.entries import find_entry, load
 from catalogs.vehicles import open_vehicle
 from flows.measured.grown_vehicle import grown_vehicle
 from tasks.campaign.campaign import Run
@@ -37,8 +36,8 @@ MANOEUVRES = {
     "slow": (Weather(kind="dry"), 4.5, 0.0, 0.0),
 }
 """Weather, first speed [m/s], peak pressure [MPa] and height of a hump [m]."""
-TRUTHS = yaml.safe_load(LIBRARY_FILE.with_name("truths.yaml").read_text())["library"]
-LIBRARY = [e for e in load_effects() if e.effect_class != "sensor"]
+TRUTHS = yaml.safe_load(find_entry("library of effects").with_name("truths.yaml").read_text())["library"]
+LIBRARY = [e for e in load("library of effects") if e.effect_class != "sensor"]
 OF_THE_ROAD = {"retuned_grade"}
 """A grade belongs to the proving ground and not to the vehicle."""
 CHANNELS = ("speed", "wheel_speed_f", "wheel_speed_r", "pitch")

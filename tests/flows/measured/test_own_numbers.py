@@ -2,14 +2,14 @@
 
 from types import SimpleNamespace
 
-from catalogs.effects import load_effects
+from catalogs.entries import load
 from flows.measured.closing import _describe_own_numbers
 from tasks.identification.decision.answer import NamedEffect, Parameter, make_estimate
 
 
 def test_a_number_that_stands_as_a_rival_is_not_told_again_among_the_vehicles_own():
     def number(name: str, value: float) -> NamedEffect:
-        effect = next(e for e in load_effects() if e.name == name)
+        effect = next(e for e in load("library of effects") if e.name == name)
         p = Parameter(
             name=effect.parameters[0].name,
             value=value,
@@ -25,7 +25,10 @@ def test_a_number_that_stands_as_a_rival_is_not_told_again_among_the_vehicles_ow
     told = SimpleNamespace(rivals=[("pressure_nonlinearity", grip)], effects=[grip], experiment=None)
     outcome = SimpleNamespace(verdict=told, calibrated=(gain, grip))
     assert (
-        _describe_own_numbers(outcome, load_effects())
+        _describe_own_numbers(outcome, load("library of effects"))
         == "the brakes give 51 % [0, 100] above the torque of the vehicle file"
     )
-    assert _describe_own_numbers(SimpleNamespace(verdict=told, calibrated=(grip,)), load_effects()) == ""
+    assert (
+        _describe_own_numbers(SimpleNamespace(verdict=told, calibrated=(grip,)), load("library of effects"))
+        == ""
+    )

@@ -9,8 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from catalogs.decision_rules import load_decision_rules
-from catalogs.effects import load_effects
 from catalogs.entries import load
 from flows.measured.closing import describe_search, verdict_json
 from flows.measured.residuals import predict_runs
@@ -70,9 +68,11 @@ def judged() -> tuple[Outcome, Campaign]:
     campaign = replace(made, runs=runs, name=HOSTILE, vehicle=HOSTILE)
     campaign = replace(campaign, tolerances=campaign.tolerances.with_session({"pressure_gain": 0.2}))
     library = tuple(
-        e for e in load_effects() if e.name in {"brake_lag", "brake_dead_time", "retuned_pressure_gain"}
+        e
+        for e in load("library of effects")
+        if e.name in {"brake_lag", "brake_dead_time", "retuned_pressure_gain"}
     )
-    outcome = judge_runs(campaign, VEHICLE, SURFACE, library, load_decision_rules())
+    outcome = judge_runs(campaign, VEHICLE, SURFACE, library, load("set of decision rules"))
     (lag,) = outcome.verdict.effects
     rival = replace(
         lag, name="brake_dead_time", parameters=(replace(lag.parameters[0], name="dead_time", value=0.08),)

@@ -6,7 +6,7 @@ import pyarrow.parquet as pq
 import pytest
 import zarr
 
-from flows.store.arrays import ARRAYS, arrays_of
+from flows.store.arrays import ARRAYS, EVERY_ARRAY
 from flows.store.frames import buffer_hash, create_arrays, read_clip, write_clip
 from flows.store.layout import PARTIAL, Layout, write_atomically, write_json
 from flows.store.staging import partial_files
@@ -73,12 +73,12 @@ def test_arrays_say_their_dimensions_and_camera(layout):
 
 
 def test_arrays_carry_unit_and_meaning_and_the_names_of_their_codes(tmp_path):
-    create_arrays(tmp_path / "frames", (1, *SHAPE), True, {})
+    create_arrays(tmp_path / "frames", (1, *SHAPE), True, {}, objects=True)
     group = zarr.open_group(tmp_path / "frames", mode="r")
     assert {name: array.attrs["units"] for name, array in group.arrays()} == {
-        "rgb": "1", "depth": "m", "class": "1", "normal": "1", "road": "m", "flow": "px", "marks": "1",
+        "rgb": "1", "depth": "m", "class": "1", "instance": "1", "normal": "1", "road": "m", "flow": "px", "marks": "1",
     }  # fmt: skip
-    for name, array in arrays_of(labels=True).items():
+    for name, array in EVERY_ARRAY.items():
         assert group[name].attrs["long_name"] == group[name].attrs["description"] == array.channel.description
     codes = dict(
         zip(group["class"].attrs["flag_meanings"].split(), group["class"].attrs["flag_values"], strict=True)
@@ -151,7 +151,17 @@ def test_channel_names_are_unique_and_described():
         "check_method",
         "check_passed",
     }
-    texts |= {"clip_id_a", "clip_id_b", "label_a", "label_b", "control", "differs", "variant"}
+    texts |= {
+        "clip_id_a",
+        "clip_id_b",
+        "label_a",
+        "label_b",
+        "control",
+        "differs",
+        "variant",
+        "scene",
+        "kind",
+    }
     assert {c.name for c in CHANNELS_BY_NAME.values() if not c.unit} == texts, "every number has a unit"
 
 

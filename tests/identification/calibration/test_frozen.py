@@ -8,7 +8,6 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
-from catalogs.effects import load_effects
 from catalogs.entries import entry_names, find_entry, load
 from catalogs.vehicles import open_vehicle
 from flows.cli import app
@@ -221,7 +220,7 @@ def test_a_faulty_procedure_is_told_by_place_and_rule(tmp_path, harm, sentence):
 
 def test_a_vehicle_that_close_loop_grew_is_calibrated_further_and_keeps_what_it_had(make_traces, tmp_path):
     found = found_form("brake_torque", "pressure", "a + b x", 3.6, 0.0, 0.1)
-    (lag,) = (e for e in load_effects() if e.name == "brake_lag")
+    (lag,) = (e for e in load("library of effects") if e.name == "brake_lag")
     grown = grown_file(
         tmp_path / "grown.yaml", found, found_effect(lag, {"lag": 0.08}), reached={"pressure": (0.0, 3.6)}
     )

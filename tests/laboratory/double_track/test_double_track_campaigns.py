@@ -12,7 +12,7 @@ import yaml
 
 import studies.double_track as package
 from catalogs.campaigns import read_campaign
-from catalogs.effects import load_effects
+from catalogs.entries import load
 from studies.double_track.campaign import draw_session, make_campaign, measure_run
 from studies.double_track.declared import read_declared
 from studies.double_track.draws import draw_coloured, draw_smooth, keyed_generator
@@ -106,7 +106,7 @@ def test_sizes_go_from_small_to_large_within_their_range():
 
 
 def test_effects_carry_the_librarys_names_units_and_bounds():
-    library = {effect.name: effect for effect in load_effects()}
+    library = {effect.name: effect for effect in load("library of effects")}
     for group in ("standard", "further"):
         for entry in EFFECTS[group].values():
             first, limits = next(iter(entry["values"].items()))

@@ -101,6 +101,7 @@ def flat_gbuffer(
         alpha=covered.astype(np.float32),
         normal=normal,
         class_id=kind,
+        object_id=np.zeros(kind.shape, np.uint16),
     )
 
 

@@ -65,7 +65,7 @@ def test_the_overcast_sky_gives_the_light_that_the_white_surface_shows(parameter
 def test_a_thin_rain_leaves_the_gradient_of_moon_and_spencer(parameters):
     clear = sky_light(WHITE, 0.25, 0.0, 0.1, parameters.sky)
     assert clear.zenith / clear.airlight == pytest.approx(np.full(3, 3.0))
-    thick = sky_light(WHITE, 0.25, 0.01, 0.1, parameters.sky)
+    thick = sky_light(WHITE, 0.25, 0.04, 0.1, parameters.sky)
     assert thick.zenith / thick.airlight == pytest.approx(np.ones(3), abs=1e-3)
 
 
@@ -85,7 +85,7 @@ def test_the_sun_is_gone_from_the_overcast_environment(parameters, sky, air):
     cloudy = cloud_over(clear_sky(), sky, air, parameters)
     up = cloudy[:16]
     assert up.max() < 1.5 * sky.zenith.max()
-    assert up.std(axis=(0, 1)).max() < 0.1
+    assert up.std(axis=(0, 1)).max() < 0.2
     assert cloudy.tobytes() == cloud_over(clear_sky(), sky, air, parameters).tobytes()
 
 

@@ -14,7 +14,14 @@ from tasks.render.weather.scene_light import (
     to_display_unclipped,
 )
 from tasks.render.weather.snow.bearing import GROUND_CLASSES, bearing_share
-from tasks.render.weather.snow.field import LyingSnow, SnowField, coverage_rank, local_depth_mm, tracks_at
+from tasks.render.weather.snow.field import (
+    LyingSnow,
+    SnowField,
+    coverage_rank,
+    covered_share,
+    local_depth_mm,
+    locate_snow,
+)
 from tasks.render.weather.snow.road_anchors import AnchorParameters, road_anchors
 from tasks.render.weather.snow.shelter import open_share
 from tasks.render.weather.snow.wheel_tracks import TrackParameters
@@ -22,14 +29,10 @@ from tasks.scene.gaussians import Gaussians
 from tasks.scene.spherical_harmonics import C0
 from tasks.scene.surroundings import surface_scales
 
-EDGE_WIDTHS = 1.4
-"""Distance to the edge of a patch by the standard deviation of a Gaussian that still ends there."""
 BURIED = 0.98
 """Share of an anchor that its snow hides from which on the anchor itself need not be drawn."""
 HIGHEST_LUMP = 2.0
 """Height of the highest lump of snow by the mean depth [1]."""
-NARROWEST = 0.35
-"""Width of the narrowest Gaussian, at the very edge, by that of its anchor."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,17 +42,24 @@ class SnowCoverParameters:
     Parameters
     ----------
     patches : waves of the coverage field
+    stretch : how much longer they are along the road than across [1]
+    edge : share of the road over which the edge of a patch goes from bare to covered, at most [1]
     tracks : wheel tracks in it
     anchors : which Gaussians of the road carry it
     lumps : waves of the micro-height
     lump_share : standard deviation of the micro-height by the local depth [1]
     relief : standard deviation of the snow's brightness from hollow to lump, by its mean [1]
-    hiding_mm : depth at which 1 - 1/e of the ground is hidden [mm]
+    hiding_mm : depth at which 1 - 1/e of the ground beside the road is hidden [mm]
     albedo : reflectance of fresh snow, red, green, blue [1]
+    slush_albedo : reflectance of the wet snow at the edge of a patch, red, green, blue [1]
+    slush_mm : depth over which slush turns to snow, 1 - 1/e [mm]
     damp_albedo_ratio : reflectance of the damp road between the snow by its dry one [1]
+    dust : share of the bare road that blown snow and salt whiten [1]
     """
 
     patches: FieldParameters
+    stretch: float
+    edge: float
     tracks: TrackParameters
     anchors: AnchorParameters
     lumps: FieldParameters
@@ -57,7 +67,10 @@ class SnowCoverParameters:
     relief: float
     hiding_mm: float
     albedo: tuple[float, float, float]
+    slush_albedo: tuple[float, float, float]
+    slush_mm: float
     damp_albedo_ratio: float
+    dust: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,41 +131,27 @@ def snow_layer(
     """
     p = parameters
     anchors = road_anchors(gaussians, p.anchors, lift)
-    x, y = gaussians.means[anchors.index, :2].T
-    tracks = tracks_at(field, x, y)
-    xi = coverage_rank(field, x, y, tracks)
-    depth = local_depth_mm(xi, amount)
-    hidden = hidden_share(depth, p) * gaussians.opacities[anchors.index]
-    on = (xi <= amount.coverage) & (hidden > 1 / 255)
-    index, normal, flat, xi, depth = (
-        anchors.index[on],
-        anchors.normal[on],
-        anchors.flat[on],
-        xi[on],
-        depth[on],
+    lay = locate_snow(field, gaussians.means[anchors.index])
+    xi = coverage_rank(field, lay)
+    share = covered_share(xi, amount.coverage, p.edge)
+    on = share * gaussians.opacities[anchors.index] > 1 / 255
+    index, normal, flat, share, tracks = (
+        one[on] for one in (anchors.index, anchors.normal, anchors.flat, share, lay.tracks)
     )
-
+    depth = local_depth_mm(xi[on], amount, p.edge)
     place = gaussians.means[index].astype(np.float64)
     scales, quats = _lying(gaussians, index, normal, flat)
-    wide = scales.max(axis=1)
-    kept = np.ones(len(index))
-    if amount.coverage < 1:
-        # no wider than the way to the edge of the patch
-        inside = (amount.coverage - xi) / _steepness(field, place, tracks[on], wide)
-        kept = np.clip(inside / (EDGE_WIDTHS * wide), NARROWEST, 1)
-        scales *= kept[:, None]
-    lumps = height_field(place[:, 0], place[:, 1], p.lumps, field.seed, "snow-lumps", wide)
+    lumps = height_field(place[:, 0], place[:, 1], p.lumps, field.seed, "snow-lumps", scales.max(axis=1))
     rise = 1e-3 * depth * np.clip(1 + p.lump_share * lumps, 0.2, HIGHEST_LUMP)
     thin = np.argmin(scales, axis=1)
     scales[np.arange(len(index)), thin] = np.clip(0.3 * rise, 1e-3, 5e-3)
 
-    colour = _snow_colour(lumps, tracks[on], _at(white, index), p)
+    colour = _snow_colour(lumps, tracks, depth, _at(white, index), p)
     if gaussians.display_encoded:
         colour = to_display_unclipped(colour)
     sh = np.zeros((len(index), *gaussians.sh.shape[1:]), dtype=np.float32)
     sh[:, 0] = (colour - 0.5) / C0
-    share = hidden_share(depth, p)
-    buried = (kept == 1) & (share >= BURIED)
+    buried = share >= BURIED
     # Where the ground is not buried, its discs lie among those of the snow.
     area = surface_scales(scales).prod(axis=1) / surface_scales(gaussians.scales[index]).prod(axis=1)
     layer = replace(
@@ -160,7 +159,7 @@ def snow_layer(
         means=(place + rise[:, None] * normal).astype(np.float32),
         quats_wxyz=quats.astype(np.float32),
         scales=scales.astype(np.float32),
-        opacities=np.clip(hidden[on], 1 / 255, 1).astype(np.float32),
+        opacities=np.clip(share * gaussians.opacities[index], 1 / 255, 1).astype(np.float32),
         sh=sh,
         normals=normal.astype(np.float32),
         class_id=gaussians.class_id[index],
@@ -219,20 +218,20 @@ def whiten_gaussians(
     p = parameters
     road = np.isin(gaussians.class_id, ROAD_CLASSES)
     facing = bearing_share(gaussians, p.anchors)
-    bears = np.flatnonzero(facing > 0)
-    place = gaussians.means[bears]
-    x, y = place[:, 0], place[:, 1]
-    # wheels ran on the road alone
-    tracks = np.zeros(len(bears))
-    tracks[road[bears]] = tracks_at(field, x[road[bears]], y[road[bears]])
-    xi = coverage_rank(field, x, y, tracks)
     hidden = np.zeros(len(gaussians))
+    depth, tracks = np.zeros(len(gaussians)), np.zeros(len(gaussians))
+    on = np.flatnonzero(road & (facing > 0))
+    lay = locate_snow(field, gaussians.means[on])
+    xi = coverage_rank(field, lay)
+    tracks[on], depth[on] = lay.tracks, local_depth_mm(xi, amount, p.edge)
+    cover = covered_share(xi, amount.coverage, p.edge)
+    hidden[on] = facing[on] * np.maximum(cover, p.dust * min(1.0, 4 * amount.coverage))
+    beside = np.flatnonzero(~road & (facing > 0))
     reached = np.where(np.isin(gaussians.class_id, GROUND_CLASSES), 1.0, open_share(gaussians))
-    depth = reached[bears] * local_depth_mm(xi, amount)
-    hidden[bears] = facing[bears] * hidden_share(depth, p)
+    depth[beside] = reached[beside] * amount.depth_mm
+    hidden[beside] = facing[beside] * hidden_share(depth[beside], p)
     damp = np.where(road, p.damp_albedo_ratio, 1.0)
-    even = np.zeros(len(gaussians))
-    snow = _snow_colour(even, even, white, p)
+    snow = _snow_colour(np.zeros(len(gaussians)), tracks, depth, white, p)
     return recolour_gaussians(gaussians, (1 - hidden) * damp, hidden[:, None] * snow)
 
 
@@ -241,25 +240,18 @@ def _at(white: NDArray[np.floating], index: NDArray[np.int64]) -> NDArray[np.flo
     return white[index] if np.ndim(white) == 2 else white
 
 
-def _steepness(
-    field: SnowField, place: NDArray[np.float64], tracks: NDArray[np.float64], width: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Slope of the coverage field over a Gaussian's width [m-1]; where it is level the edge is far away."""
-    x, y = place[:, 0], place[:, 1]
-    along = coverage_rank(field, x + width, y, tracks) - coverage_rank(field, x - width, y, tracks)
-    across = coverage_rank(field, x, y + width, tracks) - coverage_rank(field, x, y - width, tracks)
-    return np.hypot(along, across) / (2 * width) + 1e-6
-
-
 def _snow_colour(
     lumps: NDArray[np.floating],
     tracks: NDArray[np.floating],
+    depth_mm: NDArray[np.floating],
     white: NDArray[np.floating],
     p: SnowCoverParameters,
 ) -> NDArray[np.float64]:
-    """Radiance of snow: hollows get and give less light than lumps, wheels press it grey."""
+    """Radiance of snow: slush where it is thin, hollows less bright than lumps, wheels press it grey."""
     shade = (1 + p.relief * np.clip(np.asarray(lumps), -2.5, 1.5)) * (1 - p.tracks.compaction * tracks)
-    return shade[:, None] * (np.array(p.albedo) * np.asarray(white))
+    wet = np.exp(-np.asarray(depth_mm) / p.slush_mm)[:, None]
+    albedo = (1 - wet) * np.array(p.albedo) + wet * np.array(p.slush_albedo)
+    return shade[:, None] * albedo * np.asarray(white)
 
 
 def _surroundings(

@@ -1,4 +1,4 @@
-"""Where wheels have run: two strips about the route, which wander a little and have soft edges."""
+"""Where wheels have run: two strips in each lane, which wander a little and have soft edges."""
 
 from dataclasses import dataclass
 
@@ -6,12 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.render.weather.coverage_field import FieldParameters, height_field
-from tasks.scene.route import Route
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrackParameters:
-    """Tracks of the traffic that drove the route before.
+    """Tracks of the traffic that drove before.
 
     Parameters
     ----------
@@ -32,9 +31,9 @@ class TrackParameters:
 
 
 def track_share(
-    x: NDArray[np.floating],
-    y: NDArray[np.floating],
-    route: Route | None,
+    station: NDArray[np.floating],
+    lateral: NDArray[np.floating],
+    lanes: tuple[float, ...],
     parameters: TrackParameters,
     seed: int,
 ) -> NDArray[np.float64]:
@@ -42,8 +41,8 @@ def track_share(
 
     Parameters
     ----------
-    x, y : [N] world coordinates [m]
-    route : the route that was driven; None where nobody has driven
+    station, lateral : [N] place along and across the route [m]
+    lanes : lateral positions of the middles of the lanes that are driven [m]
     parameters : the tracks
     seed : visual seed of the clip [1]
 
@@ -52,11 +51,10 @@ def track_share(
     float64 [N] 1 in the middle of a track, 0 away from it [1]
     """
     p = parameters
-    if route is None:
-        return np.zeros(len(x))
-    # tracks are read across the road alone, so the height of the place does not matter
-    station, lateral, _ = route.project(np.column_stack((x, y, np.zeros(len(x)))))
     wave = FieldParameters(coarsest_m=p.wander_length_m, octaves=2, roughness=0.5)
-    lateral = lateral + p.wander_m * height_field(station, np.zeros(len(x)), wave, seed, "wheel-tracks")
-    across = (np.abs(lateral) - p.gauge_m / 2) / (p.width_m / 2)
-    return 1 / (1 + across**4)
+    share = np.zeros(len(station))
+    for lane in lanes:
+        wander = p.wander_m * height_field(station, np.full(len(station), lane), wave, seed, "wheel-tracks")
+        across = (np.abs(lateral - lane + wander) - p.gauge_m / 2) / (p.width_m / 2)
+        share = np.maximum(share, 1 / (1 + across**4))
+    return share

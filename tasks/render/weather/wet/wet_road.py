@@ -156,7 +156,7 @@ def wet_layer(
     """
     p, sky = film.parameters, light.sky
     focal_px = float(shutter.K[1, 1])
-    road = np.isin(gbuffer.class_id, ROAD_CLASSES) & (gbuffer.alpha > 0.5)
+    road, share = soften_mask(np.isin(gbuffer.class_id, ROAD_CLASSES) & (gbuffer.alpha > 0.5))
     window = 2 * round(p.normal_window * shutter.height / 2) + 1
     # a slope s along the line of sight turns the mirrored ray by 2 s: a lobe is as high as its slopes, and
     # narrow across at grazing angles
@@ -184,13 +184,15 @@ def wet_layer(
     )
     gain = np.ones((*road.shape, 1), dtype=np.float32)
     add = np.zeros_like(picture)
-    facing = np.clip(gbuffer.normal[..., 2] / STEEPEST_SOAKED, 0, 1)
-    drained = np.where(np.isin(gbuffer.class_id, DRAINED_CLASSES), facing, np.float32(0))
+    drained = soaked_share(gbuffer, road)
     _wet(
         picture, road, drained, water.smooth, water.cosine, sharp, rough, compute_wetness(film.depth_mm, p.water),
         p.water.ripple_slope, p.rough_slope, p.refractive_index, p.diffuse_reflectance,
         LUMINANCE / float(LUMINANCE @ sky.white), gain, add,
     )  # fmt: skip
+    # at the road's edge a pixel is road in part
+    gain[road] = 1 - share[road, None] * (1 - gain[road])
+    add *= share[..., None]
     if film.refracts:
         shift = compute_film_shift(view, 1e-3 * film.depth_mm, p.refractive_index)
         below = see_through_film(picture, view, shift) - picture
@@ -198,6 +200,44 @@ def wet_layer(
     return Layer(name="wet", gain=gain, add=add)
 
 
+def soften_mask(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
+    """Return a mask without single pixels of another class, and the share of it about each of its pixels.
+
+    Parameters
+    ----------
+    mask : bool [H, W]
+
+    Returns
+    -------
+    mask : bool [H, W] where most of the pixels about one are in it
+    share : float32 [H, W] rising from a half at its edge to 1; 0 outside
+    """
+    width = 2 * round(EDGE_WINDOW * len(mask) / 2) + 1
+    smooth = cv2.blur(mask.astype(np.float32), (width, width)) > 0.5
+    return smooth, np.where(smooth, cv2.blur(smooth.astype(np.float32), (3, 3)), np.float32(0))
+
+
+def soaked_share(gbuffer: GBuffer, road: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Return how wet the ground beside the road gets by that of the road, and what stands on it by its foot.
+
+    Parameters
+    ----------
+    gbuffer : the rasterisation
+    road : bool [H, W] pixels of the road
+
+    Returns
+    -------
+    float32 [H, W] share; 0 on the road [1]
+    """
+    facing = np.clip(gbuffer.normal[..., 2] / STEEPEST_SOAKED, 0, 1)
+    drained = np.isin(gbuffer.class_id, DRAINED_CLASSES)
+    # the outline of what stands on wet ground shows ground in part
+    soaked = cv2.blur(np.where(drained, facing, np.float32(0)), (3, 3))
+    return np.where(road, np.float32(0), soaked)
+
+
+EDGE_WINDOW = 0.014
+"""Width of the window in which most pixels decide whether one is road, by picture height [1]."""
 DRAINED_CLASSES = (SemanticClass.SIDEWALK, SemanticClass.KERB, SemanticClass.TERRAIN)
 """Rough ground with pores that water runs off."""
 LEAST_REACH = 4

@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 
 LEVELS = (0.045, 0.06, 0.08, 0.11, 0.15, 0.2)
 """Spacings of a car's discs: 25,000 to 1,500 discs a car [m]."""
-CELL_PX = 4.0
+CELL_PX = 4.5
 """Spacing where the clip comes nearest, with the focal length that its camera has [px]."""
 _IN_VIEW = 0.8
 """Cosine of the angle from the camera's axis up to which a car counts as in view [1]."""
@@ -62,7 +62,7 @@ def detail_cars(
         cell = next(level for level in LEVELS if level >= spacing)
         rows = first + np.flatnonzero(owners == number)
         gone.append(rows)
-        coarse = {
+        coarse: dict[str, Any] = {
             member.name: value[rows]
             for member in fields(Gaussians)
             if isinstance(value := getattr(gaussians, member.name), np.ndarray)

@@ -94,7 +94,7 @@ def place_body(body: Body, car: Car) -> Surfels:
         axes=np.stack([*tangents(normal), normal], axis=1) * turn,
         scale=body.gaussians.scales[:, :2].astype(np.float64),
         albedo=body.albedo,
-        glow=_mirror_surroundings(centre, normal, body.gloss, eye),
+        glow=mirror_surroundings(centre, normal, body.gloss, eye),
         openness=body.openness,
         opacity=body.gaussians.opacities.astype(np.float64),
         class_id=np.full(len(centre), SemanticClass.VEHICLE, dtype=np.uint8),
@@ -125,7 +125,7 @@ def car_footprints(parked: tuple[Car, ...]) -> Floats:
     return np.array(rectangles).reshape(-1, 2, 2)
 
 
-def _mirror_surroundings(centre: Floats, normal: Floats, gloss: Floats, eye: Floats) -> Floats:
+def mirror_surroundings(centre: Floats, normal: Floats, gloss: Floats, eye: Floats) -> Floats:
     """Return the radiance [N, 3] mirrored towards the eye, after Schlick (1994), doi:10.1111/1467-8659.1330233."""
     view = eye - centre
     view /= np.linalg.norm(view, axis=1, keepdims=True)

@@ -15,11 +15,11 @@ from tasks.scene.street.houses.openings import (
 )
 from tasks.scene.street.layout import PIXEL, StreetLayout, nearest_depth
 from tasks.scene.street.plan import Building
-from tasks.scene.street.surfels import Surfels, graded_cells, tile_surface
+from tasks.scene.street.surfels import Surfels, graded_cells, join_surfels, tile_surface
 
 Floats = NDArray[np.float64]
 
-_CELL = (17.0, 11.0)
+_CELL = (18.0, 12.0)
 """Largest width and height of a wall cell where it is seen closest [px]."""
 _RECESS = np.array([0.0, -0.03, 0.10, 0.14, -0.06, -0.08, -0.04])
 """Distance of each part behind the wall's surface [m]."""
@@ -34,6 +34,8 @@ def build_facades(layout: StreetLayout, buildings: tuple[Building, ...], seed: i
     buildings : the houses
     seed : the street's seed [1]
     """
+    if not buildings:
+        return join_surfels([])
     looks = [draw_look(house, seed) for house in buildings]
     grids = [
         grid
@@ -115,4 +117,4 @@ def _cut_bays(
 def _cut_pattern(pattern: Pattern, cell: float) -> tuple[Floats, Floats, NDArray[np.int64]]:
     """Cut cells along one side of a grid: walls finely at their ends, panes and boards evenly."""
     alike = np.array([part in (Part.GLASS, Part.SIGN, Part.PLINTH) for _, part in pattern])
-    return graded_cells(np.cumsum([0.0, *(size for size, _ in pattern)]), cell, np.where(alike, 1.0, 0.33))
+    return graded_cells(np.cumsum([0.0, *(size for size, _ in pattern)]), cell, np.where(alike, 1.0, 0.36))

@@ -120,4 +120,4 @@ def house_boxes(layout: StreetLayout, buildings: tuple[Building, ...]) -> Floats
         ):
             d = sorted((front + house.side * near, front + house.side * far))
             boxes.append([[house.start, d[0], low], [house.start + house.width, d[1], high]])
-    return np.array(boxes)
+    return np.array(boxes).reshape(-1, 2, 3)

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from catalogs.decision_rules import load_decision_rules
+from catalogs.entries import load
 from tasks.identification.decision.candidates import Candidate
 from tasks.identification.decision.odds import RunGrams, search_explanations
-from tasks.identification.decision.told import OpenExplanation, list_open_explanations
+from tasks.identification.decision.open_explanations import OpenExplanation, list_open_explanations
 from tasks.identification.rules import DecisionRules
 from tests.identification.explained import effect_of, form_of, grams_of
 
-RULES = replace(load_decision_rules(), signature_error=0.0)
+RULES = replace(load("set of decision rules"), signature_error=0.0)
 LAG, DRAG = effect_of("brake_lag", 0), effect_of("aerodynamic_drag", 1)
 
 

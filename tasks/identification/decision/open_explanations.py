@@ -1,4 +1,4 @@
-"""What an explanation tells: members large enough to matter, and which explanations the runs leave open."""
+"""Members of an explanation that are large enough to be named, and the explanations that the runs leave open."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -15,8 +15,8 @@ from tasks.identification.rules import DecisionRules
 
 SIGNATURES = 2.0
 """Errors of a signature by which the size of an effect may differ from run to run [1]."""
-Told = frozenset[str]
-"""Names of the members that an explanation tells."""
+Names = frozenset[str]
+"""Names of the members of an explanation that are named."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,28 +25,28 @@ class OpenExplanation:
 
     Parameters
     ----------
-    explanation : the best of those that tell the same
-    told : its members that are told, those that gain most first
+    explanation : the best of those that name the same
+    named : its members that are named, those that gain most first
     log_odds : logarithm of its odds against the first that is open; 0 for that one [1]
     """
 
     explanation: Explanation
-    told: tuple[Candidate, ...]
+    named: tuple[Candidate, ...]
     log_odds: float
 
     @property
-    def names(self) -> Told:
-        """Return the names of what it tells."""
-        return frozenset(member.name for member in self.told)
+    def names(self) -> Names:
+        """Return the names of what it names."""
+        return frozenset(member.name for member in self.named)
 
     @property
-    def numbers(self) -> Told:
-        """Return the numbers of what it tells: a drag with and without a wind is one number."""
-        return frozenset(m.name if m.effect is None else m.effect.parameters[0].name for m in self.told)
+    def numbers(self) -> Names:
+        """Return the numbers of what it names: a drag with and without a wind is one number."""
+        return frozenset(m.name if m.effect is None else m.effect.parameters[0].name for m in self.named)
 
 
-def tell_members(grams: RunGrams, explanation: Explanation, rules: DecisionRules) -> tuple[Candidate, ...]:
-    """Return the members that the runs tell at the odds of a name: to be there, and to be larger than what matters.
+def select_members(grams: RunGrams, explanation: Explanation, rules: DecisionRules) -> tuple[Candidate, ...]:
+    """Return the members whose odds reach those of a name: to be there, and to be larger than what matters.
 
     None of an explanation whose odds against nothing are less.
 
@@ -133,10 +133,10 @@ def find_shared_members(
 def list_open_explanations(
     grams: RunGrams, explanations: Iterable[Explanation], rules: DecisionRules
 ) -> list[OpenExplanation]:
-    """Return the explanations that the runs leave open, the first being the one that they tell.
+    """Return the explanations that the runs leave open, the first being the one that they name.
 
-    Explanations that tell the same count once, by the best of them. The simplest of those within the odds of a name is
-    the first: a member whose odds do not speak for it is not told. One that tells all that the first does and more is
+    Explanations that name the same count once, by the best of them. The simplest of those within the odds of a name is
+    the first: a member whose odds do not speak for it is not named. One that names all that the first does and more is
     no other explanation.
 
     Parameters
@@ -152,41 +152,41 @@ def list_open_explanations(
     ranked += [e for e in plain[: rules.most_compared // 2] if not any(e is known for known in ranked)]
     needed = [take_away_members(grams, explanation, rules) for explanation in reversed(ranked)]
     # of the same members the best comes last, and stays
-    by_told: dict[Told, OpenExplanation] = {}
+    by_names: dict[Names, OpenExplanation] = {}
     most = -inf
     for explanation in {e.names: e for e in needed}.values():
-        told = find_shared_members(grams, explanation, rules)
+        named = find_shared_members(grams, explanation, rules)
         # what the runs disagree about may leave another explanation as good as the best, and no better
         against = min(-compare_explanations(grams, ranked[0], explanation, rules.signature_error), 0.0)
         most = max(most, against)
-        if not told and any(is_surely_large(explanation, m, rules) for m in explanation.members):
+        if not named and any(is_surely_large(explanation, m, rules) for m in explanation.members):
             continue  # it holds something, and nothing that may be named
-        known = by_told.get(frozenset(m.name for m in told))
+        known = by_names.get(frozenset(m.name for m in named))
         if known is None or against > known.log_odds:
-            found = OpenExplanation(explanation=explanation, told=told, log_odds=against)
-            by_told[found.names] = found
-    within = [found for found in by_told.values() if found.log_odds >= most - log(rules.named_odds)]
+            found = OpenExplanation(explanation=explanation, named=named, log_odds=against)
+            by_names[found.names] = found
+    within = [found for found in by_names.values() if found.log_odds >= most - log(rules.named_odds)]
     if not within:
-        return [OpenExplanation(explanation=ranked[0], told=(), log_odds=0.0)]
+        return [OpenExplanation(explanation=ranked[0], named=(), log_odds=0.0)]
     best = max(within, key=lambda found: (found.log_odds, found.explanation.log_odds))
     # what an effect of the library explains as well is no form
     laws = [
         f
-        for f in by_told.values()
-        if f.told
+        for f in by_names.values()
+        if f.named
         and _has_form(best) > _has_form(f)
         and _explains_as_much(grams, f.explanation, best.explanation, rules)
     ]  # fmt: skip
     whole = min(laws, key=_rank_simplest) if laws else best
-    # a member whose odds do not speak for it is not told
+    # a member whose odds do not speak for it is not named
     parts = [f for f in within if f.names <= whole.names]
-    simplest = min([f for f in within if not f.told] or parts or [whole], key=_rank_simplest)
+    simplest = min([f for f in within if not f.named] or parts or [whole], key=_rank_simplest)
     apart = [f for f in within if not f.numbers >= simplest.numbers and not _holds_again(f, simplest)]
     # of explanations that add to one another the simplest stands for all
     others = [f for f in apart if not any(g.names < f.names for g in apart)]
     others.sort(key=lambda found: -found.log_odds)
     return [
-        OpenExplanation(explanation=f.explanation, told=f.told, log_odds=f.log_odds - simplest.log_odds)
+        OpenExplanation(explanation=f.explanation, named=f.named, log_odds=f.log_odds - simplest.log_odds)
         for f in (simplest, *others)
     ]
 
@@ -197,13 +197,13 @@ def _rank_simplest(opened: OpenExplanation) -> tuple[int, float, float]:
 
 
 def _has_form(opened: OpenExplanation) -> bool:
-    return any(member.effect is None for member in opened.told)
+    return any(member.effect is None for member in opened.named)
 
 
 def _holds_again(other: OpenExplanation, first: OpenExplanation) -> bool:
     """Whether a form of another explanation is what the first names, without its law."""
-    forms = [member for member in other.told if member.effect is None]
-    known = [member for member in first.told if member.effect is not None]
+    forms = [member for member in other.named if member.effect is None]
+    known = [member for member in first.named if member.effect is not None]
     return any(can_stand_for(form, member) for form in forms for member in known)
 
 

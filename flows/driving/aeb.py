@@ -1,0 +1,419 @@
+"""``musync lab aeb``: emergency brakes against protocols in every weather, by the speed of the impact."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain, islice, product
+from math import pi
+from typing import Any
+
+import numpy as np
+
+from catalogs.emergency_braking import EmergencyBraking, ProtocolEntry
+from catalogs.entries import load
+from catalogs.scenario import Scenario
+from flows.making.driving import surface_of, weather_of
+from flows.pages.figures import Figure, Line, Panel, pick_style
+from flows.pages.writer import Cell, Section, Table, write_page
+from flows.running.progress import progress_bar
+from flows.store.outputs import Outputs
+from tasks.driving.brakes import (
+    Approach,
+    BlindTrigger,
+    BrakeLine,
+    DriverTrigger,
+    FrictionTrigger,
+    Trigger,
+)
+from tasks.driving.outcome import Outcome, judge_approach
+from tasks.driving.stepped import DriveSettings, SteppedDrive
+from tasks.driving.targets import TargetTrack
+from tasks.errors import InputError
+from tasks.studies.label_ranges import sampled_friction
+from tasks.surface.state import SurfaceState
+from tasks.surface.wet_friction import ANY_SPEED, compute_wet_share
+from tasks.vehicle.parameters import Vehicle, compute_surface_response
+
+PERCENTILES = (5, 50, 95)
+LONGEST_S = 30.0
+KM_H = 3.6
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """One approach of a protocol.
+
+    Parameters
+    ----------
+    protocol, name : of the protocol, and of the approach in it
+    speed : of the car [m/s]
+    track : of the target
+    allowed_km_h : impact that the rule allows; None where it says nothing [km/h]
+    """
+
+    protocol: str
+    name: str
+    speed: float
+    track: TargetTrack
+    allowed_km_h: float | None
+
+
+def compare_brakes(
+    *, vehicle: str = "bmw-320i", protocol: list[str] | None = None, weather: list[str] | None = None,
+    brake: list[str] | None = None, bounds: bool = True, out: str | None = None,
+) -> dict[str, Any]:  # fmt: skip
+    """Drive every approach of the protocols in every weather with every brake, without pictures.
+
+    Parameters
+    ----------
+    vehicle : catalogue name or file of the car
+    protocol, weather, brake : names of `catalogs/emergency_braking.yaml`; None takes all
+    bounds : drive each at the 5th, 50th and 95th percentile of friction under the surface bounds too
+    out : folder for aeb.json and the page
+
+    Returns
+    -------
+    ``rows[]`` with protocol, approach, ``speed_km_h``, weather, brake, friction, ``collided``,
+    ``impact_speed_km_h`` with its ``p05``, ``p50`` and ``p95``, ``min_ttc_s``, ``clearance_m``, ``avoided_km_h`` and
+    ``allowed_km_h``;
+    ``summary[]`` by protocol, weather and brake; ``sources`` of the protocols.
+
+    Raises
+    ------
+    InputError
+        For names that do not exist.
+    """
+    table: EmergencyBraking = load("emergency braking")
+    results = Outputs(out, "lab aeb", "aeb.json", "aeb.html")
+    chosen = _choose(table, protocol, weather, brake)
+    car, pavement = load("vehicle", vehicle), load("wet friction").apply(load("surface", "dense-asphalt"))
+    study = load("sensitivity study")[0]
+    rows = []
+    with progress_bar("weathers", len(chosen["weather"])) as advance:
+        for name in chosen["weather"]:
+            scenario = Scenario(**table.list_weathers()[name])
+            state = surface_of(scenario, pavement)
+            frictions = np.percentile(sampled_friction(weather_of(scenario), pavement, study), PERCENTILES)
+            for case, kind in product(_list_cases(table, chosen["protocol"]), chosen["brake"]):
+                rows.append(
+                    {
+                        "protocol": case.protocol,
+                        "approach": case.name,
+                        "speed_km_h": round(case.speed * KM_H, 6),
+                        "weather": name,
+                        "brake": kind,
+                    }
+                    | _drive_case(car, state, case, kind, table, frictions.tolist() if bounds else [])
+                )
+            advance(name)
+    result = {
+        "vehicle": car.name,
+        "rows": rows,
+        "summary": summarise(rows),
+        "sources": {name: table.protocols[name].source for name in chosen["protocol"]},
+    }
+    results.write_json("aeb.json", result)
+    results.write("aeb.html", draw_page(result))
+    return result
+
+
+def drive_approach(
+    car: Vehicle, state: SurfaceState, case: Case, trigger: Trigger, line: BrakeLine, table: EmergencyBraking
+) -> Outcome:
+    """Drive an approach to its end and return the outcome.
+
+    Parameters
+    ----------
+    car, state : the car and the road
+    case : the approach
+    trigger, line : when the brake is put on, and the pressure behind
+    table : overhang, width and rate of the car
+    """
+    overhang, width = table.car.overhang_m.value, table.car.width_m.value
+    drive = SteppedDrive(
+        car, state,
+        DriveSettings(
+            initial_speed=case.speed, duration_s=LONGEST_S, rate_hz=table.car.rate_hz.value, hold_speed=True
+        ),
+    )  # fmt: skip
+    step = 1.0 / table.car.rate_hz.value
+    looks = case.track.follow(np.arange(drive.steps, dtype=np.float64) * step)
+    # until a brake acts the speed is held, and the car is where it would be: those steps are driven at once
+    for held, target in enumerate(looks):
+        bumper = overhang + case.speed * held * step
+        unbraked = bumper >= target.station
+        if unbraked or trigger.demands(
+            Approach(time=held * step, bumper=bumper, speed=case.speed, width=width, targets=(target,))
+        ):
+            break
+    drive.advance(0.0, max(held + unbraked, 1))
+    line.demand(held * step)
+    for seen in () if unbraked else islice(chain((target,), looks), drive.step_count - held, None):
+        time, speed = drive.time, drive.read("speed")
+        met = drive.read("station") + overhang >= seen.station
+        if met or drive.stop_time <= time or (speed <= seen.speed and time >= case.track.settles_at):
+            break
+        # a step holds one pressure: that of its middle
+        drive.advance(line.pressure_at(time + 0.5 * step))
+    station, speeds, pressure = (
+        drive.read_column(name) for name in ("station", "speed", "brake_pressure_mpa")
+    )
+    return judge_approach(station, speeds, pressure, case.track, overhang=overhang, width=width)
+
+
+def make_brake(
+    kind: str, car: Vehicle, state: SurfaceState, table: EmergencyBraking
+) -> tuple[Trigger, BrakeLine]:
+    """Return a brake of a kind for a car on a road.
+
+    Parameters
+    ----------
+    kind : blind, friction or driver
+    car, state : the car and the road, of which only the one that knows friction is told
+    table : numbers of the brakes
+    """
+    brakes, line = table.brakes, table.brake_line
+    lock_mpa = car.mass * car.gravity * car.wheel_radius / car.brake_gain
+    full = line.full_over_lock.value
+    if kind == "driver":
+        wanted = brakes.driver.deceleration.value
+        return (
+            DriverTrigger(looming=brakes.driver.looming_rad_s.value, reaction=brakes.driver.reaction_s.value),
+            BrakeLine(full_mpa=wanted * lock_mpa, delay=0.0, build_up=brakes.driver.build_up_s.value),
+        )
+    pipes = BrakeLine(full_mpa=full * lock_mpa, delay=line.delay_s.value, build_up=line.build_up_s.value)
+    if kind == "blind":
+        return BlindTrigger(time_to_collision=brakes.blind.time_to_collision_s.value), pipes
+    friction_at = find_tyre_friction(car, state)
+    rise = line.build_up_s.value * min(friction_at(0.0) / full, 1.0)
+    trigger = FrictionTrigger(
+        friction_at, gravity=car.gravity, share=brakes.friction.share.value, margin=brakes.friction.margin_m.value,
+        lost=line.delay_s.value + 0.5 * rise,
+    )  # fmt: skip
+    return trigger, pipes
+
+
+def find_tyre_friction(car: Vehicle, state: SurfaceState) -> Callable[[float], float]:
+    """Return the function of the speed [m/s] that gives the peak friction of the car's tyres on a road [1]."""
+    peak, grip = compute_surface_response(car, state.kind, state.friction).tyre.peak, state.grip
+    if grip == ANY_SPEED:
+        return lambda speed: peak
+    return lambda speed: peak * compute_wet_share(speed, grip) / grip.reference
+
+
+def list_cases(protocol: str, entry: ProtocolEntry, overhang: float) -> Iterator[Case]:
+    """Yield the approaches of a protocol.
+
+    Parameters
+    ----------
+    protocol : its name
+    entry : its numbers
+    overhang : of the car's bumper before its front axle [m]
+    """
+    target = entry.target
+    for place, speed_km_h in enumerate(entry.speeds_km_h):
+        speed, pace = speed_km_h / KM_H, target.speed_km_h / KM_H
+        allowed = entry.allowed_km_h[place] if entry.allowed_km_h else None
+        if entry.begins_s is None:
+            for gap, slows in product(target.gaps_m, target.decelerations):
+                track = TargetTrack(
+                    station=overhang + gap, speed=pace, width=target.width_m, change_at=target.brakes_at_s or 0.0,
+                    acceleration=-slows,
+                )  # fmt: skip
+                name = f"{speed_km_h:g} km/h, {gap:g} m, {slows:g} m/s2"
+                yield Case(protocol=protocol, name=name, speed=speed, track=track, allowed_km_h=allowed)
+            continue
+        gap = (speed - pace) * entry.begins_s
+        if target.crosses_km_h:
+            across = target.crosses_km_h / KM_H
+            track = TargetTrack(
+                station=overhang + gap, speed=across, heading=pi / 2, lateral=-across * entry.begins_s,
+                width=target.width_m,
+            )  # fmt: skip
+        else:
+            track = TargetTrack(station=overhang + gap, speed=pace, width=target.width_m)
+        yield Case(
+            protocol=protocol, name=f"{speed_km_h:g} km/h", speed=speed, track=track, allowed_km_h=allowed
+        )
+
+
+def summarise(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return for each protocol, weather and brake how many approaches collide, and the mean and largest impact.
+
+    Parameters
+    ----------
+    rows : of `compare_brakes`
+    """
+    found: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
+    for row in rows:
+        found.setdefault((row["protocol"], row["weather"], row["brake"]), []).append(row)
+    return [
+        {
+            "protocol": protocol, "weather": weather, "brake": brake, "approaches": len(some),
+            "collided": sum(row["collided"] for row in some),
+            "mean_impact_km_h": round(float(np.mean([row["impact_speed_km_h"] for row in some])), 2),
+            "largest_impact_km_h": max(row["impact_speed_km_h"] for row in some),
+            "beyond_rule": sum(
+                row["allowed_km_h"] is not None and row["impact_speed_km_h"] > row["allowed_km_h"] for row in some
+            ),
+        }
+        for (protocol, weather, brake), some in found.items()
+    ]  # fmt: skip
+
+
+def _list_cases(table: EmergencyBraking, protocols: Sequence[str]) -> list[Case]:
+    overhang = table.car.overhang_m.value
+    return [case for name in protocols for case in list_cases(name, table.protocols[name], overhang)]
+
+
+def _drive_case(
+    car: Vehicle,
+    state: SurfaceState,
+    case: Case,
+    kind: str,
+    table: EmergencyBraking,
+    frictions: Sequence[float],
+) -> dict[str, Any]:
+    def drive_on(road: SurfaceState) -> Outcome:
+        return drive_approach(car, road, case, *make_brake(kind, car, road, table), table)
+
+    outcome = drive_on(state)
+    spread = [drive_on(replace(state, friction=float(mu))).impact_speed * KM_H for mu in frictions]
+    ends = sorted(spread) if spread else []
+    return {
+        "friction": round(state.friction, 4),
+        **tell_outcome(outcome),
+        **{f"p{p:02d}": round(v, 2) for p, v in zip(PERCENTILES, ends, strict=False)},
+        "allowed_km_h": case.allowed_km_h,
+    }
+
+
+def tell_outcome(outcome: Outcome) -> dict[str, Any]:
+    """Return an outcome in the units that people read; None for what there is not.
+
+    Parameters
+    ----------
+    outcome : of an approach
+    """
+    return {
+        "collided": outcome.collided,
+        "impact_speed_km_h": round(outcome.impact_speed * KM_H, 2),
+        "min_ttc_s": _finite(outcome.min_ttc),
+        "clearance_m": _finite(outcome.clearance),
+        "avoided_km_h": round(outcome.avoided_speed * KM_H, 2),
+        "brake_time_s": _finite(outcome.brake_time),
+    }
+
+
+def _finite(value: float) -> float | None:
+    return round(value, 3) if np.isfinite(value) else None
+
+
+def _choose(
+    table: EmergencyBraking, protocol: list[str] | None, weather: list[str] | None, brake: list[str] | None
+) -> dict[str, list[str]]:
+    known = {
+        "protocol": (protocol, list(table.protocols)),
+        "weather": (weather, list(table.weathers)),
+        "brake": (brake, list(type(table.brakes).model_fields)),
+    }
+    problems = [
+        f"--{name} {one}: there is none of this name; there are {', '.join(all_names)}"
+        for name, (asked, all_names) in known.items()
+        for one in asked or []
+        if one not in all_names
+    ]
+    if problems:
+        raise InputError(problems)
+    return {name: asked or all_names for name, (asked, all_names) in known.items()}
+
+
+def draw_page(result: dict[str, Any]) -> str:
+    """Return the page: impact speed by approach and weather for each brake, and the summary.
+
+    Parameters
+    ----------
+    result : of `compare_brakes`
+    """
+    rows = result["rows"]
+    weathers, brakes = (list(dict.fromkeys(row[key] for row in rows)) for key in ("weather", "brake"))
+    sections = [
+        Section(
+            title="Collisions",
+            parts=[
+                Table(
+                    rows=_tell_collisions(result["summary"], weathers),
+                    note="Approaches that end in a collision, of all of the protocol, by weather.",
+                )
+            ],
+        )
+    ]
+    for protocol, source in result["sources"].items():
+        some = [row for row in rows if row["protocol"] == protocol]
+        table = Table(
+            rows=_tell_impacts(some, brakes),
+            note="Speed over that of the target at the impact [km/h], red beyond what the rule allows; none is a dash.",
+            digits=3,
+        )
+        sections.append(
+            Section(title=protocol, parts=[source, *_plot_impacts(some, weathers, brakes), table])
+        )
+    return write_page(
+        "musync lab aeb",
+        "Emergency brakes by approach and weather",
+        sections,
+        lead=[
+            f"{result['vehicle']} in coupled mode, without pictures: the brake knows where its target is. Blind brakes"
+            " at a time to collision, friction at the way that the road asks for, driver after a reaction."
+        ],
+    )
+
+
+def _tell_collisions(summary: Sequence[dict[str, Any]], weathers: Sequence[str]) -> list[Any]:
+    told: dict[tuple[str, str], dict[str, Any]] = {}
+    for row in summary:
+        line = told.setdefault(
+            (row["protocol"], row["brake"]), {"protocol": row["protocol"], "brake": row["brake"]}
+        )
+        line[row["weather"]] = f"{row['collided']} of {row['approaches']}"
+    return list(told.values())
+
+
+def _tell_impacts(rows: Sequence[dict[str, Any]], brakes: Sequence[str]) -> list[Any]:
+    told: list[Any] = []
+    for brake in brakes:
+        told.append(brake)
+        lines: dict[str, dict[str, Any]] = {}
+        for row in (row for row in rows if row["brake"] == brake):
+            allowed, impact = row["allowed_km_h"], row["impact_speed_km_h"] or None
+            bad = allowed is not None and row["impact_speed_km_h"] > allowed
+            lines.setdefault(row["approach"], {"approach": row["approach"], "allowed": allowed})[
+                row["weather"]
+            ] = Cell(value=impact, tone="bad") if bad else impact
+        told += lines.values()
+    return told
+
+
+def _plot_impacts(
+    rows: Sequence[dict[str, Any]], weathers: Sequence[str], brakes: Sequence[str]
+) -> list[Figure]:
+    """Impact over approach speed with its band, a panel for each brake; none where all approaches have one speed."""
+    if len({row["speed_km_h"] for row in rows}) < 2:
+        return []
+    panels = []
+    for brake in brakes:
+        lines = []
+        for place, weather in enumerate(weathers):
+            some = [row for row in rows if (row["brake"], row["weather"]) == (brake, weather)]
+            band = {
+                side: [row[end] for row in some]
+                for side, end in (("low", "p05"), ("high", "p95"))
+                if some and end in some[0]
+            }
+            lines.append(
+                Line(
+                    name=weather, x=[row["speed_km_h"] for row in some], y=[row["impact_speed_km_h"] for row in some],
+                    style=pick_style(place), marked=True, **band,
+                )
+            )  # fmt: skip
+        panels.append(Panel(title=brake, x="approach [km/h]", y="impact [km/h]", lines=lines, least=5.0))
+    return [Figure(caption="Impact speed by approach and weather", panels=panels, columns=3)]
