@@ -2,8 +2,9 @@
 
 The discs of a generated street carry its colours down to some pixels of a 480x320 picture. Closer by, and with a longer
 focal length, the camera sees more: stones, sand, roughcast. Band-limited noise that is fixed to the world's coordinates
-modulates the blended colour there. Each octave fades in between two and four pixels a wave, so that no picture aliases,
-and a pixel's cost does not depend on the street.
+modulates the blended colour there. Each octave fades in between two and four pixels a wave. Ground that is seen at a
+flat angle shows the mean over the length that a pixel covers there: no picture aliases, so that grain moves as the
+world does. A pixel's cost does not depend on the street.
 """
 
 from dataclasses import replace
@@ -31,6 +32,8 @@ BRIGHTEST = 0.5
 _TILE = 256
 _TEXELS_A_WAVE = 3.0
 _PIXELS_A_WAVE = 2.0
+_WALL_FACING = 0.25
+"""Sine of the angle under which walls along a street are seen: flatter ones show no grain within this share [1]."""
 _UPRIGHT = np.arange(256) == SemanticClass.BUILDING
 _STRENGTH = np.array([DEVIATION.get(c, 0.0) for c in range(256)], dtype=np.float32)  # type: ignore[call-overload]
 
@@ -66,7 +69,6 @@ def add_grain(gbuffer: GBuffer, T_world_camera: NDArray[np.float64], K: NDArray[
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _modulate(rgb, depth, class_id, pose, K):  # type: ignore[no-untyped-def]
     height, width = depth.shape
-    size = _NOISE.shape[0]
     coarsest = WAVES[-1]
     for i in range(height):
         down = (i + 0.5 - K[1, 2]) / K[1, 1]
@@ -84,27 +86,44 @@ def _modulate(rgb, depth, class_id, pose, K):  # type: ignore[no-untyped-def]
             dy = pose[1, 0] * across + pose[1, 1] * down + pose[1, 2]
             dz = pose[2, 0] * across + pose[2, 1] * down + pose[2, 2]
             x, y, up = pose[0, 3] + z * dx, pose[1, 3] + z * dy, pose[2, 3] + z * dz
+            wide = z / K[0, 0]
             if _UPRIGHT[kind]:
-                u, v, facing = 0.8 * x + 0.6 * y, up, 0.45
+                u, v, along_u, along_v = 0.8 * x + 0.6 * y, up, 0.0, 0.0
+                samples, pixel = 1, wide / _WALL_FACING
             else:
-                u, v = x, y + up
-                facing = max(abs(dz) / np.sqrt(dx * dx + dy * dy + dz * dz), 0.02)
-            # between the pixel's width and its length on the surface: its length alone would blur the sides
-            pixel = z / K[0, 0] / facing**0.75
+                steep = max(abs(dz), 1e-3)
+                facing = steep / np.sqrt(dx * dx + dy * dy + steep * steep)
+                # by how much a pixel is longer on the surface than it is wide, the squares' difference
+                u, v, along_u, along_v = x, y + up, wide * dx / steep, wide * dy / steep
+                # between the pixel's width and its length on the surface; samples lie as far apart
+                pixel = wide / np.sqrt(facing)
+                samples = int(np.ceil(2 / np.sqrt(facing)))
             total = 0.0
             for k in range(len(WAVES)):
                 share = min(WAVES[k] / pixel / _PIXELS_A_WAVE - 1, 1.0)
-                if share <= 0:
-                    continue
-                a, b = u * _TEXELS_A_WAVE / WAVES[k], v * _TEXELS_A_WAVE / WAVES[k]
-                r, c = np.floor(a), np.floor(b)
-                ta, tb = a - r, b - c
-                r0, c0 = int(r) % size, int(c) % size
-                r1, c1 = (r0 + 1) % size, (c0 + 1) % size
-                total += share * (
-                    (1 - ta) * ((1 - tb) * _NOISE[r0, c0] + tb * _NOISE[r0, c1])
-                    + ta * ((1 - tb) * _NOISE[r1, c0] + tb * _NOISE[r1, c1])
-                )
+                if share > 0:
+                    total += share * _blur_along(u, v, along_u, along_v, samples, _TEXELS_A_WAVE / WAVES[k])
             gain = np.float32(max(1 + deviation * total, 0.3))
             for channel in range(3):
                 rgb[i, j, channel] *= gain
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _blur_along(u, v, along_u, along_v, samples, texels):  # type: ignore[no-untyped-def]
+    """Mean of the noise at a place, over a length to either side, weighted by a triangle [1]."""
+    size = _NOISE.shape[0]
+    total, weights = 0.0, 0.0
+    for n in range(samples):
+        t = (2 * n + 1) / samples - 1
+        a, b = (u + t * along_u) * texels, (v + t * along_v) * texels
+        r, c = np.floor(a), np.floor(b)
+        ta, tb = a - r, b - c
+        r0, c0 = int(r) % size, int(c) % size
+        r1, c1 = (r0 + 1) % size, (c0 + 1) % size
+        weight = 1 - abs(t)
+        weights += weight
+        total += weight * (
+            (1 - ta) * ((1 - tb) * _NOISE[r0, c0] + tb * _NOISE[r0, c1])
+            + ta * ((1 - tb) * _NOISE[r1, c0] + tb * _NOISE[r1, c1])
+        )
+    return total / weights

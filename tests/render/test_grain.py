@@ -1,5 +1,7 @@
 """Grain of near surfaces: fixed to the world, only where the camera resolves it, and of the mean that was there."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -52,3 +54,14 @@ def test_neighbouring_pixels_do_not_alias():
     grain = add_grain(*look_down(3.0, 100.0)).rgb[..., 0]
     away = grain - grain.mean()
     assert (away[:, 1:] * away[:, :-1]).mean() > 0.3 * (away**2).mean()
+
+
+def test_a_road_at_a_flat_angle_does_not_alias_along_its_length():
+    """Pixels one above the other share a part of the road, also where each covers many waves of its length."""
+    view, _, K = look_down(3.0, 400.0)
+    pose = np.array([[0.0, 0, 1, 3], [-1, 0, 0, 0], [0, -1, 0, 1.4], [0, 0, 0, 1]])
+    K[1, 2] = 0.5 - 70  # the horizon lies 70 rows above the picture: the road from 8 to 2.4 m
+    depth = np.repeat(1.4 * 400 / (np.arange(HEIGHT) + 0.5 - K[1, 2])[:, None], WIDTH, axis=1)
+    grain = add_grain(replace(view, depth=depth.astype(np.float32)), pose, K).rgb[..., 0]
+    for rows in np.split(grain - grain.mean(), 8):
+        assert (rows[1:] * rows[:-1]).mean() > 0.1 * (rows**2).mean() > 0

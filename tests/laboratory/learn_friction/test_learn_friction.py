@@ -9,7 +9,7 @@ import torch
 import musync
 from catalogs.entries import load
 from flows.making.generate import generate_dataset
-from studies.learn_friction.__main__ import GRID, open_made, paint_grid
+from studies.learn_friction.__main__ import GRID, STREETS, open_made, paint_grid
 from studies.learn_friction.baselines import describe_command, fit_ridge, predict_by_ridge
 from studies.learn_friction.comparison import PAINTED, compare_predictors, format_errors
 from studies.learn_friction.network import train_network
@@ -67,6 +67,19 @@ def test_the_shipped_grid_holds_out_whole_drives_farther_on(drawn: Samples) -> N
         rates[split].add((scenario.weather, scenario.precipitation_mm_h))
     assert max(onsets["train"]) + 4 <= min(onsets["test"]) and len(onsets["test"]) >= 5
     assert rates["test"] - rates["train"] == {("rain", 25.0), ("snow", 1.5)}
+
+
+def test_the_grid_of_streets_holds_out_whole_streets() -> None:
+    grid = load("grid", STREETS)
+    streets: dict[str, set[str]] = {"train": set(), "test": set()}
+    for (label, _), (split, _) in zip(grid.scenarios, grid.tags, strict=True):
+        streets[split].add(label.partition("/")[0])
+    assert (
+        len(streets["test"]) >= 4 and len(streets["train"]) >= 10 and not streets["train"] & streets["test"]
+    )
+    assert {name.partition("-")[0] for name in streets["test"]} <= {
+        name.partition("-")[0] for name in streets["train"]
+    }
 
 
 def test_the_tutorial_shows_the_grid_that_the_study_makes() -> None:
@@ -164,5 +177,5 @@ def test_the_comparison_judges_the_painted_world_by_what_the_car_does(drawn: Sam
 
 
 def test_a_dataset_of_another_grid_is_not_trained_on(toy_dataset):
-    with pytest.raises(InputError, match=r"must be the dataset of studies/learn_friction/grid\.yaml"):
+    with pytest.raises(InputError, match=r"must be the dataset of .*learn_friction/grid\.yaml"):
         open_made(str(toy_dataset.root))
