@@ -88,6 +88,8 @@ def read_driven(inputs: Path) -> DrivenClips | None:
         raise InputError(
             f"{file}: must hold the pressures of a drive: {str(error).splitlines()[0]}"
         ) from None
-    firsts = np.flatnonzero(np.concatenate([[True], labels[1:] != labels[:-1]])) if len(labels) else []
-    parts = np.split(values, firsts[1:]) if len(labels) else []
+    if not len(labels):
+        return DrivenClips(entry=entry, pressures={})
+    firsts = np.flatnonzero(np.concatenate([[True], labels[1:] != labels[:-1]]))
+    parts = np.split(values, firsts[1:])
     return DrivenClips(entry=entry, pressures=dict(zip(labels[firsts], parts, strict=True)))

@@ -101,7 +101,7 @@ def compare_brakes(
                         "weather": name,
                         "brake": kind,
                     }
-                    | _drive_case(car, state, case, kind, table, frictions if bounds else ())
+                    | _drive_case(car, state, case, kind, table, frictions.tolist() if bounds else ())
                 )
             advance(name)
     result = {
@@ -135,7 +135,7 @@ def drive_approach(
         ),
     )  # fmt: skip
     step = 1.0 / table.car.rate_hz.value
-    looks = case.track.follow(np.arange(drive.steps) * step)
+    looks = case.track.follow(np.arange(drive.steps, dtype=np.float64) * step)
     # until a brake acts the speed is held, and the car is where it would be: those steps are driven at once
     for held, target in enumerate(looks):
         bumper = overhang + case.speed * held * step
@@ -153,8 +153,10 @@ def drive_approach(
             break
         # a step holds one pressure: that of its middle
         drive.advance(line.pressure_at(time + 0.5 * step))
-    columns = (drive.read_column(name) for name in ("station", "speed", "brake_pressure_mpa"))
-    return judge_approach(*columns, case.track, overhang=overhang, width=width)
+    station, speeds, pressure = (
+        drive.read_column(name) for name in ("station", "speed", "brake_pressure_mpa")
+    )
+    return judge_approach(station, speeds, pressure, case.track, overhang=overhang, width=width)
 
 
 def make_brake(

@@ -3,6 +3,9 @@
 from dataclasses import fields, replace
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from catalogs.driven import DrivenClips, PolicyEntry, encode_driven
 from catalogs.entries import load
 from catalogs.grids import Grid
@@ -85,7 +88,7 @@ def _find_problems(grid: Grid, rate_hz: float) -> list[str]:
 
 def _drive_clips(
     grid: Grid, policy: Policy, rate_hz: float
-) -> tuple[dict[str, list[float]], list[dict[str, Any]]]:
+) -> tuple[dict[str, NDArray[np.float64]], list[dict[str, Any]]]:
     """Pressures of each clip by its label, and outcomes of the scenarios; the first is driven twice."""
     settings = grid.settings
     entries = read_entries(settings, {scenario.weather for _, scenario in grid.scenarios})
@@ -95,7 +98,7 @@ def _drive_clips(
         scene: grade_of(scene or settings.scene)
         for scene in {scenario.scene for _, scenario in grid.scenarios}
     }
-    driven: dict[str, list[float]] = {}
+    driven: dict[str, NDArray[np.float64]] = {}
     outcomes: list[dict[str, Any]] = []
     bumper = load("emergency braking").car
     with progress_bar("driven", len(grid.scenarios)) as advance:
@@ -116,6 +119,6 @@ def _drive_clips(
                 for number, (user, outcome) in enumerate(zip(scenario.objects, found, strict=True), start=1)
             ]
             for seed in range(settings.seed, settings.seed + settings.visual_seeds):
-                driven[name_clip(label, seed, settings.visual_seeds)] = pressures
+                driven[name_clip(label, seed, settings.visual_seeds)] = np.array(pressures)
             advance(label)
     return driven, outcomes

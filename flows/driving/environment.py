@@ -12,7 +12,7 @@ HIGHEST_MPA = 12.0
 MOST_TARGETS = 4
 
 
-class BrakingEnvironment(gymnasium.Env):  # type: ignore[misc]
+class BrakingEnvironment(gymnasium.Env):
     """Brake so that nothing is hit: an action in 0 to 1 is the pressure over `HIGHEST_MPA`.
 
     The observation is a dictionary: ``state`` (speed, acceleration, wheel speeds) and ``targets`` (distance, speed,

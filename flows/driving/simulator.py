@@ -92,9 +92,12 @@ class Simulator:
     ) -> None:
         self.scenario = asked = _check_scenario(scenario)
         car = vehicle if isinstance(vehicle, Vehicle) else load("vehicle", vehicle)
-        if not isinstance(surface, SurfaceParameters):
-            surface = load("wet friction").apply(load("surface", surface))
-        self.state = surface_of(asked, surface)
+        pavement = (
+            surface
+            if isinstance(surface, SurfaceParameters)
+            else load("wet friction").apply(load("surface", surface))
+        )
+        self.state = surface_of(asked, pavement)
         if grade is None:
             grade = LEVEL_ROAD if asked.scene in LEVEL_SCENES else grade_of(str(asked.scene))
         sizes = load("road user sizes") if asked.objects else {}
@@ -145,8 +148,13 @@ class Simulator:
         overhang : of the front bumper before the front axle [m]
         width : of the car [m]
         """
-        columns = [self.read_column(name) for name in ("station", "speed", "brake_pressure_mpa")]
-        return [judge_approach(*columns, track, overhang=overhang, width=width) for track in self._targets]
+        station, speed, pressure = (
+            self.read_column(name) for name in ("station", "speed", "brake_pressure_mpa")
+        )
+        return [
+            judge_approach(station, speed, pressure, track, overhang=overhang, width=width)
+            for track in self._targets
+        ]
 
     def _observe(self) -> Observation:
         drive = self._drive

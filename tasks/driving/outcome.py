@@ -53,7 +53,7 @@ def judge_approach(
     overhang : of the front bumper before the front axle [m]
     width : of the car [m]
     """
-    time = TICK_S * np.arange(len(station))
+    time = TICK_S * np.arange(len(station), dtype=np.float64)
     there, pace, aside = _place(track, time)
     gap, closing = there - station - overhang, speed - pace
     in_path = np.abs(aside) < 0.5 * (width + track.width)

@@ -4,12 +4,11 @@ The brake has the pressure a millisecond after it is told, and goes to it in the
 writes this down, and the rollout of that trace is the stepped drive bit for bit.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf, isfinite
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tasks.errors import InputError
 from tasks.surface.road_profile import FLAT_ROAD, LEVEL_ROAD, RoadGrade, RoadHazard
@@ -49,12 +48,12 @@ def count_ticks(rate_hz: float) -> int:
     return ticks
 
 
-def trace_pressures(pressures: Sequence[float], ticks_per_step: int) -> NDArray[np.float64]:
+def trace_pressures(pressures: ArrayLike, ticks_per_step: int) -> NDArray[np.float64]:
     """Return the pressure at the internal steps of a drive, float64 [N] [MPa].
 
     Parameters
     ----------
-    pressures : of the steps [MPa]
+    pressures : of the steps, [N] [MPa]
     ticks_per_step : ticks of a step [1]
     """
     told = np.repeat(np.asarray(pressures, np.float64), PER_TICK * ticks_per_step)
@@ -207,14 +206,14 @@ class SteppedDrive:
 
 
 def simulate_pressures(
-    vehicle: Vehicle, surface: SurfaceState, settings: DriveSettings, pressures: Sequence[float]
+    vehicle: Vehicle, surface: SurfaceState, settings: DriveSettings, pressures: ArrayLike
 ) -> Rollout:
     """Simulate the drive in which each step has its pressure: that of `SteppedDrive`, in one call.
 
     Parameters
     ----------
     vehicle, surface, settings : as of `SteppedDrive`
-    pressures : of the steps [MPa]
+    pressures : of the steps, [N] [MPa]
     """
     per_step, told = settings.ticks_per_step, np.flatnonzero(np.asarray(pressures) > 0)
     # half a step early: time is a whole number of steps, but for rounding
