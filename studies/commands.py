@@ -258,6 +258,23 @@ COMMANDS = (
         brief=show_table,
     ),
     Command(
+        name="lab real-photos",
+        group=KNOWN,
+        sentence="Train a small network with frames and ask it about your photographs of dry, wet and snowy roads.",
+        function="studies.real_photos.study:compare_with_photographs",
+        options=(
+            define_argument("photos", str, "Folder with the subfolders dry, wet and snow of photographs."),
+            define_argument("dataset", list[str], "Datasets with frames, in several weathers."),
+            define_option("out", str, "Folder for real_photos.json and real_photos.html."),
+            define_option(
+                "folder", list[str] | None, "CLASS=NAME: subfolder of a class with another name.", None
+            ),
+            define_option("seeds", int, "Networks of each kind of training.", 3, minimum=1),
+            define_option("frames", int, "Frames of each clip, at most.", 21, minimum=1),
+        ),
+        brief=select_keys("rows", "page"),
+    ),
+    Command(
         name="lab lineage",
         group=ORIGINS,
         sentence="List the catalogue lines, works and measured runs that the numbers of a clip rest on, by column.",

@@ -24,12 +24,14 @@ class Score:
     Parameters
     ----------
     training : what they were trained with
+    count : real photographs of a class among that [1]; None for all
     part : ``HELD_OUT`` or ``DEVELOPMENT``
     confusion : float64 [seed, true class, answer], each row a share [1]
     answers : int [seed, photograph], place of the class
     """
 
     training: str
+    count: int | None
     part: str
     confusion: NDArray[np.float64]
     answers: NDArray[np.int64]
@@ -69,34 +71,36 @@ def compare_trainings(
     steps : of a training [1]
     say : is told the name of each kind of training when it is done
     """
-    found: dict[tuple[str, str], list[NDArray[np.int64]]] = {}
+    found: dict[tuple[str, int | None, str], list[NDArray[np.int64]]] = {}
 
-    def ask(training: str, network) -> None:  # type: ignore[no-untyped-def]
+    def ask(training: str, count: int | None, network) -> None:  # type: ignore[no-untyped-def]
         for part, pictures in judged.items():
-            found.setdefault((training, part), []).append(network.predict(pictures))
+            found.setdefault((training, count, part), []).append(network.predict(pictures))
         say(training)
 
     tuning = max(1, steps * TUNING_STEPS // STEPS)
     for seed in seeds:
         zero_shot = train_network([ours], seed=seed, steps=steps)
-        ask(ZERO_SHOT, zero_shot)
+        ask(ZERO_SHOT, 0, zero_shot)
         for count in counts:
             few = rest.draw_each(count, 100 * seed + count)
-            ask(f"{count} real", train_network([few], seed=seed, steps=steps))
-            ask(f"{count} real and ours, mixed", train_network([few, ours], seed=seed, steps=steps))
+            ask(f"{count} real", count, train_network([few], seed=seed, steps=steps))
+            ask(f"{count} real and ours, mixed", count, train_network([few, ours], seed=seed, steps=steps))
             ask(
                 f"ours, then tuned with {count} real",
+                count,
                 continue_training(zero_shot, few, seed=seed, steps=tuning),
             )
-        ask("all real", train_network([rest], seed=seed, steps=steps))
+        ask("all real", None, train_network([rest], seed=seed, steps=steps))
     return [
         Score(
             training=training,
+            count=count,
             part=part,
             confusion=np.stack([measure_confusion(judged[part].label, one) for one in answers]),
             answers=np.stack(answers),
         )
-        for (training, part), answers in found.items()
+        for (training, count, part), answers in found.items()
     ]
 
 

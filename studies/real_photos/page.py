@@ -14,34 +14,20 @@ SHOWN = 8
 
 
 def list_scores(scores: Sequence[Score]) -> list[dict[str, Any]]:
-    """Return a row for each kind of training and judged part, as tables and JSON have it."""
+    """Return a row for each kind of training and judged part: ``part``, ``trained_on``, ``real_per_class``,
+    ``accuracy_mean`` and ``accuracy_sd`` over the seeds, and ``by_class``.
+    """
     return [
         {
-            "training": score.training,
             "part": score.part,
-            "accuracy": float(score.accuracies.mean()),
-            "deviation over seeds": float(score.accuracies.std(ddof=1))
-            if len(score.accuracies) > 1
-            else None,
-            **{kind: float(share) for kind, share in zip(CLASSES, score.by_class, strict=True)},
+            "trained_on": score.training,
+            "real_per_class": score.count,
+            "accuracy_mean": float(score.accuracies.mean()),
+            "accuracy_sd": float(score.accuracies.std(ddof=1)) if len(score.accuracies) > 1 else None,
+            "by_class": {kind: float(share) for kind, share in zip(CLASSES, score.by_class, strict=True)},
         }
         for score in scores
     ]
-
-
-def format_scores(scores: Sequence[Score]) -> str:
-    """Return the table for a terminal."""
-    lines = [
-        f"{'training':34}{'part':13}{'accuracy':>9}{'+-':>6}" + "".join(f"{kind:>6}" for kind in CLASSES)
-    ]
-    for row in list_scores(scores):
-        spread = row["deviation over seeds"]
-        lines.append(
-            f"{row['training']:34}{row['part']:13}{row['accuracy']:9.3f}"
-            f"{'' if spread is None else format(spread, '.3f'):>6}"
-            + "".join(f"{row[kind]:6.2f}" for kind in CLASSES)
-        )
-    return "\n".join(lines)
 
 
 def write_study_page(
@@ -57,11 +43,15 @@ def write_study_page(
     facts : what was read, by name
     """
     zero = next(score for score in scores if score.training == ZERO_SHOT and score.part == HELD_OUT)
-    rows = list_scores(scores)
+    rows = [row | row["by_class"] for row in list_scores(scores)]
     tables = [
         Table(
             title=f"Photographs: {part}",
-            rows=[{k: v for k, v in row.items() if k != "part"} for row in rows if row["part"] == part],
+            rows=[
+                {k: v for k, v in row.items() if k not in {"part", "by_class"}}
+                for row in rows
+                if row["part"] == part
+            ],
             digits=3,
         )
         for part in (HELD_OUT, DEVELOPMENT)

@@ -126,4 +126,4 @@ def _is_surrounded(gaussians: Gaussians) -> NDArray[np.bool_]:
 def _is_lit(gaussians: Gaussians) -> NDArray[np.bool_]:
     if gaussians.light is None:
         return np.ones(len(gaussians), dtype=np.bool_)
-    return ((gaussians.light >= 0) & (gaussians.light <= 1)).all(axis=1)
+    return (gaussians.light.min(axis=1) >= 0) & (gaussians.light.max(axis=1) <= 1)

@@ -115,7 +115,7 @@ PLACES: tuple[tuple[str, str, tuple, object], ...] = (
     ("weather", "0/ice.yaml", ("surface", "glaze_mm", "unit"), "furlong"),
     ("weather", "0/ice.yaml", ("surface", "glaze_mm"), {"no_such_key": 1}),
     ("weather", "0/ice.yaml", ("tyre", "efficiency", "value", 0), INF),
-    ("weather", "0/rain.yaml", ("exposure_ev", "unit"), ""),
+    ("weather", "0/rain.yaml", ("anchors_mm_h", "unit"), ""),
     ("weather", "0/rain.yaml", ("particles", "slope", "source"), 7),
     ("video's camera", "0/camera.yaml", ("width",), 0.5),
     ("video's camera", "0/camera.yaml", ("height",), True),

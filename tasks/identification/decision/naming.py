@@ -15,7 +15,6 @@ from tasks.identification.decision.candidates import Candidate
 from tasks.identification.decision.comparison import compare_explanations, temper_odds
 from tasks.identification.decision.forms import KNOTS, find_scanned_ranges, make_form_hypotheses
 from tasks.identification.decision.odds import (
-    LEVELS,
     Explanation,
     RunGrams,
     can_stand_for,
@@ -35,6 +34,8 @@ from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.ports import PORT_UNITS
 
 FELT = CHANNELS.index("longitudinal_acceleration")
+FRICTION_LEVEL = "retuned_friction_level"
+"""Number of the file that a form of friction with one value everywhere is too."""
 STEPS = 8
 """Gauss-Newton steps of a last fit [1]."""
 MOST_REFINED = 4
@@ -131,7 +132,7 @@ def _find_varying(finding: Finding, first: OpenExplanation) -> OpenExplanation |
     varying = [
         weigh_explanation(grams, [*(m for m in first.named if m is not level), form], spread=False)
         for level in first.named
-        if level.name in LEVELS
+        if level.name == FRICTION_LEVEL
         for form in grams.columns.candidates
         if form.effect is None and can_stand_for(form, level)
     ]

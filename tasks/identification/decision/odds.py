@@ -27,8 +27,6 @@ PORT_OF_NUMBER = {
     "retuned_grade": "longitudinal_force",
 }  # fmt: skip
 """Port at which a number of the vehicle's file acts."""
-LEVELS = {"retuned_friction_level", "retuned_pressure_gain", "retuned_grade"}
-"""Numbers that a form with one value everywhere is too."""
 SAME_VARIABLE = {"speed": "wheel_speed", "wheel_speed": "speed"}
 """Variables that differ by the slip of the tyres alone."""
 FEWEST = 3

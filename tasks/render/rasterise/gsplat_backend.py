@@ -172,7 +172,7 @@ class GsplatBackend:
         if not bodies:
             return prepared
         clouds = [*(self._stand(body, prepared.sh.shape[1]) for body in bodies), prepared]
-        tensors = {
+        tensors: dict[str, Any] = {
             field.name: torch.cat([getattr(cloud, field.name) for cloud in clouds])
             for field in fields(DeviceGaussians)
             if isinstance(getattr(prepared, field.name), torch.Tensor)

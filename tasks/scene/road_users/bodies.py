@@ -79,7 +79,8 @@ def build_road_user(kind: str, size: Floats, cell: float = FINEST_M) -> RoadUser
     cell : spacing of a vehicle's discs; a person's are finer [m]
     """
     if kind in VEHICLES:
-        body = build_body(kind, *size.tolist(), colour=PAINTS[kind], cell=cell)
+        length, width, height = size.tolist()
+        body = build_body(kind, length, width, height, colour=PAINTS[kind], cell=cell)
         red = np.array(FINISHES[Part.TAIL_LAMP].albedo)
         lamps = (np.abs(body.albedo - red).max(axis=1) < 1e-6) & (body.gaussians.means[:, 0] < 0)
     else:

@@ -1,7 +1,6 @@
 """What our frames are worth on real photographs: parts that share nothing, fair draws, and scores that tell."""
 
 import json
-import sys
 
 import cv2
 import numpy as np
@@ -9,7 +8,6 @@ import pytest
 import torch
 
 import musync
-from studies.real_photos.__main__ import PAGE, REPORT, read_folder_names, run_study
 from studies.real_photos.comparison import (
     DEVELOPMENT,
     HELD_OUT,
@@ -27,6 +25,7 @@ from studies.real_photos.pictures import (
     read_photographs,
     split_photographs,
 )
+from studies.real_photos.study import PAGE, REPORT, compare_with_photographs, read_folder_names
 
 LOOKS = {"dry": (0, 1), "wet": (1, 0), "snow": (1, 1)}
 """Whether the drawn photographs of each class have stripes along each axis [1]."""
@@ -133,7 +132,7 @@ def test_a_confusion_counts_true_classes_in_rows_and_the_score_is_their_mean() -
     label, answer = np.array([0, 0, 0, 0, 1, 1, 2]), np.array([0, 0, 0, 2, 1, 0, 2])
     table = measure_confusion(label, answer)
     assert table.tolist() == [[0.75, 0, 0.25], [0.5, 0.5, 0], [0, 0, 1]]
-    score = Score(training="any", part=HELD_OUT, confusion=table[None], answers=answer[None])
+    score = Score(training="any", count=0, part=HELD_OUT, confusion=table[None], answers=answer[None])
     assert score.accuracies.tolist() == [0.75] and score.by_class.tolist() == [0.75, 0.5, 1]
 
 
@@ -153,20 +152,19 @@ def test_real_photographs_teach_and_frames_whose_labels_are_wrong_teach_the_wron
 
 
 def test_the_study_writes_report_and_page_and_writes_the_same_again(
-    photographs, tmp_path, monkeypatch, capsys
+    photographs, tmp_path, monkeypatch
 ) -> None:
     pictures, _ = read_photographs(photographs, {})
-    monkeypatch.setattr("studies.real_photos.__main__.read_frames", lambda *_, **__: pictures)
+    monkeypatch.setattr("studies.real_photos.study.read_frames", lambda *_, **__: pictures)
     monkeypatch.setattr(musync, "open", lambda place: place)
-    given = [str(photographs), "ours", "--seeds", "1", "--counts", "2", "--steps", "5", "--out"]
     reports = []
     for name in ("one", "two"):
-        monkeypatch.setattr(sys, "argv", ["real_photos", *given, str(tmp_path / name)])
-        run_study()
-        reports.append((tmp_path / name / REPORT).read_bytes())
+        out = tmp_path / name
+        compare_with_photographs(str(photographs), ["ours"], out=str(out), seeds=1, counts=[2], steps=5)
+        reports.append((out / REPORT).read_bytes())
     assert reports[0] == reports[1]
     told = json.loads(reports[0])
-    assert told["facts"]["held out"] == 12 and len(told["scores"]) == 2 * 5
+    assert told["facts"]["held out"] == 12 and len(told["rows"]) == 2 * 5
+    assert {row["real_per_class"] for row in told["rows"]} == {0, 2, None}
     page = (tmp_path / "one" / PAGE).read_text()
     assert page.count("data:image/jpeg") == 3 * (8 + 4 + 4) and "keep" not in page.split("<body", 1)[0]
-    assert f"{ZERO_SHOT:34}{HELD_OUT:13}" in capsys.readouterr().out

@@ -135,9 +135,8 @@ def snow_layer(
     xi = coverage_rank(field, lay)
     share = covered_share(xi, amount.coverage, p.edge)
     on = share * gaussians.opacities[anchors.index] > 1 / 255
-    index, normal, flat, share, tracks = (
-        one[on] for one in (anchors.index, anchors.normal, anchors.flat, share, lay.tracks)
-    )
+    index, normal, flat = anchors.index[on], anchors.normal[on], anchors.flat[on]
+    share, tracks = share[on], lay.tracks[on]
     depth = local_depth_mm(xi[on], amount, p.edge)
     place = gaussians.means[index].astype(np.float64)
     scales, quats = _lying(gaussians, index, normal, flat)
