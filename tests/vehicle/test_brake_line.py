@@ -6,6 +6,7 @@ from math import exp
 import numpy as np
 import pytest
 
+from tasks.surface.wet_friction import ANY_SPEED
 from tasks.vehicle.effects.brake_line import (
     DISC_COOLING,
     compute_acting_pressure,
@@ -34,7 +35,7 @@ def coupled(drive, vehicle):
 def test_with_no_numbers_the_acting_pressure_is_the_commanded_one():
     assert compute_acting_pressure(2.345, 17.0, 300.0, theta()) == 2.345
     assert compute_line_pressure(1.0, 2.0, 2.345, 5e-4, theta()) == 2.345
-    assert compute_friction_factor(theta(), 30.0, 1.4, 1e5, 1.0) == 1.0
+    assert compute_friction_factor(theta(), 30.0, 1.4, 1e5, 1.0, ANY_SPEED) == 1.0
 
 
 def test_each_number_of_the_line_does_what_it_says():
@@ -119,4 +120,4 @@ def test_struts_meet_friction_and_a_stop():
 
 def test_friction_falls_with_speed_and_load():
     effects = theta(friction_speed=0.01, load_sensitivity=0.15)
-    assert compute_friction_factor(effects, 20.0, 1.2, 0.0, 0.0) == pytest.approx(0.8 * 0.97)
+    assert compute_friction_factor(effects, 20.0, 1.2, 0.0, 0.0, ANY_SPEED) == pytest.approx(0.8 * 0.97)
