@@ -15,7 +15,6 @@ from tasks.scene.road_users.track import Track
 ROAD_USERS = "road_users.yaml"
 """Name among a dataset's kept inputs, where its grid has road users."""
 Kind = Literal["car", "van", "truck", "adult", "child", "bicycle"]
-KM_H = 3.6
 LONGEST_M = 30.0
 """Greatest side of a body [m]: longer than any road train of Council Directive 96/53/EC."""
 BODIES = "bodies"
@@ -180,10 +179,10 @@ class RoadUser(_Form):
             start=start,
             heading=heading,
             in_world=form.world_m is not None,
-            speed=form.speed_km_h / KM_H,
+            speed=form.speed_km_h / 3.6,
             change_at=inf if form.change_at_s is None else form.change_at_s,
             acceleration=form.acceleration_m_s2 or 0.0,
-            final_speed=(form.until_km_h or 0.0) / KM_H,
+            final_speed=(form.until_km_h or 0.0) / 3.6,
         )
 
 

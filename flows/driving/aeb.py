@@ -11,9 +11,8 @@ import numpy as np
 from catalogs.emergency_braking import EmergencyBraking, ProtocolEntry
 from catalogs.entries import load
 from catalogs.scenario import Scenario
+from flows.driving.aeb_page import draw_page
 from flows.making.driving import surface_of, weather_of
-from flows.pages.figures import Figure, Line, Panel, pick_style
-from flows.pages.writer import Cell, Section, Table, write_page
 from flows.running.progress import progress_bar
 from flows.store.outputs import Outputs
 from tasks.driving.brakes import (
@@ -24,7 +23,7 @@ from tasks.driving.brakes import (
     FrictionTrigger,
     Trigger,
 )
-from tasks.driving.outcome import Outcome, judge_approach
+from tasks.driving.outcome import Outcome, describe_outcome, judge_approach
 from tasks.driving.stepped import DriveSettings, SteppedDrive
 from tasks.driving.targets import TargetTrack
 from tasks.errors import InputError
@@ -35,7 +34,6 @@ from tasks.vehicle.parameters import Vehicle, compute_surface_response
 
 PERCENTILES = (5, 50, 95)
 LONGEST_S = 30.0
-KM_H = 3.6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,7 +96,7 @@ def compare_brakes(
                     {
                         "protocol": case.protocol,
                         "approach": case.name,
-                        "speed_km_h": round(case.speed * KM_H, 6),
+                        "speed_km_h": round(case.speed * 3.6, 6),
                         "weather": name,
                         "brake": kind,
                     }
@@ -211,7 +209,7 @@ def list_cases(protocol: str, entry: ProtocolEntry, overhang: float) -> Iterator
     """
     target = entry.target
     for place, speed_km_h in enumerate(entry.speeds_km_h):
-        speed, pace = speed_km_h / KM_H, target.speed_km_h / KM_H
+        speed, pace = speed_km_h / 3.6, target.speed_km_h / 3.6
         allowed = entry.allowed_km_h[place] if entry.allowed_km_h else None
         if entry.begins_s is None:
             for gap, slows in product(target.gaps_m, target.decelerations):
@@ -224,7 +222,7 @@ def list_cases(protocol: str, entry: ProtocolEntry, overhang: float) -> Iterator
             continue
         gap = (speed - pace) * entry.begins_s
         if target.crosses_km_h:
-            across = target.crosses_km_h / KM_H
+            across = target.crosses_km_h / 3.6
             track = TargetTrack(
                 station=overhang + gap, speed=across, heading=pi / 2, lateral=-across * entry.begins_s,
                 width=target.width_m,
@@ -277,35 +275,14 @@ def _drive_case(
         return drive_approach(car, road, case, *make_brake(kind, car, road, table), table)
 
     outcome = drive_on(state)
-    spread = [drive_on(replace(state, friction=float(mu))).impact_speed * KM_H for mu in frictions]
+    spread = [drive_on(replace(state, friction=float(mu))).impact_speed * 3.6 for mu in frictions]
     ends = sorted(spread) if spread else []
     return {
         "friction": round(state.friction, 4),
-        **tell_outcome(outcome),
+        **describe_outcome(outcome),
         **{f"p{p:02d}": round(v, 2) for p, v in zip(PERCENTILES, ends, strict=False)},
         "allowed_km_h": case.allowed_km_h,
     }
-
-
-def tell_outcome(outcome: Outcome) -> dict[str, Any]:
-    """Return an outcome in the units that people read; None for what there is not.
-
-    Parameters
-    ----------
-    outcome : of an approach
-    """
-    return {
-        "collided": outcome.collided,
-        "impact_speed_km_h": round(outcome.impact_speed * KM_H, 2),
-        "min_ttc_s": _finite(outcome.min_ttc),
-        "clearance_m": _finite(outcome.clearance),
-        "avoided_km_h": round(outcome.avoided_speed * KM_H, 2),
-        "brake_time_s": _finite(outcome.brake_time),
-    }
-
-
-def _finite(value: float) -> float | None:
-    return round(value, 3) if np.isfinite(value) else None
 
 
 def _choose(
@@ -325,95 +302,3 @@ def _choose(
     if problems:
         raise InputError(problems)
     return {name: asked or all_names for name, (asked, all_names) in known.items()}
-
-
-def draw_page(result: dict[str, Any]) -> str:
-    """Return the page: impact speed by approach and weather for each brake, and the summary.
-
-    Parameters
-    ----------
-    result : of `compare_brakes`
-    """
-    rows = result["rows"]
-    weathers, brakes = (list(dict.fromkeys(row[key] for row in rows)) for key in ("weather", "brake"))
-    sections = [
-        Section(
-            title="Collisions",
-            parts=[
-                Table(
-                    rows=_tell_collisions(result["summary"], weathers),
-                    note="Approaches that end in a collision, of all of the protocol, by weather.",
-                )
-            ],
-        )
-    ]
-    for protocol, source in result["sources"].items():
-        some = [row for row in rows if row["protocol"] == protocol]
-        table = Table(
-            rows=_tell_impacts(some, brakes),
-            note="Speed over that of the target at the impact [km/h], red beyond what the rule allows; none is a dash.",
-            digits=3,
-        )
-        sections.append(
-            Section(title=protocol, parts=[source, *_plot_impacts(some, weathers, brakes), table])
-        )
-    return write_page(
-        "musync lab aeb",
-        "Emergency brakes by approach and weather",
-        sections,
-        lead=[
-            f"{result['vehicle']} in coupled mode, without pictures: the brake knows where its target is. Blind brakes"
-            " at a time to collision, friction at the way that the road asks for, driver after a reaction."
-        ],
-    )
-
-
-def _tell_collisions(summary: Sequence[dict[str, Any]], weathers: Sequence[str]) -> list[Any]:
-    told: dict[tuple[str, str], dict[str, Any]] = {}
-    for row in summary:
-        line = told.setdefault(
-            (row["protocol"], row["brake"]), {"protocol": row["protocol"], "brake": row["brake"]}
-        )
-        line[row["weather"]] = f"{row['collided']} of {row['approaches']}"
-    return list(told.values())
-
-
-def _tell_impacts(rows: Sequence[dict[str, Any]], brakes: Sequence[str]) -> list[Any]:
-    told: list[Any] = []
-    for brake in brakes:
-        told.append(brake)
-        lines: dict[str, dict[str, Any]] = {}
-        for row in (row for row in rows if row["brake"] == brake):
-            allowed, impact = row["allowed_km_h"], row["impact_speed_km_h"] or None
-            bad = allowed is not None and row["impact_speed_km_h"] > allowed
-            lines.setdefault(row["approach"], {"approach": row["approach"], "allowed": allowed})[
-                row["weather"]
-            ] = Cell(value=impact, tone="bad") if bad else impact
-        told += lines.values()
-    return told
-
-
-def _plot_impacts(
-    rows: Sequence[dict[str, Any]], weathers: Sequence[str], brakes: Sequence[str]
-) -> list[Figure]:
-    """Impact over approach speed with its band, a panel for each brake; none where all approaches have one speed."""
-    if len({row["speed_km_h"] for row in rows}) < 2:
-        return []
-    panels = []
-    for brake in brakes:
-        lines = []
-        for place, weather in enumerate(weathers):
-            some = [row for row in rows if (row["brake"], row["weather"]) == (brake, weather)]
-            band = {
-                side: [row[end] for row in some]
-                for side, end in (("low", "p05"), ("high", "p95"))
-                if some and end in some[0]
-            }
-            lines.append(
-                Line(
-                    name=weather, x=[row["speed_km_h"] for row in some], y=[row["impact_speed_km_h"] for row in some],
-                    style=pick_style(place), marked=True, **band,
-                )
-            )  # fmt: skip
-        panels.append(Panel(title=brake, x="approach [km/h]", y="impact [km/h]", lines=lines, least=5.0))
-    return [Figure(caption="Impact speed by approach and weather", panels=panels, columns=3)]

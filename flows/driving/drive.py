@@ -7,7 +7,6 @@ from catalogs.driven import DrivenClips, PolicyEntry, encode_driven
 from catalogs.entries import load
 from catalogs.grids import Grid
 from catalogs.sentences import cap_problems
-from flows.driving.aeb import tell_outcome
 from flows.driving.policy import Policy, drive_with, load_policy
 from flows.driving.simulator import UNBRAKED, Simulator
 from flows.making.generate import generate_dataset
@@ -15,6 +14,7 @@ from flows.making.grid_entries import read_entries
 from flows.making.plan import name_clip
 from flows.making.request import list_facts
 from flows.running.progress import progress_bar
+from tasks.driving.outcome import describe_outcome
 from tasks.driving.stepped import TICKS_PER_S, count_ticks
 from tasks.errors import InputError
 
@@ -108,7 +108,7 @@ def _drive_clips(
                 )
             found = simulator.judge(bumper.overhang_m.value, bumper.width_m.value)
             outcomes += [
-                {"scenario": label, "number": number, "kind": user.kind} | tell_outcome(outcome)
+                {"scenario": label, "number": number, "kind": user.kind} | describe_outcome(outcome)
                 for number, (user, outcome) in enumerate(zip(scenario.objects, found, strict=True), start=1)
             ]
             for seed in range(settings.seed, settings.seed + settings.visual_seeds):

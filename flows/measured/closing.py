@@ -23,7 +23,7 @@ from tasks.campaign.braking_heat import estimate_disc_temperatures
 from tasks.campaign.campaign import CHANNELS, FILE_NUMBERS, SESSION, Campaign
 from tasks.identification.decision.answer import ChannelError, NamedEffect, Parameter, Verdict
 from tasks.identification.decision.excitation import find_reached_range
-from tasks.identification.decision.naming import measure_force
+from tasks.identification.decision.settling import measure_force
 from tasks.identification.decision.verdict import Outcome, judge_runs
 from tasks.identification.decision.words import describe_effect, describe_verdict, join_phrases, list_unshared
 from tasks.vehicle.effects.library import Effect

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from math import cos, inf, nan, sin
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,3 +96,24 @@ def _find_unbraked_impact(speed: float, bumper: float, track: TargetTrack, width
     if not passed.size or abs(aside[passed[0]]) >= 0.5 * (width + track.width):
         return 0.0
     return max(speed - float(pace[passed[0]]), 0.0)
+
+
+def describe_outcome(outcome: Outcome) -> dict[str, Any]:
+    """Return an outcome in the units that people read; None for what there is not.
+
+    Parameters
+    ----------
+    outcome : of an approach
+    """
+    return {
+        "collided": outcome.collided,
+        "impact_speed_km_h": round(outcome.impact_speed * 3.6, 2),
+        "min_ttc_s": _finite(outcome.min_ttc),
+        "clearance_m": _finite(outcome.clearance),
+        "avoided_km_h": round(outcome.avoided_speed * 3.6, 2),
+        "brake_time_s": _finite(outcome.brake_time),
+    }
+
+
+def _finite(value: float) -> float | None:
+    return round(value, 3) if np.isfinite(value) else None

@@ -14,20 +14,14 @@ from tasks.identification.decision.correlation import correlate_residual_with_pr
 from tasks.identification.decision.experiment import Experiment, plan_next_experiment
 from tasks.identification.decision.held_out import compute_held_out_errors
 from tasks.identification.decision.log_faults import describe_inputs, describe_log_faults
-from tasks.identification.decision.naming import (
-    estimate_signature_share,
-    find_detectable_sizes,
-    fit_told,
-    list_calibrated,
-    name_members,
-    settle_told,
-)
+from tasks.identification.decision.naming import find_detectable_sizes, list_calibrated, name_members
 from tasks.identification.decision.open_explanations import (
     OpenExplanation,
     list_open_explanations,
     select_members,
 )
 from tasks.identification.decision.search import Finding, find_explanations
+from tasks.identification.decision.settling import estimate_signature_share, fit_named, settle_named
 from tasks.identification.decision.words import (
     describe_driven,
     describe_foreign,
@@ -105,7 +99,7 @@ def judge_runs(
     if foreign:
         nothing = next(e for e in finding.explanations if not e.members)
         opened = [OpenExplanation(explanation=nothing, named=(), log_odds=0.0)]
-    opened, fitted = settle_told(finding, opened, rules)
+    opened, fitted = settle_named(finding, opened, rules)
     first, *others = opened
     evidence = finding.evidence
     share = estimate_signature_share(finding, first, rules)
@@ -209,7 +203,7 @@ def _plan(
     if len(opened) > 1:
         first, other = (explanation.names for explanation in opened[:2])
         between = tuple(" and ".join(sorted(own)) or "nothing" for own in (first - other, other - first))
-        pair = (fitted, fit_told(finding, opened[1]))
+        pair = (fitted, fit_named(finding, opened[1]))
     elif opened[0].named:
         return None
     else:
@@ -217,7 +211,7 @@ def _plan(
         if suggested is None:
             return None
         between = (suggested.named[0].name, "the model as it stands")
-        pair = (fit_told(finding, suggested), finding.null)
+        pair = (fit_named(finding, suggested), finding.null)
     return plan_next_experiment(
         finding.evidence, *pair, (between[0], between[1]), vehicle, surface, brake_signal
     )

@@ -1,4 +1,4 @@
-"""What is told stays told only where the last fit, which reports it, agrees."""
+"""What is named stays named only where the last fit, which reports it, agrees."""
 
 from types import SimpleNamespace
 
@@ -7,7 +7,7 @@ import pytest
 
 from catalogs.entries import load
 from tasks.campaign.campaign import SESSION
-from tasks.identification.decision import naming
+from tasks.identification.decision import settling
 from tasks.identification.decision.odds import search_explanations
 from tasks.identification.decision.open_explanations import list_open_explanations
 from tests.identification.explained import effect_of, form_of, grams_of
@@ -23,9 +23,9 @@ def settle(monkeypatch, grams, most=1, **fit):
     }  # fmt: skip
     fitted = SimpleNamespace(**(plain | fit))
     opened = list_open_explanations(grams, search_explanations(grams, most=most, width=8), RULES)
-    monkeypatch.setattr(naming, "fit_told", lambda finding, opened: fitted)
-    monkeypatch.setattr(naming, "refine_fit", lambda finding, fitted: fitted)
-    return naming.settle_told(SimpleNamespace(grams=grams, null=fitted), opened, RULES)[0]
+    monkeypatch.setattr(settling, "fit_named", lambda finding, opened: fitted)
+    monkeypatch.setattr(settling, "refine_fit", lambda finding, fitted: fitted)
+    return settling.settle_named(SimpleNamespace(grams=grams, null=fitted), opened, RULES)[0]
 
 
 @pytest.mark.parametrize(("value", "scatter", "told"), [(-1.5, 0.0, 0), (-2.5, 0.0, 1), (-2.5, 1.0, 0)])
@@ -71,7 +71,7 @@ def test_values_are_known_as_well_as_the_signature_where_runs_disagree_with_the_
         residuals = [np.array([sign * size, 0.0]) for sign in (1.0, -1.0, 1.0, -1.0)]
         grams = grams_of([lag], designs, residuals)
         opened = SimpleNamespace(explanation=search_explanations(grams, most=0, width=1)[0])
-        shares.append(naming.estimate_signature_share(SimpleNamespace(grams=grams), opened, RULES))
+        shares.append(settling.estimate_signature_share(SimpleNamespace(grams=grams), opened, RULES))
     assert shares == pytest.approx([0.0, 0.0, 0.1 * np.sqrt(0.5625), 0.1], abs=1e-6)
 
 
@@ -106,9 +106,9 @@ def test_a_number_of_the_file_is_held_against_a_form_of_its_port_through_the_sim
 
     opened = list_open_explanations(grams, search_explanations(grams, most=1, width=8), RULES)
     assert opened[0].names == {level.name}
-    monkeypatch.setattr(naming, "fit_told", fit)
-    monkeypatch.setattr(naming, "refine_fit", lambda finding, fitted: fitted)
+    monkeypatch.setattr(settling, "fit_named", fit)
+    monkeypatch.setattr(settling, "refine_fit", lambda finding, fitted: fitted)
     null = SimpleNamespace(objective=0.0)
     finding = SimpleNamespace(grams=grams, null=null, evidence=SimpleNamespace(train=[None] * 4))
-    settled, _ = naming.settle_told(finding, opened[:1], RULES)
+    settled, _ = settling.settle_named(finding, opened[:1], RULES)
     assert [set(one.names) for one in settled] == names
