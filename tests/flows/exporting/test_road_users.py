@@ -11,8 +11,12 @@ import musync
 from catalogs.entries import load
 from flows.auditing.audit import audit_dataset
 from flows.exporting.export import export_dataset
+from flows.judging.judged_clip import View
+from flows.making import gate
+from flows.making.catalogue import catalogue_of
 from flows.making.generate import generate_dataset
 from flows.store.layout import Layout
+from tasks.errors import InputError
 from tests.toy_street import write_toy_grid
 
 GRID = """\
@@ -245,3 +249,21 @@ def test_lerobot_has_the_environment(export, rows):
         yaw = {CAR: 0, ADULT: np.pi / 2}[number]
         wanted = [1, *row.centre_rig, yaw, *row.velocity_rig, *row["size"]]
         np.testing.assert_allclose(own, wanted, atol=2e-3)
+
+
+def test_no_check_reads_the_depth_of_what_moves(made, data, masks, monkeypatch):
+    index = data["lead"].record["index"]
+    stored = {name: np.asarray(data.frames[name][index]) for name in ("rgb", "depth", "class", "instance")}
+    assert np.isfinite(stored["depth"][masks > 0]).any()
+    seen = []
+
+    def keep(pinhole, *_):
+        seen.append(pinhole["depth"])
+        raise InputError("enough")
+
+    monkeypatch.setattr(gate, "prepare_for_checks", keep)
+    with pytest.raises(InputError, match="enough"):
+        gate.judge_motion(stored, {}, 0.0, catalogue_of(made))
+    for depth in (*seen, View(made).arrays(index, "depth")[0]):
+        assert np.isnan(depth[masks > 0]).all()
+        np.testing.assert_array_equal(depth[masks == 0], stored["depth"][masks == 0])
