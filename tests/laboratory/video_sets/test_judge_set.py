@@ -11,16 +11,16 @@ import pyarrow.parquet as pq
 import pytest
 import yaml
 
-from benchmarks.synthetic_street import (
+from catalogs.learned_judges import LoadedJudge
+from flows.judging.foreign import read_claim
+from flows.judging.foreign_sources import read_camera
+from flows.judging.learned_rows import score_pictures
+from studies.synthetic_street import (
     drive_clip,
     hump_drive,
     make_mount,
     rig_poses,
 )
-from catalogs.learned_judges import LoadedJudge
-from flows.judging.foreign import read_claim
-from flows.judging.foreign_sources import read_camera
-from flows.judging.learned_rows import score_pictures
 from studies.video_sets.files import SetClip, find_set
 from studies.video_sets.judge_set import format_cell, judge_video_set
 from studies.video_sets.motion import JudgedSet, look_at_clip
