@@ -9,8 +9,8 @@ import pytest
 import torch
 
 from catalogs.entries import load
-from catalogs.learned_judges import load_judges
-from flows.judging.learned_rows import learned_rows
+from studies.evaluation.learned_judges import load_judges
+from studies.evaluation.learned_rows import learned_rows
 from tasks.errors import InputError
 from tasks.eval.learned_scores import (
     CLIP_MEAN,

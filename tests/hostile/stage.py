@@ -15,10 +15,10 @@ import musync
 from flows.auditing.audit import audit_dataset
 from flows.auditing.dataset_diff import compare_datasets
 from flows.auditing.explain import explain_frame
+from flows.auditing.physics import audit_physics
 from flows.auditing.repair import repair_dataset
 from flows.auditing.signing import sign_dataset
 from flows.auditing.verify import collect_garbage, verify_dataset
-from flows.judging.physics import audit_physics
 from flows.making.generate import generate_dataset
 from flows.reading.describe import describe_dataset
 from flows.reading.previews import make_films

@@ -13,10 +13,10 @@ from typer.testing import CliRunner
 from flows.auditing.audit import audit_dataset
 from flows.auditing.dataset_diff import compare_datasets
 from flows.auditing.explain import explain_frame
+from flows.auditing.physics import audit_physics
 from flows.auditing.repair import repair_dataset
 from flows.auditing.verify import verify_dataset
 from flows.cli import app
-from flows.judging.physics import audit_physics
 from flows.reading.previews import make_films
 from flows.reading.report import make_report
 from flows.reading.sheets import draw_sheets

@@ -11,10 +11,10 @@ import pyarrow.parquet as pq
 import pytest
 import yaml
 
-from catalogs.learned_judges import LoadedJudge
-from flows.judging.foreign import read_claim
-from flows.judging.foreign_sources import read_camera
-from flows.judging.learned_rows import score_pictures
+from studies.evaluation.learned_judges import LoadedJudge
+from studies.evaluation.learned_rows import score_pictures
+from studies.foreign_video.judge import read_claim
+from studies.foreign_video.sources import read_camera
 from studies.synthetic_street import (
     drive_clip,
     hump_drive,
@@ -27,8 +27,8 @@ from studies.video_sets.motion import JudgedSet, look_at_clip
 from studies.video_sets.motion_panels import list_set_panels
 from studies.video_sets.protocol import load_protocol
 from tasks.errors import InputError
-from tests.flows.judging.test_foreign import encode
-from tests.flows.judging.test_trajectories import tum_lines
+from tests.laboratory.foreign_video.test_foreign import encode
+from tests.laboratory.foreign_video.test_trajectories import tum_lines
 
 Drive = tuple[np.ndarray, np.ndarray, np.ndarray]
 STOPS = {"sunny": 7.0, "rain-50": 4.0, "snow-3": 2.0}

@@ -10,8 +10,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from flows.judging.physics import audit_physics, clip_columns, clip_facts, find_route
-from flows.judging.physics_constants import read_constants
+from flows.auditing.physics import audit_physics, clip_columns, clip_facts, find_route
+from flows.auditing.physics_constants import read_constants
 from flows.making.generate import generate_dataset
 from flows.making.plan import read_plan
 from flows.store.layout import Layout

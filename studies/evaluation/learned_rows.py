@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catalogs.entries import load
-from catalogs.learned_judges import LoadedJudge
-from flows.judging.evaluation_rows import figure_row, find_control, group_weather_families
-from flows.judging.judged_clip import JudgedClip, Row, View
+from studies.evaluation.judged_clip import JudgedClip, Row, View
+from studies.evaluation.learned_judges import LoadedJudge
+from studies.evaluation.rows import figure_row, find_control, group_weather_families
 from tasks.eval.learned_scores import (
     ClipWeather,
     FlowAlignedDistance,
@@ -37,7 +37,7 @@ def learned_rows(view: View, clips: list[JudgedClip], judges: dict[str, LoadedJu
     ----------
     view : of the dataset
     clips : as the other judges saw them
-    judges : from `catalogs.learned_judges.load_judges`
+    judges : from `studies.evaluation.learned_judges.load_judges`
     """
     families = list(group_weather_families(clips))
     scores: dict[str, dict[str, float]] = {}
@@ -127,7 +127,7 @@ def score_pictures(
     Parameters
     ----------
     frames : uint8 [F, H, W, 3] sRGB
-    judges : from `catalogs.learned_judges.load_judges`
+    judges : from `studies.evaluation.learned_judges.load_judges`
     kinds : of weather that CLIP tells from dry: ``clip_KIND`` is its similarity less the dry one
     """
     scores: dict[str, float] = {}

@@ -9,15 +9,15 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from flows.commands.evaluation import shorten_evaluation
-from flows.judging import evaluation
-from flows.judging.evaluation import NOT_RUN, evaluate_dataset
-from flows.judging.physics import clip_columns, clip_facts
+from flows.auditing.physics import clip_columns, clip_facts
 from flows.making.catalogue import catalogue_of
 from flows.making.generate import generate_dataset
+from studies.evaluation import evaluation
+from studies.evaluation.commands import shorten_evaluation
+from studies.evaluation.evaluation import NOT_RUN, evaluate_dataset
 from tasks.errors import InputError
 from tasks.eval.state_agreement import WHEELS
-from tests.flows.judging.test_trajectories import tum_lines
+from tests.laboratory.foreign_video.test_trajectories import tum_lines
 from tests.toy_street import write_toy_grid
 
 GRID = """
@@ -91,18 +91,18 @@ def write_reference(dataset: Path, folder: Path) -> None:
 
 
 def test_the_terminal_shows_the_means_over_all_clips_and_what_lacks(judged: Path) -> None:
-    told = shorten_evaluation(json.loads((judged / "evaluation.json").read_text()))
-    assert {row["condition"] for row in told["rows"]} == {"all", "paper/dry-features"}
-    assert all(row["value"] is not None for row in told["rows"])
-    assert any(row["metric"] == "pitch_rmse" and row["method"] == "essential" for row in told["rows"])
-    assert any(line.startswith("fast_vqa (not run") for line in told["lacking"])
+    shown = shorten_evaluation(json.loads((judged / "evaluation.json").read_text()))
+    assert {row["condition"] for row in shown["rows"]} == {"all", "paper/dry-features"}
+    assert all(row["value"] is not None for row in shown["rows"])
+    assert any(row["metric"] == "pitch_rmse" and row["method"] == "essential" for row in shown["rows"])
+    assert any(line.startswith("fast_vqa (not run") for line in shown["lacking"])
 
 
 def test_the_terminal_shows_the_rows_of_a_single_clip_where_there_are_no_means() -> None:
     columns = {"metric": "pitch_mae", "method": "pnp", "unit": "deg", "paper": None, "note": ""}
     row = columns | {"condition": "snow-3/flat", "value": 0.1, "window": False}
-    told = shorten_evaluation({"clips": 1, "rows": [row, row | {"window": True}]})
-    assert [row["condition"] for row in told["rows"]] == ["snow-3/flat"]
+    shown = shorten_evaluation({"clips": 1, "rows": [row, row | {"window": True}]})
+    assert [row["condition"] for row in shown["rows"]] == ["snow-3/flat"]
 
 
 def test_every_metric_has_rows_and_a_row_without_a_value_says_why(judged: Path) -> None:

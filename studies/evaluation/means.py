@@ -9,8 +9,8 @@ import numpy as np
 
 from catalogs.entries import load
 from catalogs.paper_metrics import ClipSet
-from flows.judging.evaluation_rows import figure_row, group_weather_families, read_visual_seed
-from flows.judging.judged_clip import JudgedClip, Row
+from studies.evaluation.judged_clip import JudgedClip, Row
+from studies.evaluation.rows import figure_row, group_weather_families, read_visual_seed
 
 SETS: dict[ClipSet, Callable[[dict[str, Any]], bool]] = {
     "stops": lambda c: c["peak_pressure_mpa"] > 0 and c["hazard_height_m"] == 0,

@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from flows.judging.judged_clip import JudgedClip, Row
-from flows.judging.motion_curves import MotionPanel, draw_motion
 from flows.pages.figures import Figure, Line, Panel, Style, pick_style
 from flows.pages.writer import Picture, Section, Table, encode_picture, write_page
+from studies.evaluation.judged_clip import JudgedClip, Row
+from studies.evaluation.motion_curves import MotionPanel, draw_motion
 
 SHOWN_CLIPS = 12
 MEANING = {

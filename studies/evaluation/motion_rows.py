@@ -7,9 +7,9 @@ from typing import Literal
 import numpy as np
 
 from catalogs.entries import load
-from flows.judging.evaluation_rows import Scored, figure_row, find_control, windowed_rows
-from flows.judging.judged_clip import JudgedClip, Row
-from flows.judging.standards import Floats, MeantMotion, Standard, opening_of, require_whole_way
+from studies.evaluation.judged_clip import JudgedClip, Row
+from studies.evaluation.rows import Scored, figure_row, find_control, windowed_rows
+from studies.evaluation.standards import Floats, MeantMotion, Standard, opening_of, require_whole_way
 from tasks.eval.body_agreement import rms
 from tasks.eval.poses.motion import RecoveredMotion, motion_of_telemetry
 from tasks.eval.video_motion import (

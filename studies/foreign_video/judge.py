@@ -1,4 +1,4 @@
-"""Verdicts on any video or trajectory, without a renderer's data: against a claim, or against an editor's input."""
+"""The verdict on any video or trajectory against the telemetry claimed for it, without a renderer's data."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -10,11 +10,10 @@ from catalogs.campaign_files import find_unit_problems, open_parquet, parse_colu
 from catalogs.documents import read_content
 from catalogs.entries import load
 from catalogs.sentences import shorten
-from flows.judging.foreign_sources import read_camera, read_footage
 from flows.store.outputs import Outputs
+from studies.foreign_video.sources import read_camera, read_footage
 from tasks.errors import InputError
 from tasks.eval.foreign_video import VideoClaim, judge_motion, sample_claim
-from tasks.eval.video_motion import motion_retention
 
 NEEDS_DEPTH = (
     "pose by photometric alignment",
@@ -56,7 +55,7 @@ def judge_video(
         Every file that cannot be read, in one sentence each.
     """
     results = Outputs(out, "lab judge", "judgement.json")
-    footage, claimed, lens = _read_all((read_footage, video), (read_claim, claim), (read_camera, camera))
+    footage, claimed, lens = read_all((read_footage, video), (read_claim, claim), (read_camera, camera))
     at = sample_claim(claimed, footage.times)
     recovered = footage.motion(lens, at.rows, metric=metric)
     verdict = judge_motion(recovered, at, load("foreign gate file"))
@@ -79,66 +78,7 @@ def judge_video(
     return result
 
 
-def measure_retention(
-    source: str,
-    source_braking: str,
-    edited: str,
-    edited_braking: str,
-    *,
-    camera: str,
-    event: tuple[int, int] = (16, 42),
-    out: str | None = None,
-) -> dict[str, Any]:
-    """Measure how much of the road event's pitch an editor kept, from its input and output (paper, Appendix A.5).
-
-    Parameters
-    ----------
-    source, edited : videos or trajectories of the drive over the road feature, before and after the edit
-    source_braking, edited_braking : the same of the drive that brakes on the flat road
-    camera : YAML, as for `judge_video`
-    event : first and last frame of the event; the paper's at 10 frames a second
-    out : folder for retention.json
-
-    Raises
-    ------
-    InputError
-        For every file that cannot be read or is given twice, clips of different length, an event outside them, or a
-        lost track.
-    """
-    results = Outputs(out, "lab retention", "retention.json")
-    names = (source, source_braking, edited, edited_braking)
-    twice = [name for name in dict.fromkeys(names) if names.count(name) > 1]
-    if twice:
-        raise InputError([f"{name}: must be one of the four clips; it stands for two." for name in twice])
-    *clips, lens = _read_all(*((read_footage, name) for name in names), (read_camera, camera))
-    counts = [len(clip.times) for clip in clips]
-    problems = []
-    if len(set(counts)) > 1:
-        problems.append(f"The four clips must have one number of frames; they have {counts}.")
-    if not 2 <= event[0] < event[1] - 1 or not event[1] < min(counts) - 2:
-        problems.append(
-            f"The event must lie within the clips with two frames before and after it; it is frames {event[0]} to"
-            f" {event[1]} of {min(counts)}."
-        )
-    if problems:
-        raise InputError(problems)
-    motions = [clip.motion(lens) for clip in clips]
-    lost = [f"{clip.name}: {m.failures[0]}" for clip, m in zip(clips, motions, strict=True) if m.failures]
-    if lost:
-        raise InputError(lost)
-    before, before_braking, after, after_braking = (motion.pitch for motion in motions)
-    result = {
-        "motion_retention": motion_retention(before, before_braking, after, after_braking, event),
-        "event": list(event),
-        "frames": counts[0],
-        "clips": [clip.name for clip in clips],
-        "method": [motion.method for motion in motions],
-    }
-    results.write_json("retention.json", result)
-    return result
-
-
-def _read_all(*sources: tuple[Callable[[Path], Any], str]) -> list[Any]:
+def read_all(*sources: tuple[Callable[[Path], Any], str]) -> list[Any]:
     """Return the value that each reader makes of its file; all faulty files are reported at once."""
     parts: list[Any] = []
     problems: list[str] = []

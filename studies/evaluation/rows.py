@@ -7,7 +7,7 @@ from typing import Any, TypedDict, Unpack
 import numpy as np
 
 from catalogs.scenario import SCENARIO_FIELDS
-from flows.judging.judged_clip import JudgedClip, Row
+from studies.evaluation.judged_clip import JudgedClip, Row
 from tasks.errors import InputError
 from tasks.eval.video_motion import WINDOWS
 from tasks.surface.weather import DRY, WEATHERS

@@ -6,18 +6,7 @@ from typing import Any, get_args
 
 import pyarrow as pa
 
-from catalogs.learned_judges import load_judges
-from flows.judging.dataset_motion import list_motion_panels
-from flows.judging.evaluation_means import mean_rows
-from flows.judging.evaluation_page import render_page
-from flows.judging.evaluation_rows import figure_row, group_weather_families
-from flows.judging.judged_clip import JudgedClip, Row, View, judge_clip
-from flows.judging.learned_rows import learned_rows
-from flows.judging.motion_rows import EventWindow, motion_rows
-from flows.judging.physics import clip_facts
-from flows.judging.road_edit_rows import road_edit_rows
-from flows.judging.standards import find_reference_cases, own_telemetry, reference_traces
-from flows.judging.trajectories import trajectory_files
+from flows.auditing.physics import clip_facts
 from flows.making.places import refuse_changed_scene
 from flows.running.orchestration import run_as_stage
 from flows.store.address import open_for_reading
@@ -26,6 +15,17 @@ from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest, refuse_changed_content, require_frames
 from flows.store.telemetry import write_parquet
 from manifests.manifest import list_scenes
+from studies.evaluation.dataset_motion import list_motion_panels
+from studies.evaluation.judged_clip import JudgedClip, Row, View, judge_clip
+from studies.evaluation.learned_judges import load_judges
+from studies.evaluation.learned_rows import learned_rows
+from studies.evaluation.means import mean_rows
+from studies.evaluation.motion_rows import EventWindow, motion_rows
+from studies.evaluation.page import render_page
+from studies.evaluation.road_edit_rows import road_edit_rows
+from studies.evaluation.rows import figure_row, group_weather_families
+from studies.evaluation.standards import find_reference_cases, own_telemetry, reference_traces
+from studies.foreign_video.trajectories import trajectory_files
 from tasks.errors import InputError
 from tasks.eval.severity import severity_agreement
 
@@ -65,7 +65,7 @@ def evaluate_dataset(
     crf : constant rate factor of H.264 that the pictures pass through before they are judged [1]
     reference : folder of independent traces that the motion is judged against as well, beside the clips' telemetry
     event_window : whether that of E_geometry opens as the front axle meets the feature, or at the paper's fixed time
-    learned : YAML of local checkpoints of learned judges, as `catalogs.learned_judges` reads it
+    learned : YAML of local checkpoints of learned judges, as `studies.evaluation.learned_judges` reads it
 
     Raises
     ------

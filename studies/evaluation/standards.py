@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from catalogs.reference_match import find_case
 from catalogs.references import Traces, read_reference
 from catalogs.scenario import SCENARIO_FIELDS, Scenario
-from flows.judging.judged_clip import JudgedClip
+from studies.evaluation.judged_clip import JudgedClip
 from tasks.errors import InputError
 from tasks.vehicle.replayed_trace import ENDS_STANDING
 

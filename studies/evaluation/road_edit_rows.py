@@ -4,9 +4,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from flows.judging.evaluation_rows import figure_row, find_control
-from flows.judging.judged_clip import JudgedClip, Row, View
 from flows.making.catalogue import Catalogue, catalogue_of
+from studies.evaluation.judged_clip import JudgedClip, Row, View
+from studies.evaluation.rows import figure_row, find_control
 from tasks.conventions import ROAD_CLASSES
 from tasks.eval.flip import flip_error
 from tasks.eval.image_quality import ssim

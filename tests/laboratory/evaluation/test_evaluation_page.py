@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from flows.judging.evaluation_page import render_page
-from flows.judging.evaluation_rows import figure_row
-from flows.judging.motion_curves import PITCH, MotionPanel
+from studies.evaluation.motion_curves import PITCH, MotionPanel
+from studies.evaluation.page import render_page
+from studies.evaluation.rows import figure_row
 from tests.flows.pages.test_writer import HOSTILE, assert_text_alone
 
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from catalogs.entries import entry_names, load
-from flows.making import replay
 from flows.making.driving import simulate_drive
 from flows.making.pictures import render_frames
+from studies.paper import replay
 from tasks.errors import InputError
 from tasks.render.sensor import Sensor
 from tests.toy_street import write_toy_grid

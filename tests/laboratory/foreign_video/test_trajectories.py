@@ -8,8 +8,8 @@ import pyarrow.parquet as pq
 import pytest
 from scipy.spatial.transform import Rotation
 
-from flows.judging.foreign import judge_video
-from flows.judging.trajectories import read_trajectory, trajectory_files
+from studies.foreign_video.judge import judge_video
+from studies.foreign_video.trajectories import read_trajectory, trajectory_files
 from studies.synthetic_street import drive_clip
 from tasks.errors import InputError
 

@@ -9,7 +9,7 @@ import numpy as np
 from catalogs.scenes import load_route
 from catalogs.studies.ablation import cut_coupling
 from catalogs.variants import warn_of_variant
-from flows.judging.physics_constants import read_constants
+from flows.auditing.physics_constants import read_constants
 from flows.making.catalogue import Catalogue
 from flows.making.driving import collect_surface_depths, surface_of
 from flows.making.input_changes import refuse_changed_records

@@ -8,8 +8,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from catalogs.entries import load
-from flows.judging.foreign import read_claim
-from flows.judging.foreign_sources import ForeignCamera, read_camera, scale_intrinsics
+from studies.foreign_video.judge import read_claim
+from studies.foreign_video.sources import ForeignCamera, read_camera, scale_intrinsics
 from tasks.errors import InputError
 from tasks.eval.foreign_video import VideoClaim, sample_claim
 

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from catalogs.entries import find_entry, load
-from flows.judging.evaluation_means import mean_rows
-from flows.judging.evaluation_rows import figure_row, find_control, group_weather_families
+from studies.evaluation.means import mean_rows
+from studies.evaluation.rows import figure_row, find_control, group_weather_families
 
 RATES = {"dry": 0.0, "rain-10": 10.0, "rain-50": 50.0}
 DRIVES: dict[str, dict[str, float]] = {

@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from catalogs.documents import read_yaml
 from catalogs.sentences import cap_problems, shorten, shorten_value
-from flows.judging.film_length import READ_ONLY, measure_missing_end
-from flows.judging.trajectories import SUFFIXES, read_trajectory
+from studies.foreign_video.film_length import READ_ONLY, measure_missing_end
+from studies.foreign_video.trajectories import SUFFIXES, read_trajectory
 from tasks.errors import InputError
 from tasks.eval.poses.essential import recover_motion_essential
 from tasks.eval.poses.motion import RecoveredMotion

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flows.judging.dataset_motion import list_motion_panels
-from flows.judging.judged_clip import JudgedClip
-from flows.judging.motion_curves import PITCH, PROGRESS, MotionPanel, draw_motion
-from flows.judging.standards import MeantMotion, Standard
+from studies.evaluation.dataset_motion import list_motion_panels
+from studies.evaluation.judged_clip import JudgedClip
+from studies.evaluation.motion_curves import PITCH, PROGRESS, MotionPanel, draw_motion
+from studies.evaluation.standards import MeantMotion, Standard
 from tasks.eval.poses.motion import motion_of_telemetry
 
 TIMES = np.arange(81) / 10

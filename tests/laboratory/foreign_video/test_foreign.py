@@ -14,9 +14,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from catalogs.entries import load
-from flows.judging import foreign_sources
-from flows.judging.foreign import judge_video, measure_retention, read_claim
-from flows.judging.foreign_sources import (
+from studies.foreign_video import sources
+from studies.foreign_video.judge import judge_video, read_claim
+from studies.foreign_video.retention import measure_retention
+from studies.foreign_video.sources import (
     LEVEL,
     MOST_PIXELS,
     ForeignCamera,
@@ -27,7 +28,7 @@ from tasks.errors import InputError
 from tasks.eval.foreign_video import VideoClaim, judge_motion, sample_claim
 from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.poses.undistort import undistort_frames
-from tests.flows.judging.test_trajectories import tum_lines
+from tests.laboratory.foreign_video.test_trajectories import tum_lines
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +40,7 @@ def street() -> Clip:
 def each_video_followed_once() -> Iterator[None]:
     """The motion in equal frames is the same, whatever is claimed of it."""
     seen: dict[tuple[bytes, ...], RecoveredMotion] = {}
-    recover = foreign_sources.recover_motion_essential
+    recover = sources.recover_motion_essential
 
     def recover_once(frames: np.ndarray, *geometry: np.ndarray) -> RecoveredMotion:
         key = (sha256(frames).digest(), *(array.tobytes() for array in geometry))
@@ -48,7 +49,7 @@ def each_video_followed_once() -> Iterator[None]:
         return seen[key]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(foreign_sources, "recover_motion_essential", recover_once)
+        patch.setattr(sources, "recover_motion_essential", recover_once)
         yield
 
 
@@ -185,14 +186,12 @@ def test_times_that_fall_are_not_replaced_by_a_rate(tmp_path: Path) -> None:
 
 def test_undistortion_in_parts_is_that_of_the_whole(street: Clip, monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[np.ndarray] = []
-    monkeypatch.setattr(foreign_sources, "CHUNK", 5)
-    monkeypatch.setattr(
-        foreign_sources, "recover_motion_essential", lambda frames, *rest: seen.append(frames)
-    )
+    monkeypatch.setattr(sources, "CHUNK", 5)
+    monkeypatch.setattr(sources, "recover_motion_essential", lambda frames, *rest: seen.append(frames))
     height, width = street.frames.shape[1:3]
     bent = np.array([-0.2, 0.05, 0.001, -0.001, 0.0])
     camera = ForeignCamera(K=street.K, width=width, height=height, mount=LEVEL, distortion=bent)
-    film = foreign_sources.Footage(name="v", times=np.arange(24) / 16, frames=street.frames, poses=None)
+    film = sources.Footage(name="v", times=np.arange(24) / 16, frames=street.frames, poses=None)
     film.motion(camera, np.arange(2, 20))
     whole = undistort_frames({"rgb": street.frames[2:20]}, street.K, bent)["rgb"]
     assert (seen[0] == whole).all()
