@@ -240,5 +240,28 @@ COMMANDS = (
         passed=require_key("follows"),
         output="sentences",
     ),
+    Command(
+        name="lab sheets",
+        group=PAPER,
+        sentence="Draw one place in every weather, and each road feature before, at and after the wheels touch it.",
+        function="studies.paper.sheets:draw_sheets",
+        options=(
+            DATASET,
+            define_option("out", str, "Folder for weather.png and hazards.png."),
+            define_option(
+                "station",
+                float | None,
+                "Station on the route where the weathers are shown [m].",
+                None,
+                shown_default="12, or as far as every clip comes",
+            ),
+            define_option(
+                "beside",
+                list[str] | None,
+                "Finished dataset of another street, whose weathers come below; repeat it for more.",
+                None,
+            ),
+        ),
+    ),
     *evaluation.COMMANDS,
 )

@@ -24,8 +24,8 @@ from flows.reading.describe import describe_dataset
 from flows.reading.previews import make_films
 from flows.reading.query import query_dataset
 from flows.reading.report import make_report
-from flows.reading.sheets import draw_sheets
 from flows.store.layout import Layout
+from studies.paper.sheets import draw_sheets
 from tasks.errors import InputError
 
 SECONDS = 60

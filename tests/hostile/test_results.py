@@ -19,8 +19,8 @@ from flows.auditing.verify import verify_dataset
 from flows.cli import app
 from flows.reading.previews import make_films
 from flows.reading.report import make_report
-from flows.reading.sheets import draw_sheets
 from flows.store.outputs import FORMAT, MARKER
+from studies.paper.sheets import draw_sheets
 from tasks.errors import InputError
 from tests.flows.reseal import reseal
 from tests.hostile.stage import COMMANDS, Stage, endure, listing

@@ -15,11 +15,11 @@ from flows.exporting.export import export_dataset
 from flows.reading.describe import describe_dataset
 from flows.reading.previews import make_films
 from flows.reading.report import make_report
-from flows.reading.sheets import draw_sheets
 from flows.store.layout import Layout
 from flows.store.telemetry import read_table
 from studies.evaluation.evaluation import evaluate_dataset
 from studies.negative_controls.study import run_controls
+from studies.paper.sheets import draw_sheets
 from tasks.errors import InputError
 
 

@@ -15,7 +15,6 @@ from flows.making.generate import generate_dataset
 from flows.making.plan import read_plan
 from flows.pages.static import as_svg
 from flows.reading.previews import make_films
-from flows.reading.sheets import draw_sheets
 from studies.commands import shorten_controls
 from studies.evaluation.evaluation import evaluate_dataset
 from studies.evaluation.judged_clip import METHODS, JudgedClip
@@ -33,6 +32,7 @@ from studies.negative_controls.study import (
     score_controls,
     summarise_controls,
 )
+from studies.paper.sheets import draw_sheets
 from tasks.errors import InputError
 from tasks.eval.poses.motion import RecoveredMotion
 from tests.toy_street import write_toy_grid

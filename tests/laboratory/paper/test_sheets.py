@@ -3,9 +3,9 @@
 import cv2
 import pytest
 
-from flows.reading.sheets import _draw_still, draw_sheets, is_flat_twin
 from flows.store.sealed import read_manifest
 from flows.store.telemetry import read_columns
+from studies.paper.sheets import _draw_still, draw_sheets, is_flat_twin
 from tasks.errors import InputError
 from tasks.render.contact_sheet import CAPTION, MARGIN, TILE_WIDTH
 
