@@ -13,7 +13,7 @@ from flows.auditing.physics_constants import read_constants
 from flows.making.catalogue import Catalogue
 from flows.making.driving import collect_surface_depths, surface_of
 from flows.making.input_changes import refuse_changed_records
-from flows.making.places import find_scene, refuse_changed_scene
+from flows.making.locations import find_scene, refuse_changed_scene
 from flows.making.plan import Plan, read_plan
 from flows.making.traced import refuse_traced
 from flows.running.orchestration import run_as_stage
@@ -296,7 +296,7 @@ def _as_row(verdict: PhysicsVerdict, frame_ticks: np.ndarray) -> dict[str, Any]:
 
 
 def _describe_break(law: Law, frame_ticks: np.ndarray) -> dict[str, Any]:
-    """Law, place and size of a break; ``tick`` is null where a law is of the clip's row."""
+    """Law, tick and size of a break; ``tick`` is null where a law is of the clip's row."""
     table, _, name = law.of.partition(".")
     tick = {"ticks": law.at, "frames": int(frame_ticks[law.at]) if law.at < len(frame_ticks) else None}.get(
         table

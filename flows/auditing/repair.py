@@ -100,15 +100,15 @@ def _repair_locked(
 
 def _refuse_files_as_folders(layout: Layout, paths: Iterable[str]) -> None:
     """Raise `InputError` where a folder is expected and something else exists, or a folder exists instead of a file."""
-    places = {place for path in paths for place in PurePosixPath(path).parents} - {PurePosixPath(".")}
-    wrong = [place for place in places if (layout.root / place).is_file()]
+    folders = {folder for path in paths for folder in PurePosixPath(path).parents} - {PurePosixPath(".")}
+    wrong = [path for path in folders if (layout.root / path).is_file()]
     wrong += [PurePosixPath(path) for path in paths if (layout.root / path).is_dir()]
     if wrong:
         raise InputError(
             [
-                f"{layout.root / place}: must not be a file where the dataset has a folder, nor a folder where it has a"
+                f"{layout.root / path}: must not be a file where the dataset has a folder, nor a folder where it has a"
                 " file: move it away and repair again"
-                for place in sorted(wrong)
+                for path in sorted(wrong)
             ]
         )
 

@@ -24,8 +24,8 @@ from flows.making.driving import (
     surface_of,
 )
 from flows.making.gate import judge_motion, nothing_to_judge
+from flows.making.locations import note_location
 from flows.making.pictures import frame_rows, gather_motion, render_frames, rig_of
-from flows.making.places import remember_place
 from flows.making.plan import ClipPlan, Plan, read_plan
 from flows.making.traced import replay_drive, unknown_ranges
 from flows.running.processors import measure_peak_memory
@@ -119,7 +119,7 @@ def open_work(layout: Layout, index: int, scene: str) -> ClipWork:
     cv2.setNumThreads(1)  # one thread a clip: more within a frame cost more than they give
     plan = read_plan(layout.root)
     clip = plan.clips[index]
-    remember_place(plan.record_of(clip.scenario.scene)["sha256"], scene)
+    note_location(plan.record_of(clip.scenario.scene)["sha256"], scene)
     return ClipWork(clip=clip, plan=plan, catalogue=catalogue_of(layout.root, clip.scenario.scene))
 
 

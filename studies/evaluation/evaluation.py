@@ -7,7 +7,7 @@ from typing import Any, get_args
 import pyarrow as pa
 
 from flows.auditing.physics import clip_facts
-from flows.making.places import refuse_changed_scene
+from flows.making.locations import refuse_changed_scene
 from flows.running.orchestration import run_as_stage
 from flows.store.address import open_for_reading
 from flows.store.missing import null_missing

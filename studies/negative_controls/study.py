@@ -14,7 +14,7 @@ from flows.auditing.physics import clip_facts
 from flows.making.catalogue import Catalogue, catalogue_of
 from flows.making.driven import refuse_driven
 from flows.making.driving import simulate_drive
-from flows.making.places import refuse_changed_scene
+from flows.making.locations import refuse_changed_scene
 from flows.making.plan import Plan, read_plan
 from flows.making.traced import refuse_traced
 from flows.pages.static import as_svg

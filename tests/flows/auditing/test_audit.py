@@ -28,7 +28,7 @@ def copy(toy_dataset, tmp_path) -> Layout:
 @pytest.fixture
 def own_dataset(tmp_path, monkeypatch) -> Layout:
     """A dataset whose scene and camera are this test's own, with its own note of where they lie: others are equal."""
-    monkeypatch.setattr("flows.making.places.cache_root", lambda: tmp_path / "notes")
+    monkeypatch.setattr("flows.making.locations.cache_root", lambda: tmp_path / "notes")
     grid = write_toy_grid(tmp_path, frames=2)
     return generate_dataset(grid, str(tmp_path / "data"), runner="threads", workers=1).layout
 

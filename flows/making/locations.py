@@ -10,30 +10,30 @@ from flows.store.layout import read_json, write_json
 from tasks.errors import InputError
 from tasks.kernel_cache import cache_root
 
-SHELVES = "MUSYNC_SCENES"
+SCENE_FOLDERS = "MUSYNC_SCENES"
 """Environment variable: folders that hold scenes, for datasets whose scene was never used on this machine."""
 
 
-def remember_place(sha256: str, place: str | Path) -> None:
+def note_location(sha256: str, location: str | Path) -> None:
     """Note in the user's cache where something of a hash lies, for whoever makes or judges clips with it later.
 
     Parameters
     ----------
     sha256 : of a file's bytes, or that identifies a scene
-    place : file or folder
+    location : file or folder
     """
-    note, absolute = _find_note(sha256), str(Path(place).resolve())
-    if noted_place(sha256) != Path(absolute):
+    note, absolute = _find_note(sha256), str(Path(location).resolve())
+    if noted_location(sha256) != Path(absolute):
         write_json(note, absolute)
 
 
-def noted_place(sha256: str) -> Path | None:
+def noted_location(sha256: str) -> Path | None:
     """Where something of a hash lay when it was last used; None if nothing is noted, or the note is damaged."""
     try:
-        place = read_json(_find_note(sha256))
+        location = read_json(_find_note(sha256))
     except InputError:
         return None
-    return Path(place) if isinstance(place, str) else None
+    return Path(location) if isinstance(location, str) else None
 
 
 def find_scene(scene: Mapping[str, Any]) -> str:
@@ -46,27 +46,27 @@ def find_scene(scene: Mapping[str, Any]) -> str:
     Raises
     ------
     InputError
-        If no place is known that holds it.
+        If no folder is known that holds it.
     """
     if is_built_in(scene["name"]):
         return str(scene["name"])
-    shelves = [Path(folder) for folder in os.environ.get(SHELVES, "").split(os.pathsep) if folder]
-    places = [
-        noted_place(scene["sha256"]),
+    folders = [Path(folder) for folder in os.environ.get(SCENE_FOLDERS, "").split(os.pathsep) if folder]
+    locations = [
+        noted_location(scene["sha256"]),
         Path(scene["name"]),
-        *(shelf / scene["name"] for shelf in shelves),
+        *(folder / scene["name"] for folder in folders),
     ]
     found = {
-        str(place): content
-        for place in places
-        if place is not None and (content := _identity_at(place)) is not None
+        str(location): content
+        for location in locations
+        if location is not None and (content := _identity_at(location)) is not None
     }
     # a scene that was changed where it lies is better than none: audits compare it and say so
-    for place in sorted(found, key=lambda place: found[place] != scene["sha256"]):
-        return place
+    for location in sorted(found, key=lambda location: found[location] != scene["sha256"]):
+        return location
     raise InputError(
         f"scene {scene['name']}: no folder is known here that holds it (SHA-256 {scene['sha256'][:12]}...):"
-        f" set {SHELVES} to the folder in which it lies as {Path(scene['name']).name}"
+        f" set {SCENE_FOLDERS} to the folder in which it lies as {Path(scene['name']).name}"
     )
 
 
@@ -80,19 +80,19 @@ def refuse_changed_scene(scene: Mapping[str, Any]) -> None:
     Raises
     ------
     InputError
-        If no place is known that holds it, or it is another one now.
+        If no folder is known that holds it, or it is another one now.
     """
-    place = find_scene(scene)
-    if not is_built_in(scene["name"]) and _identity_at(Path(place)) != scene["sha256"]:
+    location = find_scene(scene)
+    if not is_built_in(scene["name"]) and _identity_at(Path(location)) != scene["sha256"]:
         raise InputError(
-            f"scene {scene['name']}: must be the recorded one (SHA-256 {scene['sha256'][:12]}...); {place} holds"
-            f" another now: put the recorded one back, or set {SHELVES} to the folder in which it lies"
+            f"scene {scene['name']}: must be the recorded one (SHA-256 {scene['sha256'][:12]}...); {location} holds"
+            f" another now: put the recorded one back, or set {SCENE_FOLDERS} to the folder in which it lies"
         )
 
 
-def _identity_at(place: Path) -> str | None:
+def _identity_at(location: Path) -> str | None:
     try:
-        return scene_identity(str(place))
+        return scene_identity(str(location))
     except (InputError, OSError):
         return None
 
