@@ -37,8 +37,6 @@ STEP = 1.0
 """Way between two pictures of one station of a street [m]."""
 SEEN, MOST_HOLES = 0.5, 0.002
 """Opacity below which a pixel of the road is a hole, and the share of such pixels [1]."""
-LEAST_RATIO = 3.0
-"""Difference of a street to the one most like it, over that of two pictures of one station [1]."""
 AHEAD = (4.0, 40.0)
 """Nearest and farthest road that is looked at for holes [m]."""
 

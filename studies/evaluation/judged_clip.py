@@ -13,9 +13,9 @@ from flows.auditing.physics import clip_columns
 from flows.making.catalogue import catalogue_of
 from flows.making.gate import prepare_for_checks
 from flows.making.plan import read_plan
-from flows.reading.film import through_film
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
+from studies.evaluation.film import through_film
 from studies.foreign_video.trajectories import read_trajectory
 from tasks.conventions import ROAD_CLASSES
 from tasks.eval.no_reference import piqe, temporal_error

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from catalogs.documents import read_yaml
+from catalogs.documents import LARGEST_YAML, parse_yaml, read_content
 from catalogs.sentences import cap_problems, shorten, shorten_value
 from studies.foreign_video.film_length import READ_ONLY, measure_missing_end
 from studies.foreign_video.trajectories import SUFFIXES, read_trajectory
@@ -222,7 +222,7 @@ def read_camera(path: Path) -> ForeignCamera:
     InputError
         If the file cannot be read, lacks a number, or states what no film is judged by.
     """
-    content = read_yaml(path, "camera")
+    content = parse_yaml(read_content(path, "camera", LARGEST_YAML), path, "camera")
     wrong = [f"{path}: {problem}." for problem in _find_unknown(content)]
     numbers: dict[str, Any] = {k: v.get("value") if isinstance(v, dict) else v for k, v in content.items()}
     if "focal_length" in numbers and _is_number(numbers.get("width")) and _is_number(numbers.get("height")):
