@@ -11,14 +11,14 @@ import pyarrow.parquet as pq
 import pytest
 import yaml
 
-from benchmarks.synthetic_street import (
+from flows.judging.foreign import read_claim
+from flows.judging.foreign_sources import read_camera
+from studies.synthetic_street import (
     drive_clip,
     hump_drive,
     make_mount,
     rig_poses,
 )
-from flows.judging.foreign import read_claim
-from flows.judging.foreign_sources import read_camera
 from studies.video_sets.files import SetClip, find_set
 from studies.video_sets.judge_set import format_cell, judge_video_set
 from studies.video_sets.motion import JudgedSet, look_at_clip
