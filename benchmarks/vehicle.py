@@ -12,10 +12,10 @@ import numpy as np
 from benchmarks.side_by_side import least_cpu_s, make_row, print_rows
 from catalogs.entries import load
 from catalogs.studies import Condition
+from studies.paper.stop_curves import sensitivity_study
 from studies.paper.vehicle_modes import simulate_condition
 from tasks.campaign.campaign import CHANNELS, Run
 from tasks.identification.inference.forward import prepare_run, simulate_run
-from tasks.studies.sensitivity import sensitivity_study
 from tasks.surface.road_profile import FLAT_ROAD
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle import reference

@@ -13,14 +13,14 @@ from catalogs.entries import load
 from flows.measured.closing_error_rates import JUDGES
 from manifests.provenance import source_hashes
 from studies.closing_benchmark import benchmark as closing_benchmark
-from studies.closing_benchmark.summary import pair_outcome, summarise_benchmark
-from tasks.campaign.planned_runs import TRAINING
-from tasks.identification.benchmark import (
+from studies.closing_benchmark.summary import (
     classify_outcome,
     compute_exact_interval,
-    make_synthetic_campaign,
     measure_interval_miss,
+    pair_outcome,
+    summarise_benchmark,
 )
+from studies.closing_benchmark.synthetic import TRAINING, make_synthetic_campaign
 
 ROOT = Path(closing_benchmark.__file__).parents[2]
 VEHICLE, SURFACE = load("vehicle", "paper-reference"), load("surface", "dense-asphalt")

@@ -22,10 +22,10 @@ from flows.measured.closing import close_loop, find_unused_tolerances, verdict_j
 from flows.measured.closing_ledger import record_reading
 from flows.measured.friction_pulls import describe_friction_pulls, find_pulled_runs
 from flows.measured.grown_vehicle import grown_vehicle
+from studies.closing_benchmark.synthetic import TOLERANCES, make_synthetic_campaign
 from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS, SESSION, Campaign
 from tasks.campaign.planned_runs import RunPlan
 from tasks.errors import InputError
-from tasks.identification.benchmark import TOLERANCES, make_synthetic_campaign
 from tasks.identification.decision.answer import ChannelError, NamedEffect, OpenOdds, Parameter
 from tests.flows.measured.findings import verdict_of
 

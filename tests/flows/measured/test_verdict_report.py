@@ -14,9 +14,9 @@ from flows.measured.closing import describe_search, verdict_json
 from flows.measured.residuals import predict_runs
 from flows.measured.verdict_figures import format_plain_unit, make_brake_curve
 from flows.measured.verdict_report import MISSED, find_next_steps, write_verdict_page
+from studies.closing_benchmark.synthetic import make_synthetic_campaign
 from tasks.campaign.campaign import Campaign
 from tasks.campaign.planned_runs import RunPlan
-from tasks.identification.benchmark import make_synthetic_campaign
 from tasks.identification.decision.verdict import Outcome, judge_runs
 from tests.browsers import find_barriers, open_chromium
 
