@@ -193,18 +193,6 @@ def test_the_next_step_follows_from_the_verdict(
     assert all("; rm" not in command or "'a car; rm -r x'" in command for _, command in steps)
 
 
-def test_runs_that_do_not_grip_as_the_mapping_says_ask_for_more_stops_at_the_limit(
-    judged: tuple[Outcome, Campaign],
-) -> None:
-    outcome, campaign = judged
-    nothing = facts(outcome, verdict="NOTHING", rivals=[], vehicle_file=None)
-    first = {
-        pull: find_next_steps(nothing | {"friction_pulls_sigma": {"run-1": pull}}, campaign)[0][0]
-        for pull in (-2.4, -2.6)
-    }
-    assert "runs that reach further" in first[-2.4] and "stops at the limit of friction" in first[-2.6]
-
-
 def test_the_page_fits_a_narrow_screen_fetches_nothing_and_keeps_nobody_out(
     text: str, tmp_path: Path
 ) -> None:
