@@ -13,14 +13,6 @@ Share = Annotated[Scalar, require_quantity("1", above=0)]
 Speeds = Annotated[tuple[Number, ...], Field(min_length=1)]
 
 
-class CarEntry(CatalogueEntry):
-    """The car that brakes: what its bumper reaches, and how often it looks."""
-
-    overhang_m: Metres
-    width_m: Metres
-    rate_hz: Annotated[Scalar, require_quantity("Hz", above=0)]
-
-
 class LineEntry(CatalogueEntry):
     """From a demand to the pressure."""
 
@@ -102,7 +94,7 @@ class ProtocolEntry(CatalogueEntry):
 class EmergencyBraking(CatalogueEntry):
     """Content of the file."""
 
-    car: CarEntry
+    rate_hz: Annotated[Scalar, require_quantity("Hz", above=0)]
     brake_line: LineEntry
     brakes: BrakesEntry
     weathers: dict[str, PartialScenario]

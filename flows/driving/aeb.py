@@ -10,6 +10,7 @@ import numpy as np
 
 from catalogs.emergency_braking import EmergencyBraking, ProtocolEntry
 from catalogs.entries import load
+from catalogs.road_users import EGO
 from catalogs.scenario import Scenario
 from flows.driving.aeb_page import draw_page
 from flows.making.driving import surface_of, weather_of
@@ -23,7 +24,13 @@ from tasks.driving.brakes import (
     FrictionTrigger,
     Trigger,
 )
-from tasks.driving.outcome import Outcome, describe_outcome, judge_approach
+from tasks.driving.outcome import (
+    TICK_S,
+    Outcome,
+    describe_outcome,
+    find_unbraked_impact,
+    judge_approach,
+)
 from tasks.driving.stepped import DriveSettings, SteppedDrive
 from tasks.driving.targets import TargetTrack
 from tasks.errors import InputError
@@ -124,16 +131,15 @@ def drive_approach(
     car, state : the car and the road
     case : the approach
     trigger, line : when the brake is put on, and the pressure behind
-    table : overhang, width and rate of the car
+    table : how often the brake looks
     """
-    overhang, width = table.car.overhang_m.value, table.car.width_m.value
+    overhang, width = load("road user sizes")[EGO]
+    rate_hz = table.rate_hz.value
     drive = SteppedDrive(
         car, state,
-        DriveSettings(
-            initial_speed=case.speed, duration_s=LONGEST_S, rate_hz=table.car.rate_hz.value, hold_speed=True
-        ),
+        DriveSettings(initial_speed=case.speed, duration_s=LONGEST_S, rate_hz=rate_hz, hold_speed=True),
     )  # fmt: skip
-    step = 1.0 / table.car.rate_hz.value
+    step = 1.0 / rate_hz
     looks = case.track.follow(np.arange(drive.steps, dtype=np.float64) * step)
     # until a brake acts the speed is held, and the car is where it would be: those steps are driven at once
     for held, target in enumerate(looks):
@@ -155,7 +161,11 @@ def drive_approach(
     station, speeds, pressure = (
         drive.read_column(name) for name in ("station", "speed", "brake_pressure_mpa")
     )
-    return judge_approach(station, speeds, pressure, case.track, overhang=overhang, width=width)
+    path = case.track.locate(TICK_S * np.arange(len(station), dtype=np.float64))
+    return judge_approach(
+        station, speeds, pressure, path, overhang=overhang, width=width,
+        unbraked_impact=find_unbraked_impact(case.speed, overhang, case.track, width),
+    )  # fmt: skip
 
 
 def make_brake(
@@ -259,7 +269,7 @@ def summarise(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _list_cases(table: EmergencyBraking, protocols: Sequence[str]) -> list[Case]:
-    overhang = table.car.overhang_m.value
+    overhang, _ = load("road user sizes")[EGO]
     return [case for name in protocols for case in list_cases(name, table.protocols[name], overhang)]
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from catalogs.entries import load
+from catalogs.road_users import EGO
 from catalogs.scenario import Scenario
 from flows.driving.aeb import Case, compare_brakes, drive_approach, find_tyre_friction, list_cases, make_brake
 from flows.making.driving import surface_of
@@ -16,7 +17,7 @@ from tasks.errors import InputError
 TABLE = load("emergency braking")
 CAR = load("vehicle", "bmw-320i")
 ASPHALT = load("wet friction").apply(load("surface", "dense-asphalt"))
-OVERHANG = TABLE.car.overhang_m.value
+OVERHANG = load("road user sizes")[EGO][0]
 
 
 def road(weather: str):
@@ -36,7 +37,7 @@ def test_the_impact_in_the_dry_is_the_closed_form(speed, target):
     outcome = drive_approach(CAR, dry, case, trigger, line, TABLE)
     assert outcome.collided and outcome.clearance == outcome.min_ttc == 0.0
     # the demand falls on a look, and the first pressure that is seen is that of the middle of a step
-    look = 1 / TABLE.car.rate_hz.value
+    look = 1 / TABLE.rate_hz.value
     demanded = round((outcome.brake_time - line.delay) / look) * look
     friction = find_tyre_friction(CAR, dry)(0.0)
     mean_speed = 0.5 * (case.speed + outcome.impact_speed + target / 3.6)
