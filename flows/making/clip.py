@@ -39,8 +39,7 @@ from manifests.canonical import sha256_of_file
 from tasks.errors import InputError
 from tasks.render.object_truth import measure_objects
 from tasks.surface.state import SurfaceState
-from tasks.vehicle.peaks import compute_peaks
-from tasks.vehicle.rollout import Rollout, compute_lift_times
+from tasks.vehicle.rollout import Rollout, compute_lift_times, compute_peaks
 
 Columns = Mapping[str, NDArray[Any]]
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from catalogs.entries import load
+from studies.closing_benchmark.synthetic import RICH, TOLERANCES, make_synthetic_campaign
 from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
-from tasks.campaign.planned_runs import RICH, RunPlan, make_planned_run, plan_experiments
-from tasks.identification.benchmark import TOLERANCES, make_synthetic_campaign
+from tasks.campaign.planned_runs import RunPlan, make_planned_run, plan_experiments
 from tasks.identification.decision import experiment
 from tasks.identification.decision.answer import Verdict
 from tasks.identification.decision.verdict import judge_runs

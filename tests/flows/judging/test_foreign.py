@@ -13,7 +13,6 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from benchmarks.synthetic_street import Clip, drive_clip
 from catalogs.entries import load
 from flows.judging import foreign_sources
 from flows.judging.foreign import judge_video, measure_retention, read_claim
@@ -23,6 +22,7 @@ from flows.judging.foreign_sources import (
     ForeignCamera,
     read_video,
 )
+from studies.synthetic_street import Clip, drive_clip
 from tasks.errors import InputError
 from tasks.eval.foreign_video import VideoClaim, judge_motion, sample_claim
 from tasks.eval.poses.motion import RecoveredMotion

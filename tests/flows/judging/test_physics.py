@@ -231,11 +231,6 @@ def test_a_pose_that_does_not_follow_the_station_is_named(dataset: Path) -> None
     assert verdict.column == "frames.T_world_rig"
 
 
-def test_a_folder_that_is_no_dataset_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"plan\.json: no such file"):
-        audit_physics(str(tmp_path))
-
-
 def test_a_table_without_a_column_is_refused(dataset: Path, tmp_path: Path) -> None:
     copy = tmp_path / "copy"
     shutil.copytree(dataset, copy, ignore=shutil.ignore_patterns("frames.zarr"))

@@ -8,9 +8,9 @@ import pyarrow.parquet as pq
 import pytest
 from scipy.spatial.transform import Rotation
 
-from benchmarks.synthetic_street import drive_clip
 from flows.judging.foreign import judge_video
 from flows.judging.trajectories import read_trajectory, trajectory_files
+from studies.synthetic_street import drive_clip
 from tasks.errors import InputError
 
 CAMERA = "width: 240\nheight: 160\nfocal_length: 200\n"

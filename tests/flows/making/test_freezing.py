@@ -191,11 +191,6 @@ def test_generate_takes_a_grid_or_a_manifest(arguments, tmp_path):
     assert isinstance(answer.exception, InputError)
 
 
-def test_an_unknown_manifest_lists_those_that_ship():
-    with pytest.raises(InputError, match="multibody-held-out"):
-        read_frozen("nowhere")
-
-
 def test_a_users_file_that_is_no_frozen_run_is_not_written_over(tmp_path):
     precious = tmp_path / "notes.json"
     precious.write_text('{"mine": 1}')

@@ -52,7 +52,6 @@ def test_two_faults_of_one_run_stay_two() -> None:
     ("signal", "factor", "words"),
     [
         ("p_bar", 100.0, "in 4 of 4 runs (run-0, run-1, run-2, run-3): channel brake_pressure reaches 2"),
-        ("v_kmh", 0.001, "in 4 of 4 runs (run-0, run-1, run-2, run-3): channel speed must stay at or above 2 m/s"),
         ("w_r", 0.0, "in 4 of 4 files (run-0.csv, run-1.csv, run-2.csv, run-3.csv): signal w_r is missing"),
     ],
 )  # fmt: skip

@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 import yaml
 
-from benchmarks.synthetic_street import camera_matrix, hump_drive, render_clip
+from studies.synthetic_street import camera_matrix, hump_drive, render_clip
 from studies.video_sets.editors import add_noise, warp_road, write_video
 from studies.video_sets.judge_set import judge_video_set
 from tests.laboratory.video_sets.test_judge_set import PROTOCOL, STOPS, cell, rms

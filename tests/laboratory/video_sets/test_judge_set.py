@@ -11,16 +11,16 @@ import pyarrow.parquet as pq
 import pytest
 import yaml
 
-from benchmarks.synthetic_street import (
+from catalogs.learned_judges import LoadedJudge
+from flows.judging.foreign import read_claim
+from flows.judging.foreign_sources import read_camera
+from flows.judging.learned_rows import score_pictures
+from studies.synthetic_street import (
     drive_clip,
     hump_drive,
     make_mount,
     rig_poses,
 )
-from catalogs.learned_judges import LoadedJudge
-from flows.judging.foreign import read_claim
-from flows.judging.foreign_sources import read_camera
-from flows.judging.learned_rows import score_pictures
 from studies.video_sets.files import SetClip, find_set
 from studies.video_sets.judge_set import format_cell, judge_video_set
 from studies.video_sets.motion import JudgedSet, look_at_clip
@@ -220,25 +220,6 @@ def test_files_of_unknown_names_are_refused_all_at_once(tmp_path: Path) -> None:
     for words in ("rain-7.mp4: no clip of the protocol", "first: a model's clips must lie in seed-N",
                   "wall.mp4: no road feature", "hail.parquet: no clip", "camera.yaml: no such file"):  # fmt: skip
         assert words in told
-
-
-def test_a_set_that_is_not_there_is_told_and_its_parts_are_not(tmp_path: Path) -> None:
-    with pytest.raises(InputError) as caught:
-        find_set(tmp_path / "nowhere", load_protocol("paper"))
-    (problem,) = caught.value.problems
-    assert "nowhere: no such folder" in problem
-
-
-def test_a_window_that_no_figure_has_is_refused_before_a_clip_is_judged(tmp_path: Path) -> None:
-    clip = tmp_path / "set" / "models" / "one" / "seed-1" / "weather" / "sunny.mp4"
-    clip.parent.mkdir(parents=True)
-    clip.touch()
-    (tmp_path / "set" / "camera.yaml").write_text("{width: 96, height: 64, fx: 80, fy: 80, cx: 48, cy: 32}")
-    with pytest.raises(InputError, match="--window must be one of 0, 5, 7, 9 frames; it is 6"):
-        judge_video_set(str(tmp_path / "set"), out=str(tmp_path / "out"), window=6)
-    with pytest.raises(InputError) as caught:
-        judge_video_set(str(tmp_path / "set"), out=str(tmp_path / "out"))
-    assert list(caught.value.problems) == [f"{clip}: the file is empty; give a video."]
 
 
 def test_the_papers_protocol_has_its_clips_prompts_and_printed_rows() -> None:

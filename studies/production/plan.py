@@ -26,10 +26,10 @@ import psutil
 import yaml
 from distributed import Client, LocalCluster, Worker
 
-from benchmarks.scale.copies import grid_of
 from flows.making.generate import generate_dataset
 from flows.running.runner import IN_FLIGHT, run_unordered
 from flows.store.layout import Layout
+from studies.scale.copies import grid_of
 from tasks.errors import InputError
 
 Row = tuple[str, float, str]

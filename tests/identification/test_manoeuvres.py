@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tasks.campaign.campaign import CHANNELS
-from tasks.campaign.manoeuvres import measure_manoeuvre_errors
+from tasks.identification.decision.held_out import measure_manoeuvre_errors
 
 T = np.arange(500) * 0.01
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from catalogs.entries import load
-from tasks.studies.sensitivity import PrintedFigure, beside_print, latin_hypercube, sensitivity_study
+from studies.paper.stop_curves import beside_print, sensitivity_study
+from tasks.studies.sensitivity import PrintedFigure
 
 ARCHIVE_SCATTER_M = 0.00137
 """The paper's statement of the difference between its own archived and repeated stops."""
@@ -44,13 +45,6 @@ def test_curves_are_monotonic_over_positive_snowfall(study):
 def test_envelopes_hold_the_nominal_curve(study):
     for name in ("rain50_stop_m", "snow1_stop_m", "snow3_stop_m", "rain50_mu"):
         assert study[name]["p05"] < study[name]["nominal"] < study[name]["p95"]
-
-
-def test_each_stratum_of_the_hypercube_is_drawn_once():
-    samples = latin_hypercube({"a": (1.0, 3.0), "b": (-1.0, 0.0)}, ("a", "b"), 64, 7)
-    assert np.array_equal(np.sort(np.floor((samples["a"] - 1) / 2 * 64)), np.arange(64))
-    assert np.array_equal(np.sort(np.floor((samples["b"] + 1) * 64)), np.arange(64))
-    assert abs(np.corrcoef(samples["a"], samples["b"])[0, 1]) < 0.5
 
 
 def test_the_published_coast_drag_would_miss_the_printed_distances(vehicle):

@@ -10,17 +10,32 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import betaincinv
 
 from tasks.campaign.campaign import SESSION, Campaign, Run, Tolerances
-from tasks.campaign.planned_runs import RICH, TRAINING, RunPlan, make_planned_run
-from tasks.identification.decision.answer import Verdict
+from tasks.campaign.planned_runs import RunPlan, make_planned_run
 from tasks.identification.inference.forward import compute_instrument_readings, prepare_run, simulate_run
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.slots import Slot
 from tasks.vehicle.effects.table import PARAMETER_INDEX, build_parameter_vector
 from tasks.vehicle.parameters import Vehicle
 
+RICH: tuple[RunPlan, ...] = (
+    RunPlan(speed=32.0, peak=0.0, duration=8.0), RunPlan(speed=16.7, peak=0.0, duration=8.0),
+    RunPlan(speed=25.0, peak=2.0, disc_rise=350.0), RunPlan(speed=27.8, peak=1.5, disc_rise=150.0),
+    RunPlan(speed=26.4, peak=-2.4), RunPlan(speed=16.7, peak=2.3), RunPlan(speed=11.1, peak=3.5, duration=4.0),
+    RunPlan(weather="rain", rate=10.0, speed=22.2, peak=2.3), RunPlan(weather="rain", rate=25.0, speed=12.5, peak=3.0),
+    RunPlan(weather="snow", rate=3.0, speed=13.9, peak=2.3), RunPlan(weather="snow", rate=1.0, speed=9.7, peak=0.6),
+    RunPlan(speed=11.1, peak=0.0, duration=4.0, hazard=(12.0, 3.7, 0.075)),
+    RunPlan(speed=9.7, peak=0.0, duration=4.0, hazard=(10.0, 2.0, -0.08)),
+    RunPlan(speed=7.8, peak=0.5, duration=4.0, hazard=(10.0, 3.7, 0.06)),
+    RunPlan(speed=25.0, peak=0.0, duration=8.0), RunPlan(speed=22.2, peak=2.6, disc_rise=250.0),
+    RunPlan(speed=33.3, peak=2.0, disc_rise=80.0), RunPlan(speed=13.9, peak=1.6, duration=5.0),
+    RunPlan(weather="rain", rate=10.0, speed=16.7, peak=2.6), RunPlan(weather="snow", rate=1.0, speed=12.5, peak=2.0),
+    RunPlan(speed=8.9, peak=0.8, duration=4.0, hazard=(9.0, 3.7, 0.05)),
+    RunPlan(speed=9.7, peak=0.0, duration=4.0, hazard=(12.0, 2.5, 0.06)),
+)  # fmt: skip
+"""An experiment design that excites every port, 14 training runs first."""
+TRAINING = 14
 NOISE_SIGMA = np.array([0.03, 0.05, 0.09, 0.09, 0.015, 0.1, 0.1])
 NOISE_RHO = np.array([0.6, 0.0, 0.0, 0.0, 0.6, 0.0, 0.0])
 PRESSURE_NOISE = 0.01
@@ -123,63 +138,3 @@ def _draw_autoregressive_noise(rho: float, count: int, rng: np.random.Generator)
     for i in range(1, count):
         x[i] = rho * x[i - 1] + np.sqrt(1.0 - rho**2) * x[i]
     return x
-
-
-def classify_outcome(verdict: Verdict, truth: str | None, form: tuple[str, str] | None = None) -> str:
-    """Return how a verdict compares with the truth: right, wrong, a set with or without the truth, a form, or refused.
-
-    Parameters
-    ----------
-    verdict : verdict of `judge_runs`
-    truth : name of the effect in the data; None where there is none
-    form : port and variable of a truth outside the library
-    """
-    names = [effect.name for effect in verdict.effects]
-    if truth is None:
-        return "right" if not names else "false discovery"
-    if not names:
-        return "refused"
-    if form is not None and verdict.verdict in ("UNKNOWN_FORM", "SET"):
-        right = form in {(e.port, e.variable) for e in verdict.effects if e.effect_class == "form"}
-        if verdict.verdict == "UNKNOWN_FORM":
-            return "right form" if right else "wrong form"
-        return "set with truth" if right else "set without truth"
-    if verdict.verdict == "UNKNOWN_FORM":
-        return "form"
-    if verdict.verdict == "SET":
-        contained = truth in {*names, *(rival.name for _, rival in verdict.rivals)}
-        return "set with truth" if contained else "set without truth"
-    return "right" if names == [truth] else "wrong"
-
-
-def measure_interval_miss(verdict: Verdict, truth: str, values: Mapping[str, float]) -> float | None:
-    """Return how far the truth is from the first parameter's value, in halves of its 95 % interval on that side [1].
-
-    The interval holds the truth up to 1. None unless the truth alone is named.
-
-    Parameters
-    ----------
-    verdict : verdict of `judge_runs`
-    truth : name of the effect in the data
-    values : its parameters by name [units of the table]
-    """
-    if [effect.name for effect in verdict.effects] != [truth]:
-        return None
-    first = verdict.effects[0].parameters[0]
-    off = values[first.name] - first.value
-    half = first.ci_high - first.value if off > 0.0 else first.value - first.ci_low
-    return float(abs(off) / max(half, np.finfo(np.float64).tiny))
-
-
-def compute_exact_interval(hits: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Return the Clopper-Pearson interval of a share (Clopper and Pearson 1934, doi:10.1093/biomet/26.4.404).
-
-    Parameters
-    ----------
-    hits, trials : number of successes and of trials [1]
-    confidence : probability that the interval covers the share [1]
-    """
-    tail = 0.5 * (1.0 - confidence)
-    low = float(betaincinv(hits, trials - hits + 1, tail)) if hits else 0.0
-    high = float(betaincinv(hits + 1, trials - hits, 1.0 - tail)) if hits < trials else 1.0
-    return low, high

@@ -1,6 +1,6 @@
 """How long a question about many clips takes: DuckDB on a telemetry-only dataset beside pandas over CSV and SQLite.
 
-``python -m benchmarks.queries 10000`` makes 10,000 clips of one second (ten million ticks) and asks; the CSV holds
+``python -m studies.peers.queries 10000`` makes 10,000 clips of one second (ten million ticks) and asks; the CSV holds
 only the columns that the questions need, which is kind to pandas. SQLite's table too, and it has an index of clips.
 """
 
@@ -17,7 +17,7 @@ import pandas as pd
 import yaml
 
 import musync
-from benchmarks.side_by_side import print_rows
+from benchmarks.side_by_side import make_row, print_rows
 from flows.cli import run_to_end
 from flows.making.generate import generate_dataset
 from tasks.errors import InputError
@@ -92,22 +92,22 @@ def measure_rows(clips: int = CLIPS) -> list[dict[str, Any]]:
     peer = "pandas over CSV, both questions"
     limit = f"limit {LIMIT_S}"
     return [
-        _make_row("clips made", making / report.clips * 1000, "ms/clip"),
-        _make_row("clips", report.clips, "1"),
-        _make_row("open and connect", opening, "s"),
-        _make_row("aggregate, first time", first, "s", peer, csv),
-        _make_row("aggregate, again", again, "s", limit, LIMIT_S),
-        _make_row("one clip", single, "s", peer, csv),
-        _make_row("pandas over CSV", csv, "s"),
+        make_row("clips made", making / report.clips * 1000, "ms/clip"),
+        make_row("clips", report.clips, "1"),
+        make_row("open and connect", opening, "s"),
+        make_row("aggregate, first time", first, "s", peer, csv),
+        make_row("aggregate, again", again, "s", limit, LIMIT_S),
+        make_row("one clip", single, "s", peer, csv),
+        make_row("pandas over CSV", csv, "s"),
         # of all threads together, which says the same on a busy machine
-        _make_row("open and connect, CPU", opening_cpu, "s"),
-        _make_row("aggregate, first time, CPU", first_cpu, "s", peer, csv_cpu),
-        _make_row("aggregate, again, CPU", again_cpu, "s", limit, LIMIT_S),
-        _make_row("one clip, CPU", single_cpu, "s", peer, csv_cpu),
-        _make_row("pandas over CSV, CPU", csv_cpu, "s"),
-        _make_row("SQLite, aggregate, CPU", sqlite.aggregate_s, "s", "ours, again", again_cpu),
-        _make_row("SQLite, one clip, CPU", sqlite.single_s, "s", "ours", single_cpu),
-        _make_row("SQLite, filled and indexed, CPU", sqlite.filling_s, "s"),
+        make_row("open and connect, CPU", opening_cpu, "s"),
+        make_row("aggregate, first time, CPU", first_cpu, "s", peer, csv_cpu),
+        make_row("aggregate, again, CPU", again_cpu, "s", limit, LIMIT_S),
+        make_row("one clip, CPU", single_cpu, "s", peer, csv_cpu),
+        make_row("pandas over CSV, CPU", csv_cpu, "s"),
+        make_row("SQLite, aggregate, CPU", sqlite.aggregate_s, "s", "ours, again", again_cpu),
+        make_row("SQLite, one clip, CPU", sqlite.single_s, "s", "ours", single_cpu),
+        make_row("SQLite, filled and indexed, CPU", sqlite.filling_s, "s"),
     ]
 
 
@@ -147,13 +147,6 @@ def _measure_sqlite(csv: Path, clip: str) -> _OfSqlite:
     return _OfSqlite(filling_s, aggregate_s, single_s, table, slip)
 
 
-def _make_row(
-    name: str, value: float, unit: str, peer: str | None = None, held_against: float | None = None
-) -> dict[str, Any]:
-    ratio = None if held_against is None else value / held_against
-    return {"name": name, "value": value, "unit": unit, "peer": peer, "ratio": ratio}
-
-
 def _open_dataset(folder: Path) -> musync.Dataset:
     data = musync.open(folder)
     data.connection.execute("SELECT 1").fetchall()
@@ -175,7 +168,7 @@ def _measure_time(call: Callable[[], Any]) -> tuple[float, float, Any]:
 
 def run_benchmark() -> None:
     """Ask about as many clips as the command line names, and print a row for each question and tool."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.queries")
+    parser = argparse.ArgumentParser(prog="python -m studies.peers.queries")
     parser.add_argument(
         "clips",
         type=int,

@@ -1,4 +1,4 @@
-"""One braking run in the model beside SciPy's solvers, in one run: ``python -m benchmarks.rollouts``.
+"""One braking run in the model beside SciPy's solvers, in one run: ``python -m studies.peers.rollouts``.
 
 Coupled mode, dry and flat, 60 km/h, braked from the first second on, until shortly before the stop. The solvers get
 the same equations and the same times of the log; each is asked for the loosest tolerance by which its error is no

@@ -1,4 +1,4 @@
-"""``python -m benchmarks.scale.make GRID DIR``: drive a run of copied clips; a line of JSON a stage."""
+"""``python -m studies.scale.make GRID DIR``: drive a run of copied clips; a line of JSON a stage."""
 
 import json
 import os
@@ -14,7 +14,7 @@ import psutil
 
 import flows.making.gathering as gathering
 import flows.making.generate as generate
-from benchmarks.scale.copies import CopiedClips
+from studies.scale.copies import CopiedClips
 
 EVERY_S = 0.02
 

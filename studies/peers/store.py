@@ -1,4 +1,4 @@
-"""Frames in the dataset store beside other forms of keeping them, in one run: ``python -m benchmarks.store``.
+"""Frames in the dataset store beside other forms of keeping them, in one run: ``python -m studies.peers.store``.
 
 The frames are those of one dry clip of the built-in street, colour alone. Every form writes whole files, and none
 waits for the disk: the store's flush is left out. Peers are used as a careful user would: PNG at OpenCV's own level,

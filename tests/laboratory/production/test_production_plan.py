@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.production.plan import ClipCosts, Prices, measure_scheduling, plan_production
 from flows.store.layout import Layout
+from studies.production.plan import ClipCosts, Prices, measure_scheduling, plan_production
 from tasks.errors import InputError
 
 COSTS = ClipCosts(

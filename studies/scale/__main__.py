@@ -1,7 +1,7 @@
-"""``python -m benchmarks.scale [CLIPS ...] [--folder DIR]``: how time and memory grow with the clips of a dataset.
+"""``python -m studies.scale [CLIPS ...] [--folder DIR]``: how time and memory grow with the clips of a dataset.
 
 Each dataset is driven, described, verified and queried by a process of its own, the last three as a user calls them.
-Time is of the processor [s], memory the largest of that process [MiB]. Clips are copies (`benchmarks.scale.copies`):
+Time is of the processor [s], memory the largest of that process [MiB]. Clips are copies (`studies.scale.copies`):
 a driver leaves making them to its workers. A folder in memory (``--folder /dev/shm``) leaves the disk out of it.
 """
 
@@ -17,7 +17,7 @@ from typing import Any
 
 import yaml
 
-from benchmarks.scale.copies import grid_of
+from studies.scale.copies import grid_of
 
 CLIPS = (2000, 8000, 20_000)
 LARGEST_DRIVER_MIB = 500
@@ -54,7 +54,7 @@ def measure_size(clips: int, place: Path) -> list[dict[str, Any]]:
     """One dataset: a row for each stage of making it, and for each command that reads it."""
     grid, folder = place / f"{clips}.yaml", place / str(clips)
     grid.write_text(yaml.safe_dump(grid_of(clips), sort_keys=False))
-    _, printed = measure_process([sys.executable, "-m", "benchmarks.scale.make", str(grid), str(folder)])
+    _, printed = measure_process([sys.executable, "-m", "studies.scale.make", str(grid), str(folder)])
     rows = [{"clips": clips} | json.loads(line) for line in printed.splitlines()]
     for name, (words, *rest) in COMMANDS.items():
         figures, _ = measure_process([sys.executable, "-m", "flows.cli", *words, str(folder), *rest])

@@ -1,4 +1,4 @@
-"""``python -m benchmarks.production [--clips N] [--workers N] [--measure]``: what a large production takes.
+"""``python -m studies.production [--clips N] [--workers N] [--measure]``: what a large production takes.
 
 With ``--measure`` the scheduler's share is measured (three minutes), and the requests are counted on a server here;
 else the constants of docs/how-to/plan-a-million-clips.md stand.
@@ -8,7 +8,10 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from benchmarks.production.plan import (
+from catalogs.grids.form import MOST_CLIPS
+from flows.cli import run_to_end
+from flows.store.layout import Layout
+from studies.production.plan import (
     CALLS,
     WORKERS,
     ClipCosts,
@@ -16,9 +19,6 @@ from benchmarks.production.plan import (
     measure_scheduling,
     plan_production,
 )
-from catalogs.grids.form import MOST_CLIPS
-from flows.cli import run_to_end
-from flows.store.layout import Layout
 
 
 def print_plan() -> None:

@@ -1,4 +1,4 @@
-"""Random windows as a team that trains draws them, from the store and its peers: ``python -m benchmarks.loading``.
+"""Random windows as a team that trains draws them, from the store and its peers: ``python -m studies.peers.loading``.
 
 Three clips of the built-in street (dry, rain, snow) of 81 frames at 480 x 320, colour alone; windows of 16 frames from
 random places. Figures are of processor time. A tar has an index of its members, so that it can be drawn from at random;
@@ -21,10 +21,10 @@ import zarr
 from torch.utils.data import DataLoader, Dataset
 
 from benchmarks.side_by_side import least_cpu_s, make_row, print_rows
-from benchmarks.store import Mp4, Store, StoredFrames, TarOfPng
 from flows.making.generate import generate_dataset
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
+from studies.peers.store import Mp4, Store, StoredFrames, TarOfPng
 
 FRAMES, WINDOW, DRAWS, REPEATS = 81, 16, 24, 3
 GRID = {
