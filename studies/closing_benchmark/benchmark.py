@@ -12,10 +12,15 @@ from flows.store.journal import append_line, read_lines
 from flows.store.outputs import Outputs
 from manifests.provenance import code_version
 from studies.closing_benchmark.harder import load_harder
-from studies.closing_benchmark.summary import pair_outcome, summarise_benchmark
+from studies.closing_benchmark.summary import (
+    classify_outcome,
+    measure_interval_miss,
+    pair_outcome,
+    summarise_benchmark,
+)
+from studies.closing_benchmark.synthetic import RICH, make_synthetic_campaign
 from studies.closing_benchmark.tables import benchmark_tables
-from tasks.campaign.planned_runs import RICH, RunPlan
-from tasks.identification.benchmark import classify_outcome, make_synthetic_campaign, measure_interval_miss
+from tasks.campaign.planned_runs import RunPlan
 from tasks.identification.decision.answer import Verdict
 from tasks.identification.decision.verdict import judge_runs
 

@@ -8,8 +8,9 @@ from pydantic import Field
 from catalogs.effects.truths import Truth
 from catalogs.names import WeatherName
 from catalogs.quantities import CatalogueEntry, Number
+from studies.closing_benchmark.synthetic import TRAINING
 from studies.plans import load_plan
-from tasks.campaign.planned_runs import TRAINING, RunPlan
+from tasks.campaign.planned_runs import RunPlan
 from tasks.surface.weather import DRY
 
 Positive = Annotated[float, Field(strict=True, gt=0)]

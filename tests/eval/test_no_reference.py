@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from benchmarks.synthetic_street import Clip
+from studies.synthetic_street import Clip
 from tasks.eval.no_reference import piqe, temporal_error
 
 

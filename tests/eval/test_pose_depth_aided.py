@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from benchmarks.synthetic_street import Clip
+from studies.synthetic_street import Clip
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
 from tasks.eval.poses.motion import RecoveredMotion

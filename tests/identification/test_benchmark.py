@@ -13,15 +13,14 @@ from catalogs.entries import load
 from flows.measured.closing_error_rates import JUDGES
 from manifests.provenance import source_hashes
 from studies.closing_benchmark import benchmark as closing_benchmark
-from studies.closing_benchmark.harder import load_harder
-from studies.closing_benchmark.summary import pair_outcome, summarise_benchmark
-from tasks.campaign.planned_runs import TRAINING
-from tasks.identification.benchmark import (
+from studies.closing_benchmark.summary import (
     classify_outcome,
     compute_exact_interval,
-    make_synthetic_campaign,
     measure_interval_miss,
+    pair_outcome,
+    summarise_benchmark,
 )
+from studies.closing_benchmark.synthetic import TRAINING, make_synthetic_campaign
 
 ROOT = Path(closing_benchmark.__file__).parents[2]
 VEHICLE, SURFACE = load("vehicle", "paper-reference"), load("surface", "dense-asphalt")
@@ -48,12 +47,6 @@ def test_the_exact_interval_is_clopper_and_pearsons() -> None:
     assert compute_exact_interval(0, 100) == pytest.approx((0.0, 1.0 - 0.025**0.01))
     low, high = compute_exact_interval(3, 40)
     assert binom.sf(2, 40, low) == pytest.approx(0.025) and binom.cdf(3, 40, high) == pytest.approx(0.025)
-
-
-def test_every_truth_is_of_the_library_or_a_form_outside_it() -> None:
-    truths = load("list of truths")
-    assert sum(t.in_library for t in truths) >= 20 and sum(not t.in_library for t in truths) >= 6
-    assert all((t.form is None) == t.in_library for t in truths)
 
 
 @pytest.mark.parametrize(("truth", "miss"), [(0.06, 0.0), (0.08, 1.0), (0.1, 2.0), (0.05, 1.0), (0.045, 1.5)])
@@ -159,15 +152,6 @@ def test_a_form_counts_by_its_port_and_variable_and_a_set_by_the_truth_in_it(
     assert classify_outcome(found, "lag" if form is None else "hump", form) == expected
 
 
-def test_every_truth_is_in_two_pairs_and_no_pair_comes_twice() -> None:
-    library = tuple(truth for truth in load("list of truths") if truth.in_library)
-    pairs = [frozenset(truth.name for truth in pair) for pair in load_harder().pairs(library)]
-    assert len(set(pairs)) == len(pairs) == len(library)
-    assert {name: sum(name in pair for pair in pairs) for name in set().union(*pairs)} == {
-        truth.name: 2 for truth in library
-    }
-
-
 def test_the_summary_counts_each_kind_once() -> None:
     rows = [
         row(None, "right"), row(None, "false discovery"), row("brake_lag", "right", covered=True),
@@ -186,14 +170,6 @@ def test_the_summary_counts_each_kind_once() -> None:
     # sizes and poor designs have shares of their own
     assert result["confusion"]["brake_lag"] == {"right": 1, "wrong": 1}
     assert result["named_instead"] == {"brake_lag": {"brake_dead_time": 1}, "nothing": {"brake_dead_time": 1}}
-
-
-def test_a_later_first_seed_makes_other_campaigns_of_the_same_truths_and_the_same_nulls() -> None:
-    first, later = (list(closing_benchmark._plan(2, seed, 4, 1)) for seed in (0, 5))
-    assert [(p.kind, p.name) for p in first] == [(p.kind, p.name) for p in later]
-    moved = {p.kind for p, q in zip(first, later, strict=True) if p.seed != q.seed}
-    assert moved == {"library", "outside", "size"}
-    assert {q.seed - p.seed for p, q in zip(first, later, strict=True) if p.kind in moved} == {5}
 
 
 NO_JUDGE = (
@@ -221,8 +197,3 @@ def test_every_source_that_a_verdict_imports_counts_in_its_hash_or_is_known_to_d
     untold = [file for file in own if not file.startswith((*JUDGES, *NO_JUDGE))]
     assert untold == []
     assert all(any(file.startswith(place) for file in source_hashes()) for place in JUDGES)
-
-
-def test_the_counts_of_the_benchmark_are_no_source_of_a_verdict() -> None:
-    """Else the file that says which version judged again would make that version another one."""
-    assert not "catalogs/studies/closing_error_rates.json".startswith(JUDGES)

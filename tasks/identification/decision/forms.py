@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from tasks.campaign.campaign import CHANNELS
 from tasks.identification.decision.excitation import read_variable
-from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.evidence import RunEvidence
+from tasks.identification.inference.evidence import Evidence, RunEvidence
 from tasks.identification.inference.fit import Fit
 from tasks.identification.inference.forward import (
     RunModel,

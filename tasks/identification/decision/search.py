@@ -32,8 +32,8 @@ from tasks.identification.decision.odds import (
     search_explanations,
 )
 from tasks.identification.decision.open_explanations import select_members
-from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.discrepancy import estimate_run_noise, set_run_noise
+from tasks.identification.inference.evidence import Evidence
 from tasks.identification.inference.fit import Fit, fit_hypotheses
 from tasks.identification.inference.forward import prepare_run
 from tasks.identification.inference.hypothesis import Hypothesis, make_library_hypothesis
