@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from catalogs.entries import load
+from studies.evaluation.clip_prompts import load_prompts
 from studies.evaluation.learned_judges import load_judges
 from studies.evaluation.learned_rows import learned_rows
 from tasks.errors import InputError
@@ -131,7 +131,7 @@ def test_temporal_distance_looks_at_forty_pairs_in_two_roadside_boxes_that_scale
 
 
 def test_the_prompts_are_twelve_sentences_in_the_order_of_the_features():
-    prompts = load("list of prompts")
+    prompts = load_prompts()
     assert list(prompts) == ["dry", "rain", "snow"]
     assert len({sentence for four in prompts.values() for sentence in four}) == 12
     assert all(word in " ".join(prompts[word]) for word in prompts)
