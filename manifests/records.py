@@ -87,7 +87,10 @@ else:
     # a dataset decides what it has: a figure that came later is not represented
     _figures = {c.name: NotRequired[float | None] for c in CLIP_CHANNELS if c.name not in SCENARIO_FIELDS}
     FiguresRecord = with_config(STRICT)(
-        TypedDict("FiguresRecord", {**_figures, "calibration_extrapolated": bool})
+        TypedDict(
+            "FiguresRecord",
+            {**_figures, "calibration_extrapolated": bool, "collided": NotRequired[bool | None]},
+        )
     )
     _checks = {name: NotRequired[kind | None] for name, kind in get_type_hints(PoseVerdict).items()}
     VerdictRecord = with_config(STRICT)(

@@ -15,7 +15,7 @@ COMMANDS = (
             define_option(
                 "protocol",
                 list[str] | None,
-                "Protocol of catalogs/emergency_braking.yaml; by default each.",
+                "Protocol of catalogs/emergency_braking.yaml, or an OpenSCENARIO file; by default each.",
                 None,
             ),
             define_option("weather", list[str] | None, "Weather of that file; by default each.", None),

@@ -214,6 +214,7 @@ class Campaign:
     brake_signal : signal or unit that stands for the brake pressure
     brake_rest : what that signal says at rest in all runs alike, taken off it, as a pressure [MPa]
     throttle_rest : what the throttle reads while the brake is applied, taken off it [1]
+    resting_gauge : sentence of the check of a brake pressure that rests above 0 and is not taken off; else empty
     """
 
     name: str
@@ -226,6 +227,7 @@ class Campaign:
     brake_signal: str = "brake_pressure"
     brake_rest: float = 0.0
     throttle_rest: float = 0.0
+    resting_gauge: str = ""
 
     @property
     def is_measured(self) -> NDArray[np.bool_]:

@@ -49,6 +49,9 @@ class RoadEditSettings:
     search_side: float = 0.1
 
 
+CHOSEN = RoadEditSettings()
+
+
 @dataclass(frozen=True, kw_only=True)
 class DetectedEdit:
     """Pixels of a frame that an edit changed.
@@ -91,7 +94,7 @@ class RoadEditScore:
 
 
 def register_background(
-    moving: NDArray[np.uint8], fixed: NDArray[np.uint8], background: Mask, settings: RoadEditSettings
+    moving: NDArray[np.uint8], fixed: NDArray[np.uint8], background: Mask
 ) -> tuple[NDArray[np.uint8], bool]:
     """Warp the moving picture onto the fixed one by affine ECC on the background (Evangelidis 2008).
 
@@ -99,18 +102,17 @@ def register_background(
     ----------
     moving, fixed : uint8 [H, W, 3] sRGB pictures [1]
     background : bool [H, W] pixels that count [1]
-    settings : iterations, tolerance, filter
 
     Returns
     -------
     The warped picture, and whether the registration converged.
     """
     grey = [cv2.cvtColor(p, cv2.COLOR_RGB2GRAY) for p in (fixed, moving)]
-    end = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, settings.ecc_iterations, settings.ecc_tolerance)
+    end = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, CHOSEN.ecc_iterations, CHOSEN.ecc_tolerance)
     warp = np.eye(2, 3, dtype=np.float32)
     try:
         _, warp = cv2.findTransformECC(
-            grey[0], grey[1], warp, cv2.MOTION_AFFINE, end, background.astype(np.uint8), settings.ecc_filter
+            grey[0], grey[1], warp, cv2.MOTION_AFFINE, end, background.astype(np.uint8), CHOSEN.ecc_filter
         )
     except cv2.error:
         return moving, False
@@ -130,62 +132,56 @@ def compute_paired_residual(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> NDArr
     return np.abs(lab[0] - lab[1]).mean(axis=2)
 
 
-def detect_edit(
-    feature: NDArray[np.uint8], flat: NDArray[np.uint8], target: Mask, settings: RoadEditSettings
-) -> DetectedEdit:
+def detect_edit(feature: NDArray[np.uint8], flat: NDArray[np.uint8], target: Mask) -> DetectedEdit:
     """Return the pixels that differ between a feature frame and its flat control, at the target and elsewhere.
 
     Parameters
     ----------
     feature, flat : uint8 [H, W, 3] sRGB pictures [1]
     target : bool [H, W] where the feature is prescribed [1]
-    settings : constants
     """
     height, width = target.shape
-    wide = _widen(target, settings)
+    wide = _widen(target)
     background = ~wide
-    background[round((1 - settings.lower_share) * height) :] = False
-    laid, converged = register_background(flat, feature, background, settings)
+    background[round((1 - CHOSEN.lower_share) * height) :] = False
+    laid, converged = register_background(flat, feature, background)
     residual = compute_paired_residual(feature, laid)
     quiet = residual[background]
     middle = float(np.median(quiet))
-    spread = max(float(np.median(np.abs(quiet - middle))), settings.mad_floor)
-    side = round(settings.search_side * width)
+    spread = max(float(np.median(np.abs(quiet - middle))), CHOSEN.mad_floor)
+    side = round(CHOSEN.search_side * width)
     search = wide.copy()
-    search[round(settings.search_top * height) :, side : width - side] = True
-    changed = (residual > max(settings.floor, middle + settings.mads * spread)) & search
-    return keep_components(changed, target, settings, converged)
+    search[round(CHOSEN.search_top * height) :, side : width - side] = True
+    changed = (residual > max(CHOSEN.floor, middle + CHOSEN.mads * spread)) & search
+    return keep_components(changed, target, converged)
 
 
-def keep_components(
-    changed: Mask, target: Mask, settings: RoadEditSettings, converged: bool = True
-) -> DetectedEdit:
+def keep_components(changed: Mask, target: Mask, converged: bool = True) -> DetectedEdit:
     """Return what the metric's morphology leaves of changed pixels.
 
     Parameters
     ----------
     changed : bool [H, W] pixels above the threshold [1]
     target : bool [H, W] where the feature is prescribed [1]
-    settings : constants
     converged : whether the registration converged
     """
-    wide, pixels = _widen(target, settings), changed.astype(np.uint8)
-    changed = cv2.morphologyEx(pixels, cv2.MORPH_OPEN, np.ones(settings.opening[::-1], np.uint8))
-    changed = cv2.morphologyEx(changed, cv2.MORPH_CLOSE, np.ones(settings.closing[::-1], np.uint8))
+    wide, pixels = _widen(target), changed.astype(np.uint8)
+    changed = cv2.morphologyEx(pixels, cv2.MORPH_OPEN, np.ones(CHOSEN.opening[::-1], np.uint8))
+    changed = cv2.morphologyEx(changed, cv2.MORPH_CLOSE, np.ones(CHOSEN.closing[::-1], np.uint8))
     count, label, facts, _ = cv2.connectedComponentsWithStats(changed)
-    large = [i for i in range(1, count) if facts[i, cv2.CC_STAT_AREA] >= settings.component_px]
+    large = [i for i in range(1, count) if facts[i, cv2.CC_STAT_AREA] >= CHOSEN.component_px]
     edit: Mask = np.isin(label, large)
     # parts of one component beyond the dilation are no part of the mask, so that its centroid is of the target's change
     mask: Mask = edit & wide
-    if (mask & target).sum() < settings.coverage * target.sum():
+    if (mask & target).sum() < CHOSEN.coverage * target.sum():
         mask[:] = False
     return DetectedEdit(
         mask=mask, outside=int((edit & ~wide).sum()), changed=int(edit.sum()), converged=converged
     )
 
 
-def _widen(target: Mask, settings: RoadEditSettings) -> Mask:
-    reach = 2 * settings.dilation_px + 1
+def _widen(target: Mask) -> Mask:
+    reach = 2 * CHOSEN.dilation_px + 1
     ball = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach))
     return cv2.dilate(target.astype(np.uint8), ball) > 0
 
@@ -211,7 +207,6 @@ def temporal_iou(
 
 def score_road_edit(
     feature: Sequence[NDArray[np.uint8]], flat: Sequence[NDArray[np.uint8]], targets: Sequence[Mask],
-    settings: RoadEditSettings | None = None,
 ) -> RoadEditScore | None:  # fmt: skip
     """Localised edit rate, anchor error and temporal IoU of one pair of clips; None if the target is never seen.
 
@@ -219,19 +214,15 @@ def score_road_edit(
     ----------
     feature, flat : F pictures each, uint8 [H, W, 3] sRGB [1]
     targets : F masks, bool [H, W] [1]
-    settings : constants
     """
-    chosen = settings or RoadEditSettings()
-    active = [k for k, target in enumerate(targets) if target.sum() >= chosen.active_px]
+    active = [k for k, target in enumerate(targets) if target.sum() >= CHOSEN.active_px]
     if not active:
         return None
-    found = {k: detect_edit(feature[k], flat[k], targets[k], chosen) for k in active}
+    found = {k: detect_edit(feature[k], flat[k], targets[k]) for k in active}
     return score_edits(found, feature, targets)
 
 
-def score_true_masks(
-    feature: Sequence[NDArray[np.uint8]], targets: Sequence[Mask], settings: RoadEditSettings | None = None
-) -> RoadEditScore | None:
+def score_true_masks(feature: Sequence[NDArray[np.uint8]], targets: Sequence[Mask]) -> RoadEditScore | None:
     """Return the score of a detector that finds every target without error; None if the target is never seen.
 
     Morphology and flow stay the metric's, which is why it scores less than 1.
@@ -240,13 +231,11 @@ def score_true_masks(
     ----------
     feature : F pictures, uint8 [H, W, 3] sRGB, whose flow carries the masks [1]
     targets : F masks, bool [H, W] [1]
-    settings : constants
     """
-    chosen = settings or RoadEditSettings()
     found = {
-        k: keep_components(target, target, chosen)
+        k: keep_components(target, target)
         for k, target in enumerate(targets)
-        if target.sum() >= chosen.active_px
+        if target.sum() >= CHOSEN.active_px
     }
     return score_edits(found, feature, targets) if found else None
 

@@ -19,6 +19,8 @@ WINDOWS: tuple[int | None, ...] = (None, 5, 7, 9)
 PAPER_OPENING = 2.2
 """When the paper's event window opens (Appendix A.5) [s]: 2.2 to 3.8 s holds 25 frames at 16 and 17 at 10 a second."""
 
+ORDER, GRID = 2, 101
+"""Of the Savitzky-Golay polynomial, and samples of the common progress grid of the path error [1]."""
 LEAST_RESPONSE = 1e-9
 """Pitch below which two clips are one [rad]: what rounding leaves of a difference of equal angles."""
 
@@ -31,25 +33,20 @@ class MotionProtocol:
     ----------
     event : event window from its opening [s]
     before, after : flanking intervals of the local baseline, from the same opening [s]
-    order : of the Savitzky-Golay polynomial [1]
-    grid : samples of the common progress grid of the path error [1]
     """
 
     event: tuple[float, float] = (0.0, 1.6)
     before: tuple[float, float] = (-0.5, -0.05)
     after: tuple[float, float] = (1.65, 2.1)
-    order: int = 2
-    grid: int = 101
 
 
-def smooth_signal(values: Floats, window: int | None, order: int = 2) -> Floats:
+def smooth_signal(values: Floats, window: int | None) -> Floats:
     """Smooth by Savitzky and Golay what is known; without a window return a copy.
 
     Parameters
     ----------
     values : [F] NaN where they are not known: before or after, and not within, those that are [any]
-    window : odd, above the order, None for no smoothing [frames]
-    order : of the polynomial [1]
+    window : odd, above `ORDER`, None for no smoothing [frames]
 
     Raises
     ------
@@ -62,11 +59,11 @@ def smooth_signal(values: Floats, window: int | None, order: int = 2) -> Floats:
     known = np.isfinite(values)
     if known.sum() < window:
         raise InputError(f"A smoothing window of {window} frames needs as many; known are {known.sum()}.")
-    smoothed[known] = savgol_filter(values[known], window, order)
+    smoothed[known] = savgol_filter(values[known], window, ORDER)
     return smoothed
 
 
-def normalised_progress(forward: Floats, window: int | None, order: int = 2) -> Floats:
+def normalised_progress(forward: Floats, window: int | None) -> Floats:
     """Return a monocular forward coordinate as braking progress in [0, 1].
 
     It is smoothed, given the sign with which it ends ahead, min-max normalised, smoothed again, made monotone by its
@@ -75,18 +72,18 @@ def normalised_progress(forward: Floats, window: int | None, order: int = 2) -> 
     Parameters
     ----------
     forward : [F] recovered forward coordinate on the common frame grid, any scale and sign [1]
-    window, order : of the smoothing [frames], [1]
+    window : of the smoothing [frames]
 
     Raises
     ------
     InputError
         If the car does not move.
     """
-    x = smooth_signal(forward, window, order)
+    x = smooth_signal(forward, window)
     x = x * (1.0 if x[-1] >= x[0] else -1.0)
     if not np.ptp(x) > 0:
         raise InputError("Progress cannot be normalised: the recovered car does not move.")
-    x = smooth_signal((x - x.min()) / np.ptp(x), window, order)
+    x = smooth_signal((x - x.min()) / np.ptp(x), window)
     return np.clip(np.maximum.accumulate(x), 0.0, 1.0)
 
 
@@ -99,26 +96,6 @@ def reference_progress(station: Floats) -> Floats:
     """
     way = station - station[0]
     return way / way.max()
-
-
-def resample_onto_grid(times: Floats, values: Floats, grid: Floats) -> Floats:
-    """Return a recovered coordinate at the times of the common grid, linear between frames.
-
-    Parameters
-    ----------
-    times : [F] rising from 0 [s]
-    values : [F] [any]
-    grid : [N] rising from 0 [s]
-
-    Raises
-    ------
-    InputError
-        If the video ends before the grid does, by more than half a frame.
-    """
-    slack = 0.5 * float(np.median(np.diff(times)))
-    if times[-1] < grid[-1] - slack:
-        raise InputError(f"The video ends at {times[-1]:.2f} s; the protocol judges it to {grid[-1]:.2f} s.")
-    return np.interp(grid, times, values)
 
 
 def weather_error(
@@ -198,9 +175,8 @@ def event_response(times: Floats, pitch: Floats, opening: float, protocol: Motio
 
 
 def geometry_error(
-    times: Floats, pitch: Floats, reference: Floats, opening: float, window: int | None,
-    protocol: MotionProtocol | None = None,
-) -> float:  # fmt: skip
+    times: Floats, pitch: Floats, reference: Floats, opening: float, window: int | None
+) -> float:
     """E_geometry: RMSE of the event's pitch over the RMS of the reference's; 1 without any response [1].
 
     The baseline is taken from both, so that a perfect estimate scores 0 without smoothing; the reference is
@@ -212,23 +188,21 @@ def geometry_error(
     pitch, reference : [F] recovered and reference pitch, one sign convention [rad]
     opening : when the event window opens [s]
     window : smoothing of the recovered pitch [frames]
-    protocol : windows and flanks
     """
-    chosen = protocol or MotionProtocol()
+    chosen = MotionProtocol()
     meant = event_response(times, reference, opening, chosen)
-    seen = event_response(times, smooth_signal(pitch, window, chosen.order), opening, chosen)
+    seen = event_response(times, smooth_signal(pitch, window), opening, chosen)
     return rms(seen - meant) / rms(meant)
 
 
-def path_error(path: Floats, control: Floats, grid: int = 101) -> float:
+def path_error(path: Floats, control: Floats) -> float:
     """E_path: RMS difference of normalised lateral coordinates on a common grid of normalised progress [1].
 
     Parameters
     ----------
     path, control : [F, 2] forward and lateral coordinate of a clip and of its dry control, any scale [1]
-    grid : samples of the progress grid [1]
     """
-    u = np.linspace(0.0, 1.0, grid)
+    u = np.linspace(0.0, 1.0, GRID)
     lateral = []
     for track in (path, control):
         way = np.maximum.accumulate(track[:, 0] - track[0, 0])

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from tasks.eval.road_edit import (
-    RoadEditSettings,
     register_background,
     score_road_edit,
     score_true_masks,
@@ -90,7 +89,7 @@ def test_a_true_outline_of_fewer_rows_than_the_opening_is_lost() -> None:
 
 
 def test_registration_undoes_a_shift() -> None:
-    laid, converged = register_background(shift_picture(GROUND, 2, -1), GROUND, ~SPOT, RoadEditSettings())
+    laid, converged = register_background(shift_picture(GROUND, 2, -1), GROUND, ~SPOT)
     assert converged
     assert np.abs(laid[10:-10, 10:-10].astype(int) - GROUND[10:-10, 10:-10]).mean() < 3
 
