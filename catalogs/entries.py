@@ -45,7 +45,6 @@ KINDS = {
     "camera": Kind("cameras", "cameras:CameraEntry"),
     "channel map": Kind("channel_maps", "channel_maps:build_channel_map"),
     "cut of the low-speed rule": Kind("studies/no_low_speed_rule.yaml", "low_speed:LowSpeedCutEntry"),
-    "emergency braking": Kind("emergency_braking.yaml", "emergency_braking:EmergencyBraking"),
     "foreign gate file": Kind("foreign_gates.yaml", "gates:ForeignGateEntry"),
     "gate file": Kind("gates.yaml", "gates:GateEntry"),
     "grade of the road": Kind("road_grade.yaml", "road_grade:RoadGradeEntry"),
