@@ -173,7 +173,7 @@ def _describe_own_numbers(outcome: Outcome, library: Sequence[Effect]) -> str:
     base = outcome.fitted
     place = int(np.argmax(base.pulls[: len(SESSION)]))
     number = next(e for e in library if e.effect_class == "retune" and e.parameters[0].name == SESSION[place])
-    return f"most: {number.say({SESSION[place]: float(base.session[place])})}"
+    return f"most: {number.describe({SESSION[place]: float(base.session[place])})}"
 
 
 def split_of(campaign: Campaign) -> dict[str, Any]:
