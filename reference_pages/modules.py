@@ -100,7 +100,6 @@ PAGES: dict[str, tuple[str, str, tuple[str, ...]]] = {
             "tasks.campaign.campaign",
             "tasks.campaign.channels",
             "tasks.campaign.signals",
-            "tasks.identification.decision.held_out",
             "tasks.identification.rules",
             "tasks.identification.inference.hypothesis",
             "tasks.identification.inference.forward",

@@ -25,6 +25,8 @@ class SemanticClass(IntEnum):
     OTHER = 10
 
 
+GRAVITY = 9.80665
+"""Standard acceleration of free fall (CGPM 1901) [m/s2]."""
 ROAD_CLASSES = (SemanticClass.ROAD, SemanticClass.MARKING)
 """Classes that hold the water film and the snow cover, and that follow the road profile."""
 ANY_HEADING = "any-heading"

@@ -34,8 +34,9 @@ from manifests.provenance import code_version
 from tasks.errors import InputError
 from tasks.kernel_cache import sources_hash
 from tasks.surface.weather import WEATHERS, Weather, find_weather, surface_state
-from tasks.vehicle.model.embedded import STEP, compile_advance
+from tasks.vehicle.model.embedded import compile_advance
 from tasks.vehicle.model.embedded_variables import INPUTS, OUTPUTS, EmbeddedVariable
+from tasks.vehicle.model.simulation import INTERNAL_STEP_S
 from tasks.vehicle.parameters import Vehicle
 
 SUFFIX = ".fmu"
@@ -107,7 +108,7 @@ def write_fmu(
         "fmu": out,
         "vehicle": car.name,
         "platforms": compilable,
-        "step_s": STEP,
+        "step_s": INTERNAL_STEP_S,
         "weathers": car.find_weathers(),
         "parameters": [row.name for row in INPUTS if row.role == "parameter"],
         "inputs": [row.name for row in INPUTS if row.role == "input"],
@@ -208,7 +209,9 @@ def format_description(
     units = ElementTree.SubElement(root, "UnitDefinitions")
     for unit, base in UNITS.items():
         ElementTree.SubElement(ElementTree.SubElement(units, "Unit", name=write_unit(unit)), "BaseUnit", base)
-    ElementTree.SubElement(root, "DefaultExperiment", startTime="0", stopTime="5", stepSize=str(2 * STEP))
+    ElementTree.SubElement(
+        root, "DefaultExperiment", startTime="0", stopTime="5", stepSize=str(2 * INTERNAL_STEP_S)
+    )
     variables = ElementTree.SubElement(root, "ModelVariables")
     for reference, row in enumerate((*INPUTS, *OUTPUTS)):
         description = (

@@ -7,10 +7,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from flows.exporting.dataset import ExportedClip
+from tasks.conventions import GRAVITY
 from tasks.vehicle.parameters import Vehicle
 
-STANDARD_GRAVITY = 9.80665
-"""CGPM 1901 [m s-2]."""
 FORWARD, LEFT, UP = np.eye(3)
 Vectors = NDArray[np.float64]
 
@@ -89,7 +88,7 @@ def compute_inertial_motion(
     return InertialMotion(
         attitude=attitude,
         velocity=route.apply(along + np.cross(turn, reach) + moved),
-        force=route.apply(acceleration) + STANDARD_GRAVITY * UP,
+        force=route.apply(acceleration) + GRAVITY * UP,
         turn_rate=route.apply(turn + pitch_rate),
     )
 

@@ -173,7 +173,7 @@ def _describe_own_numbers(outcome: Outcome, library: Sequence[Effect]) -> str:
     base = outcome.fitted
     index = int(np.argmax(base.pulls[: len(SESSION)]))
     number = next(e for e in library if e.effect_class == "retune" and e.parameters[0].name == SESSION[index])
-    return f"most: {number.say({SESSION[index]: float(base.session[index])})}"
+    return f"most: {number.describe({SESSION[index]: float(base.session[index])})}"
 
 
 def split_of(campaign: Campaign) -> dict[str, Any]:

@@ -213,7 +213,7 @@ def _draw_limits(name: str, ends: Values, reach: float) -> Line:
 
 
 def _draw_band(name: str, x: NDArray[np.float64], explanation: Explanation, form: Candidate) -> Line:
-    numbers = explanation.find_places(form)
+    numbers = explanation.find_numbers(form)
     values, reach = explanation.values[numbers], NORMAL_QUANTILE * explanation.errors[numbers]
     return Line(
         name=name, x=x, y=values, low=values - reach, high=values + reach, marked=True, style=STYLES[name]

@@ -20,6 +20,8 @@ FILE_NUMBERS = (*SESSION, "friction")
 
 LEAST_SAMPLES = 20
 """A shorter run holds no stop: 20 samples are a second at 20 Hz."""
+BRAKING_PRESSURE = 0.1
+"""Brake pressure, or what stands for it, from which a car brakes [MPa]: it gives 0.2 m/s^2."""
 MASKED_SPEED = 2.0
 """Speed below which a run is not used: the floor of the slip's denominator distorts slip there [m/s]."""
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.campaign import MASKED_SPEED
-from tasks.campaign.channels import GRAVITY
 from tasks.campaign.measured import MeasuredRun
+from tasks.conventions import GRAVITY
 
 FEWEST_SAMPLES = 5
 """Samples of the speed that a run needs beside its own two numbers [1]."""

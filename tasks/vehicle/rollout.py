@@ -16,14 +16,13 @@ from tasks.vehicle.brake import BrakeCommand
 from tasks.vehicle.history import History
 from tasks.vehicle.model.brake_input import make_command_input
 from tasks.vehicle.model.chassis import Conditions
-from tasks.vehicle.model.simulation import COLUMNS, Recording, Simulation, simulate
+from tasks.vehicle.model.simulation import COLUMNS, INTERNAL_STEP_S, Recording, Simulation, simulate
 from tasks.vehicle.paper.low_speed import SteadyStop
 from tasks.vehicle.paper.paper_mode import StepGrid, run_paper_mode, sample_history
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle, compute_surface_response
 
 Mode = Literal["paper", "coupled"]
 MODES: tuple[Mode, ...] = ("paper", "coupled")
-INTERNAL_STEP_S = 0.0005
 TICK_NS = 1_000_000
 
 

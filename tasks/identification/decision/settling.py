@@ -59,11 +59,9 @@ def fit_named(finding: Finding, opened: OpenExplanation) -> Fit:
     for i, part in enumerate(parts):
         if part.effect_class == "form":
             member = next(m for m in opened.named if m.name == part.name)
-            places = kept.find_places(member)
+            own = kept.find_numbers(member)
             grid = np.linspace(*ranges[part.variable], KNOTS)
-            shapes = make_form_hypotheses(
-                part.port, part.variable, grid, kept.values[places], kept.errors[places]
-            )
+            shapes = make_form_hypotheses(part.port, part.variable, grid, kept.values[own], kept.errors[own])
             trials = [(*parts[:i], shape, *parts[i + 1 :]) for shape in shapes]
     return min((fit(trial) for trial in trials), key=lambda fitted: fitted.objective)
 
