@@ -6,19 +6,12 @@ from pydantic import Field, model_validator
 
 from catalogs.grids.blocks import PartialScenario
 from catalogs.quantities import CatalogueEntry, Number, Scalar, Text, require_quantity
+from catalogs.road_users import Kind
 
 Seconds = Annotated[Scalar, require_quantity("s", minimum=0)]
 Metres = Annotated[Scalar, require_quantity("m", minimum=0)]
 Share = Annotated[Scalar, require_quantity("1", above=0)]
 Speeds = Annotated[tuple[Number, ...], Field(min_length=1)]
-
-
-class CarEntry(CatalogueEntry):
-    """The car that brakes: what its bumper reaches, and how often it looks."""
-
-    overhang_m: Metres
-    width_m: Metres
-    rate_hz: Annotated[Scalar, require_quantity("Hz", above=0)]
 
 
 class LineEntry(CatalogueEntry):
@@ -62,11 +55,12 @@ class BrakesEntry(CatalogueEntry):
 class TargetEntry(CatalogueEntry):
     """The target of a protocol.
 
-    ``crosses_km_h`` is a speed across the path, from the right; the target is then in the middle of it when the
-    unbraked car would meet it. ``gaps_m`` and ``decelerations`` multiply.
+    ``crosses_km_h`` is a speed across the path, from the right, negative from the left; ``overlap`` is the share of the
+    car's front that the target has crossed when the unbraked car meets it. ``gaps_m`` and ``decelerations`` multiply.
     """
 
-    width_m: Number
+    kind: Kind
+    overlap: Number = 0.5
     speed_km_h: Number = 0.0
     crosses_km_h: Number = 0.0
     brakes_at_s: Number | None = None
@@ -102,7 +96,7 @@ class ProtocolEntry(CatalogueEntry):
 class EmergencyBraking(CatalogueEntry):
     """Content of the file."""
 
-    car: CarEntry
+    rate_hz: Annotated[Scalar, require_quantity("Hz", above=0)]
     brake_line: LineEntry
     brakes: BrakesEntry
     weathers: dict[str, PartialScenario]

@@ -1,17 +1,22 @@
 """``musync lab aeb``: emergency brakes against protocols in every weather, by the speed of the impact."""
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from itertools import chain, islice, product
-from math import pi
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from catalogs.emergency_braking import EmergencyBraking, ProtocolEntry
+from catalogs.emergency_braking import EmergencyBraking
 from catalogs.entries import load
+from catalogs.openscenario import format_openscenario, read_openscenario
+from catalogs.road_users import EGO
 from catalogs.scenario import Scenario
+from catalogs.scenes.opendrive import find_street, format_opendrive
 from flows.driving.aeb_page import draw_page
+from flows.driving.cases import Case, list_cases
 from flows.making.driving import surface_of, weather_of
 from flows.running.progress import progress_bar
 from flows.store.outputs import Outputs
@@ -23,9 +28,14 @@ from tasks.driving.brakes import (
     FrictionTrigger,
     Trigger,
 )
-from tasks.driving.outcome import Outcome, describe_outcome, judge_approach
+from tasks.driving.outcome import (
+    TICK_S,
+    Outcome,
+    describe_outcome,
+    find_unbraked_impact,
+    judge_approach,
+)
 from tasks.driving.stepped import DriveSettings, SteppedDrive
-from tasks.driving.targets import TargetTrack
 from tasks.errors import InputError
 from tasks.studies.label_ranges import sampled_friction
 from tasks.surface.state import SurfaceState
@@ -34,25 +44,8 @@ from tasks.vehicle.parameters import Vehicle, compute_surface_response
 
 PERCENTILES = (5, 50, 95)
 LONGEST_S = 30.0
-
-
-@dataclass(frozen=True, kw_only=True)
-class Case:
-    """One approach of a protocol.
-
-    Parameters
-    ----------
-    protocol, name : of the protocol, and of the approach in it
-    speed : of the car [m/s]
-    track : of the target
-    allowed_km_h : impact that the rule allows; None where it says nothing [km/h]
-    """
-
-    protocol: str
-    name: str
-    speed: float
-    track: TargetTrack
-    allowed_km_h: float | None
+ROAD = "street"
+"""Street of the OpenSCENARIO files."""
 
 
 def compare_brakes(
@@ -64,9 +57,10 @@ def compare_brakes(
     Parameters
     ----------
     vehicle : catalogue name or file of the car
-    protocol, weather, brake : names of `catalogs/emergency_braking.yaml`; None takes all
+    protocol, weather, brake : names of `catalogs/emergency_braking.yaml`; None takes all. A protocol may also be an
+        OpenSCENARIO file with one road user
     bounds : drive each at the 5th, 50th and 95th percentile of friction under the surface bounds too
-    out : folder for aeb.json and the page
+    out : folder for aeb.json, the page, and each approach as an OpenSCENARIO file
 
     Returns
     -------
@@ -81,8 +75,10 @@ def compare_brakes(
         For names that do not exist.
     """
     table: EmergencyBraking = load("emergency braking")
-    results = Outputs(out, "lab aeb", "aeb.json", "aeb.html")
     chosen = _choose(table, protocol, weather, brake)
+    cases = [case for name in chosen["protocol"] for case in _open_protocol(table, name)]
+    scenarios = {f"openscenario/{_name_file(case)}": case for case in cases}
+    results = Outputs(out, "lab aeb", "aeb.json", "aeb.html", *scenarios, f"openscenario/{ROAD}.xodr")
     car, pavement = load("vehicle", vehicle), load("wet friction").apply(load("surface", "dense-asphalt"))
     study = load("sensitivity study")[0]
     rows = []
@@ -91,7 +87,7 @@ def compare_brakes(
             scenario = Scenario(**table.list_weathers()[name])
             state = surface_of(scenario, pavement)
             frictions = np.percentile(sampled_friction(weather_of(scenario), pavement, study), PERCENTILES)
-            for case, kind in product(_list_cases(table, chosen["protocol"]), chosen["brake"]):
+            for case, kind in product(cases, chosen["brake"]):
                 rows.append(
                     {
                         "protocol": case.protocol,
@@ -107,8 +103,12 @@ def compare_brakes(
         "vehicle": car.name,
         "rows": rows,
         "summary": summarise(rows),
-        "sources": {name: table.protocols[name].source for name in chosen["protocol"]},
+        "sources": {
+            Path(name).stem: table.protocols[name].source if name in table.protocols else name
+            for name in chosen["protocol"]
+        },
     }
+    _write_scenarios(results, scenarios, car)
     results.write_json("aeb.json", result)
     results.write("aeb.html", draw_page(result))
     return result
@@ -124,17 +124,16 @@ def drive_approach(
     car, state : the car and the road
     case : the approach
     trigger, line : when the brake is put on, and the pressure behind
-    table : overhang, width and rate of the car
+    table : how often the brake looks
     """
-    overhang, width = table.car.overhang_m.value, table.car.width_m.value
+    (overhang, width), track = load("road user sizes")[EGO], case.follow(state.friction)
+    rate_hz = table.rate_hz.value
     drive = SteppedDrive(
         car, state,
-        DriveSettings(
-            initial_speed=case.speed, duration_s=LONGEST_S, rate_hz=table.car.rate_hz.value, hold_speed=True
-        ),
+        DriveSettings(initial_speed=case.speed, duration_s=LONGEST_S, rate_hz=rate_hz, hold_speed=True),
     )  # fmt: skip
-    step = 1.0 / table.car.rate_hz.value
-    looks = case.track.follow(np.arange(drive.steps, dtype=np.float64) * step)
+    step = 1.0 / rate_hz
+    looks = track.follow(np.arange(drive.steps, dtype=np.float64) * step)
     # until a brake acts the speed is held, and the car is where it would be: those steps are driven at once
     for held, target in enumerate(looks):
         bumper = overhang + case.speed * held * step
@@ -148,14 +147,18 @@ def drive_approach(
     for seen in () if unbraked else islice(chain((target,), looks), drive.step_count - held, None):
         time, speed = drive.time, drive.read("speed")
         met = drive.read("station") + overhang >= seen.station
-        if met or drive.stop_time <= time or (speed <= seen.speed and time >= case.track.settles_at):
+        if met or drive.stop_time <= time or (speed <= seen.speed and time >= track.settles_at):
             break
         # a step holds one pressure: that of its middle
         drive.advance(line.pressure_at(time + 0.5 * step))
     station, speeds, pressure = (
         drive.read_column(name) for name in ("station", "speed", "brake_pressure_mpa")
     )
-    return judge_approach(station, speeds, pressure, case.track, overhang=overhang, width=width)
+    path = track.locate(TICK_S * np.arange(len(station), dtype=np.float64))
+    return judge_approach(
+        station, speeds, pressure, path, overhang=overhang, width=width,
+        unbraked_impact=find_unbraked_impact(case.speed, overhang, track, width),
+    )  # fmt: skip
 
 
 def make_brake(
@@ -198,42 +201,6 @@ def find_tyre_friction(car: Vehicle, state: SurfaceState) -> Callable[[float], f
     return lambda speed: peak * compute_wet_share(speed, grip) / grip.reference
 
 
-def list_cases(protocol: str, entry: ProtocolEntry, overhang: float) -> Iterator[Case]:
-    """Yield the approaches of a protocol.
-
-    Parameters
-    ----------
-    protocol : its name
-    entry : its numbers
-    overhang : of the car's bumper before its front axle [m]
-    """
-    target = entry.target
-    for place, speed_km_h in enumerate(entry.speeds_km_h):
-        speed, pace = speed_km_h / 3.6, target.speed_km_h / 3.6
-        allowed = entry.allowed_km_h[place] if entry.allowed_km_h else None
-        if entry.begins_s is None:
-            for gap, slows in product(target.gaps_m, target.decelerations):
-                track = TargetTrack(
-                    station=overhang + gap, speed=pace, width=target.width_m, change_at=target.brakes_at_s or 0.0,
-                    acceleration=-slows,
-                )  # fmt: skip
-                name = f"{speed_km_h:g} km/h, {gap:g} m, {slows:g} m/s2"
-                yield Case(protocol=protocol, name=name, speed=speed, track=track, allowed_km_h=allowed)
-            continue
-        gap = (speed - pace) * entry.begins_s
-        if target.crosses_km_h:
-            across = target.crosses_km_h / 3.6
-            track = TargetTrack(
-                station=overhang + gap, speed=across, heading=pi / 2, lateral=-across * entry.begins_s,
-                width=target.width_m,
-            )  # fmt: skip
-        else:
-            track = TargetTrack(station=overhang + gap, speed=pace, width=target.width_m)
-        yield Case(
-            protocol=protocol, name=f"{speed_km_h:g} km/h", speed=speed, track=track, allowed_km_h=allowed
-        )
-
-
 def summarise(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     """Return for each protocol, weather and brake how many approaches collide, and the mean and largest impact.
 
@@ -258,11 +225,6 @@ def summarise(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def _list_cases(table: EmergencyBraking, protocols: Sequence[str]) -> list[Case]:
-    overhang = table.car.overhang_m.value
-    return [case for name in protocols for case in list_cases(name, table.protocols[name], overhang)]
-
-
 def _drive_case(
     car: Vehicle,
     state: SurfaceState,
@@ -285,6 +247,32 @@ def _drive_case(
     }
 
 
+def _open_protocol(table: EmergencyBraking, name: str) -> list[Case]:
+    if name in table.protocols:
+        return list(list_cases(name, table.protocols[name]))
+    scenario = read_openscenario(Path(name))
+    if len(scenario.objects) != 1:
+        raise InputError(f"{name}: must have one road user; it has {len(scenario.objects)}")
+    return [Case(protocol=Path(name).stem, name=f"{scenario.initial_speed_km_h:g} km/h", scenario=scenario)]
+
+
+def _name_file(case: Case) -> str:
+    return re.sub(r"[^\w.-]+", "-", f"{case.protocol}-{case.name.replace('/', '')}") + ".xosc"
+
+
+def _write_scenarios(results: Outputs, scenarios: Mapping[str, Case], car: Vehicle) -> None:
+    street = find_street(ROAD)
+    results.write(f"openscenario/{ROAD}.xodr", format_opendrive(street, ROAD))
+    for file, case in scenarios.items():
+        results.write(
+            file,
+            format_openscenario(
+                case.scenario, street, name=f"{case.protocol}, {case.name}", road_file=f"{ROAD}.xodr",
+                wheelbase=car.wheelbase,
+            ),
+        )  # fmt: skip
+
+
 def _choose(
     table: EmergencyBraking, protocol: list[str] | None, weather: list[str] | None, brake: list[str] | None
 ) -> dict[str, list[str]]:
@@ -297,7 +285,7 @@ def _choose(
         f"--{name} {one}: there is none of this name; there are {', '.join(all_names)}"
         for name, (asked, all_names) in known.items()
         for one in asked or []
-        if one not in all_names
+        if one not in all_names and not (name == "protocol" and one.endswith(".xosc"))
     ]
     if problems:
         raise InputError(problems)

@@ -149,8 +149,8 @@ def pack_fmu(car: Vehicle, content: bytes, surface: str, platforms: Sequence[str
     compiled, header = compile_advance(car, pavement), format_header(car, starts.values(), guid)
     for target in (PLATFORMS[name] for name in platforms):
         with TemporaryDirectory() as folder:
-            place = f"binaries/{target.name}/{identifier}{target.suffix}"
-            files[place] = build_library(compiled, header, target, Path(folder))
+            path = f"binaries/{target.name}/{identifier}{target.suffix}"
+            files[path] = build_library(compiled, header, target, Path(folder))
     archive = BytesIO()
     with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as packed:
         for name, data in files.items():
@@ -213,9 +213,11 @@ def format_description(
         root, "DefaultExperiment", startTime="0", stopTime="5", stepSize=str(2 * INTERNAL_STEP_S)
     )
     variables = ElementTree.SubElement(root, "ModelVariables")
-    for place, row in enumerate((*INPUTS, *OUTPUTS)):
-        said = f"{row.description}: {_number_weathers(weathers)}" if row.kind == "choice" else row.description
-        _add_variable(variables, row, said, place, starts.get(row.name))
+    for reference, row in enumerate((*INPUTS, *OUTPUTS)):
+        description = (
+            f"{row.description}: {_number_weathers(weathers)}" if row.kind == "choice" else row.description
+        )
+        _add_variable(variables, row, description, reference, starts.get(row.name))
     structure = ElementTree.SubElement(root, "ModelStructure")
     for group in ("Outputs", "InitialUnknowns"):
         unknowns = ElementTree.SubElement(structure, group)
@@ -244,14 +246,14 @@ def _number_weathers(weathers: Sequence[str]) -> str:
 
 
 def _add_variable(
-    parent: ElementTree.Element, row: EmbeddedVariable, description: str, place: int, start: float | None
+    parent: ElementTree.Element, row: EmbeddedVariable, description: str, reference: int, start: float | None
 ) -> None:
     fixed = {"parameter": {"causality": "parameter", "variability": "fixed"}, "input": {"causality": "input"}}
     roles = fixed.get(row.role, {"causality": "output", "initial": "calculated"})
     if row.kind != "real" and row.role != "parameter":
         roles |= {"variability": "discrete"}
-    said = {"name": row.name, "valueReference": str(place), "description": description}
-    variable = ElementTree.SubElement(parent, "ScalarVariable", said | roles)
+    attributes = {"name": row.name, "valueReference": str(reference), "description": description}
+    variable = ElementTree.SubElement(parent, "ScalarVariable", attributes | roles)
     if row.kind == "boolean":
         ElementTree.SubElement(variable, "Boolean", start="true" if start else "false")
         return

@@ -38,7 +38,7 @@ class InertialMotion:
 
 
 def compute_inertial_motion(
-    clip: ExportedClip, vehicle: Vehicle, place: ArrayLike = (0, 0, 0)
+    clip: ExportedClip, vehicle: Vehicle, position: ArrayLike = (0, 0, 0)
 ) -> InertialMotion:
     """Return the motion of a point of the body.
 
@@ -51,7 +51,7 @@ def compute_inertial_motion(
     ----------
     clip : that was driven
     vehicle : that drove it
-    place : of the point in the rig [m]
+    position : of the point in the rig [m]
     """
     frames, ticks, t = clip.frames, clip.ticks, clip.frames["t_ns"] * 1e-9
     attitude = Rotation.from_matrix(clip.T_world_rig[:, :3, :3])
@@ -63,7 +63,7 @@ def compute_inertial_motion(
     )
 
     centre = np.array([-vehicle.cg_to_front_axle, 0.0, vehicle.cg_height])
-    arm = pitching.apply(np.asarray(place, np.float64) - centre)
+    arm = pitching.apply(np.asarray(position, np.float64) - centre)
     reach = centre + np.outer(frames["heave"], UP) + arm
     pitch_rate = np.outer(frames["pitch_rate"], LEFT)
     moved = np.outer(frames["heave_rate"], UP) + np.cross(pitch_rate, arm)

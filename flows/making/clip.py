@@ -24,9 +24,10 @@ from flows.making.driving import (
     surface_of,
 )
 from flows.making.gate import judge_motion, nothing_to_judge
+from flows.making.locations import note_location
 from flows.making.pictures import frame_rows, gather_motion, render_frames, rig_of
-from flows.making.places import remember_place
 from flows.making.plan import ClipPlan, Plan, read_plan
+from flows.making.road_users import judge_road_users
 from flows.making.traced import replay_drive, unknown_ranges
 from flows.running.processors import measure_peak_memory
 from flows.store.address import find_local, send_files
@@ -118,7 +119,7 @@ def open_work(layout: Layout, index: int, scene: str) -> ClipWork:
     cv2.setNumThreads(1)  # one thread a clip: more within a frame cost more than they give
     plan = read_plan(layout.root)
     clip = plan.clips[index]
-    remember_place(plan.record_of(clip.scenario.scene)["sha256"], scene)
+    note_location(plan.record_of(clip.scenario.scene)["sha256"], scene)
     return ClipWork(clip=clip, plan=plan, catalogue=catalogue_of(layout.root, clip.scenario.scene))
 
 
@@ -228,6 +229,7 @@ def commit_clip(
             **collect_motion_figures(ride.columns),
             "lateral_demand": peak_lateral_demand(ride, work.catalogue.scene.route),
             "static_pitch": ride.static_pitch,
+            **_judge_approach(work, surface, ride),
             "calibration_extrapolated": ride.calibration_extrapolated,
         } | ranges),
         "verdict": _json_numbers(verdict),
@@ -247,6 +249,16 @@ def _observe_objects(
     rig_at = rig_of(ride, frames, work.catalogue)
     motion = gather_motion(work.clip.scenario, surface, frames, work.plan, work.catalogue, rig_at)
     return measure_objects(buffers, work.catalogue.camera, motion)
+
+
+def _judge_approach(work: ClipWork, surface: SurfaceState, ride: Rollout) -> dict[str, float | bool]:
+    """Return the outcome columns of a clip of a dataset with road users."""
+    if not work.plan.settings.has_objects:
+        return {}
+    catalogue = work.catalogue
+    return judge_road_users(
+        work.clip.scenario, catalogue.road_user_sizes, catalogue.scene.route, surface.friction, ride.columns
+    )
 
 
 def collect_motion_figures(columns: Columns) -> dict[str, float]:

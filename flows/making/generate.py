@@ -12,7 +12,7 @@ from catalogs.scenes import load_scene
 from catalogs.sentences import name_some
 from flows.making.clip import make_clip, warm_up
 from flows.making.input_changes import frozen_inputs, restore_inputs
-from flows.making.places import find_scene
+from flows.making.locations import find_scene
 from flows.making.plan import Plan, hold_plan, make_plan, plan_differences, read_plan
 from flows.making.run_report import RunCost, RunReport, list_step_times
 from flows.making.seal import seal_dataset
@@ -257,9 +257,9 @@ def fan_out(layout: Layout, plan: Plan, indices: list[int], executor: Executor) 
     cost, committed = RunCost(), 0
     failures: dict[str, BaseException] = {}
     named = {index: plan.clips[index].scenario.scene for index in indices}
-    places = {scene: find_scene(plan.record_of(scene)) for scene in set(named.values())}
+    folders = {scene: find_scene(plan.record_of(scene)) for scene in set(named.values())}
     # a worker then loads each scene once
-    jobs = ((layout, index, places[named[index]]) for index in sorted(indices, key=lambda k: named[k] or ""))
+    jobs = ((layout, index, folders[named[index]]) for index in sorted(indices, key=lambda k: named[k] or ""))
     with progress_bar("clips", len(indices)) as advance:
         for (_, index, _), future in run_unordered(executor, make_clip, jobs):
             label, error = plan.clips[index].label, future.exception()

@@ -127,7 +127,7 @@ def page_data(manifest: Mapping[str, Any], brought: set[str], pictures: bool) ->
     """
     grid, rows = manifest["grid"], manifest["clips"]
     settings = recorded_grid(grid, "manifest")
-    place = {row["clip_id"]: k for k, row in enumerate(rows)}
+    index = {row["clip_id"]: k for k, row in enumerate(rows)}
     kept = (
         "clip_id", "label", "seed", "split", "calibration", "scenario", "figures", "verdict", "content"
     )  # fmt: skip
@@ -148,7 +148,7 @@ def page_data(manifest: Mapping[str, Any], brought: set[str], pictures: bool) ->
             }
             for row in rows
         ],
-        "pairs": [[place[p["clip_id_a"]], place[p["clip_id_b"]], p["control"]] for p in iterate_pairs(rows)],
+        "pairs": [[index[p["clip_id_a"]], index[p["clip_id_b"]], p["control"]] for p in iterate_pairs(rows)],
         "figure": as_plotly(
             Figure(caption="", panels=[Panel(y="", lines=[]) for _ in TRACES], linked=True, panel_px=PANEL_PX)
         ),

@@ -4,17 +4,13 @@ from functools import partial
 
 from catalogs.campaigns import read_campaign
 from catalogs.entries import load
-from catalogs.learned_judges import load_judges
 from catalogs.references import read_reference
 from catalogs.scenes.folder import read_scene
 from catalogs.scenes.gaussian_files import read_gaussians
 from catalogs.scenes.route_files import read_route
 from catalogs.scenes.stereo_folder import read_stereo_folder
 from catalogs.scenes.street import load_street_layout
-from flows.judging.foreign import read_claim
-from flows.judging.foreign_sources import read_camera, read_footage
-from flows.judging.physics_constants import read_constants
-from flows.judging.trajectories import read_trajectory
+from flows.auditing.physics_constants import read_constants
 from flows.making.plan import read_plan
 from flows.making.seal import seal_dataset
 from flows.reading.describe import validate_grid
@@ -22,6 +18,10 @@ from flows.store.layout import Layout
 from flows.store.outputs import read_marker
 from flows.store.sealed import read_manifest
 from manifests.frozen_run import read_frozen
+from studies.evaluation.learned_judges import load_judges
+from studies.foreign_video.judge import read_claim
+from studies.foreign_video.sources import read_camera, read_footage
+from studies.foreign_video.trajectories import read_trajectory
 from studies.fuzzing import recorded, seals, sound
 from studies.fuzzing.parser import Parser, parse_entries
 from studies.fuzzing.readers import (

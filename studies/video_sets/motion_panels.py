@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flows.judging.motion_curves import PITCH, PROGRESS, Floats, MotionPanel, make_event_panel
+from studies.evaluation.motion_curves import PITCH, PROGRESS, Floats, MotionPanel, make_event_panel
 from studies.video_sets.compared_motion import pair_with_control, sample_claimed_pitch
 from studies.video_sets.motion import JudgedSet, SetMotion
 from tasks.errors import InputError

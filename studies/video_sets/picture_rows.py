@@ -6,10 +6,10 @@ from typing import Any
 
 import cv2
 
-from flows.judging.evaluation_rows import figure_row
-from flows.judging.foreign_sources import read_video
-from flows.judging.judged_clip import Row
-from flows.judging.learned_rows import rank_weathers
+from studies.evaluation.judged_clip import Row
+from studies.evaluation.learned_rows import rank_weathers
+from studies.evaluation.rows import figure_row
+from studies.foreign_video.sources import read_video
 from studies.video_sets.files import VIDEO_METHOD
 from studies.video_sets.motion import JudgedSet
 from tasks.errors import InputError

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catalogs.entries import load
-from flows.judging.evaluation_rows import Scored, figure_row, windowed_rows
-from flows.judging.judged_clip import Row
+from studies.evaluation.judged_clip import Row
+from studies.evaluation.rows import Scored, figure_row, windowed_rows
 from studies.video_sets.compared_motion import (
     find_control_clip,
     pair_with_control,

@@ -10,10 +10,10 @@ import pytest
 import yaml
 
 from catalogs.entries import CATALOGUE, find_entry, load
-from catalogs.learned_judges import load_judges
 from catalogs.vehicles.frozen import frozen_text
 from catalogs.weather.grip import WEATHER, WeatherFolder
 from catalogs.weather.look import load_weather
+from studies.evaluation.learned_judges import load_judges
 from tasks.errors import InputError
 
 Change = Callable[[Any], None]

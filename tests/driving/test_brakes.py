@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from catalogs.entries import load
+from catalogs.road_users import EGO, RoadUser
 from catalogs.scenario import Scenario
-from flows.driving.aeb import Case, compare_brakes, drive_approach, find_tyre_friction, list_cases, make_brake
+from flows.driving.aeb import compare_brakes, drive_approach, find_tyre_friction, make_brake
+from flows.driving.cases import Case, list_cases
 from flows.making.driving import surface_of
 from tasks.driving.brakes import Approach, BlindTrigger, compute_impact_speed, find_threat
 from tasks.driving.targets import Target, TargetTrack
@@ -16,7 +18,7 @@ from tasks.errors import InputError
 TABLE = load("emergency braking")
 CAR = load("vehicle", "bmw-320i")
 ASPHALT = load("wet friction").apply(load("surface", "dense-asphalt"))
-OVERHANG = TABLE.car.overhang_m.value
+OVERHANG = load("road user sizes")[EGO][0]
 
 
 def road(weather: str):
@@ -24,9 +26,14 @@ def road(weather: str):
 
 
 def approach_at(speed_km_h: float, target_km_h: float) -> Case:
-    speed, pace = speed_km_h / 3.6, target_km_h / 3.6
-    track = TargetTrack(station=OVERHANG + 4.0 * (speed - pace), speed=pace)
-    return Case(protocol="test", name="test", speed=speed, track=track, allowed_km_h=None)
+    gap = OVERHANG + 4.0 * (speed_km_h - target_km_h) / 3.6
+    return make_case(speed_km_h, gap_m=gap, speed_km_h=target_km_h)
+
+
+def make_case(approach_km_h: float, **track: float) -> Case:
+    target = RoadUser.model_validate({"kind": "car", "track": track})
+    scenario = Scenario(initial_speed_km_h=approach_km_h, hold_speed=True, objects=(target,))
+    return Case(protocol="test", name="test", scenario=scenario)
 
 
 @pytest.mark.parametrize(("speed", "target"), [(50, 0), (60, 0), (70, 0), (70, 20), (80, 20)])
@@ -36,7 +43,7 @@ def test_the_impact_in_the_dry_is_the_closed_form(speed, target):
     outcome = drive_approach(CAR, dry, case, trigger, line, TABLE)
     assert outcome.collided and outcome.clearance == outcome.min_ttc == 0.0
     # the demand falls on a look, and the first pressure that is seen is that of the middle of a step
-    look = 1 / TABLE.car.rate_hz.value
+    look = 1 / TABLE.rate_hz.value
     demanded = round((outcome.brake_time - line.delay) / look) * look
     friction = find_tyre_friction(CAR, dry)(0.0)
     mean_speed = 0.5 * (case.speed + outcome.impact_speed + target / 3.6)
@@ -44,7 +51,7 @@ def test_the_impact_in_the_dry_is_the_closed_form(speed, target):
     whole = CAR.mass + (CAR.wheel_inertia_f + CAR.wheel_inertia_r) / CAR.wheel_radius**2
     jerk = CAR.brake_gain * line.full_mpa / line.build_up / (CAR.wheel_radius * whole)
     expected = compute_impact_speed(
-        (speed - target) / 3.6, case.track.find(demanded).station - case.speed * demanded - OVERHANG,
+        (speed - target) / 3.6, case.follow().find(demanded).station - case.speed * demanded - OVERHANG,
         friction * CAR.gravity + air, line.delay, friction * CAR.gravity / jerk,
     )  # fmt: skip
     assert 3.6 * outcome.impact_speed == pytest.approx(3.6 * expected, abs=0.3)
@@ -65,10 +72,8 @@ def test_the_brake_that_knows_friction_stops_a_margin_before_the_target_and_brak
 @pytest.mark.parametrize("slows", [2.0, 6.0])
 @pytest.mark.parametrize("gap", [12.0, 40.0])
 def test_the_brake_that_knows_friction_stops_behind_one_that_brakes(gap, slows):
-    dry, track = road("dry"), TargetTrack(
-        station=OVERHANG + gap, speed=50 / 3.6, change_at=1.0, acceleration=-slows
-    )  # fmt: skip
-    case = Case(protocol="test", name="test", speed=50 / 3.6, track=track, allowed_km_h=None)
+    dry = road("dry")
+    case = make_case(50, gap_m=OVERHANG + gap, speed_km_h=50, change_at_s=1, acceleration_m_s2=-slows)
     outcome = drive_approach(CAR, dry, case, *make_brake("friction", CAR, dry, TABLE), TABLE)
     assert not outcome.collided and outcome.clearance < 4.0 and outcome.brake_time > 1.0
 
@@ -102,11 +107,12 @@ def test_a_track_brakes_to_its_final_speed_and_crosses_where_it_heads():
 def test_every_protocol_has_a_source_and_an_unbraked_car_meets_its_target(name):
     entry = TABLE.protocols[name]
     assert entry.source.startswith(("UN R152", "Euro NCAP"))
-    for case in list_cases(name, entry, OVERHANG):
+    for case in list_cases(name, entry):
         time = np.arange(0.0, 40.0, 0.01)
-        there = [case.track.find(float(t)) for t in time]
+        track = case.follow()
+        there = [track.find(float(t)) for t in time]
         meets = [t for t, one in zip(time, there, strict=True) if one.station <= OVERHANG + case.speed * t]
-        assert meets and abs(case.track.find(float(meets[0])).lateral) < 0.2
+        assert meets and abs(track.find(float(meets[0])).lateral) < 0.5
 
 
 def test_the_command_compares_brakes_writes_a_page_and_refuses_names_that_are_none(tmp_path):

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 import torch
 
-from catalogs.entries import load
-from catalogs.learned_judges import load_judges
-from flows.judging.learned_rows import learned_rows
+from studies.evaluation.learned_judges import load_judges
+from studies.evaluation.learned_rows import learned_rows
 from tasks.errors import InputError
 from tasks.eval.learned_scores import (
     CLIP_MEAN,
@@ -128,13 +127,6 @@ def test_temporal_distance_looks_at_forty_pairs_in_two_roadside_boxes_that_scale
     np.testing.assert_allclose(left[0, 0, 0, [0, -1]], np.array((0, 74)) / 127.5 - 1, atol=1e-5)
     np.testing.assert_allclose(right[0, 0, 0, [0, -1]], np.array((165, 239)) / 127.5 - 1, atol=1e-5)
     assert np.isnan(FlowAlignedDistance(network=network).score(columns[None]))
-
-
-def test_the_prompts_are_twelve_sentences_in_the_order_of_the_features():
-    prompts = load("list of prompts")
-    assert list(prompts) == ["dry", "rain", "snow"]
-    assert len({sentence for four in prompts.values() for sentence in four}) == 12
-    assert all(word in " ".join(prompts[word]) for word in prompts)
 
 
 def clips(rates: dict[str, float]) -> list[SimpleNamespace]:
