@@ -5,13 +5,18 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from studies.evaluation.judged_clip import JudgedClip
+from studies.evaluation.metrics.video_motion import (
+    MotionProtocol,
+    compare_progress,
+    isolate_event,
+    reference_progress,
+)
 from studies.evaluation.motion_curves import PROGRESS, Floats, MotionPanel, make_event_panel
 from studies.evaluation.motion_rows import EventWindow, find_opening
 from studies.evaluation.rows import find_control, read_visual_seed
 from studies.evaluation.standards import MeantMotion, Standard, require_whole_way
 from tasks.errors import InputError
 from tasks.eval.poses.motion import RecoveredMotion
-from tasks.eval.video_motion import MotionProtocol, compare_progress, isolate_event, reference_progress
 from tasks.surface.weather import DRY, WEATHERS
 
 Family = list[JudgedClip]

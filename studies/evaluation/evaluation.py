@@ -20,6 +20,7 @@ from studies.evaluation.judged_clip import JudgedClip, Row, View, judge_clip
 from studies.evaluation.learned_judges import load_judges
 from studies.evaluation.learned_rows import learned_rows
 from studies.evaluation.means import mean_rows
+from studies.evaluation.metrics.severity import severity_agreement
 from studies.evaluation.motion_rows import EventWindow, motion_rows
 from studies.evaluation.page import render_page
 from studies.evaluation.road_edit_rows import road_edit_rows
@@ -27,7 +28,6 @@ from studies.evaluation.rows import figure_row, group_weather_families
 from studies.evaluation.standards import find_reference_cases, own_telemetry, reference_traces
 from studies.foreign_video.trajectories import trajectory_files
 from tasks.errors import InputError
-from tasks.eval.severity import severity_agreement
 
 NOT_RUN = {
     "motion_retention": "not run: a dataset holds no editor's input and output pair",

@@ -16,14 +16,14 @@ from flows.making.plan import read_plan
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
 from studies.evaluation.film import through_film
+from studies.evaluation.metrics.no_reference import piqe, temporal_error
+from studies.evaluation.metrics.severity import measure_image, sampled_frames
 from studies.foreign_video.trajectories import read_trajectory
 from tasks.conventions import ROAD_CLASSES
-from tasks.eval.no_reference import piqe, temporal_error
 from tasks.eval.poses.checks import POSE_CHECKS, hide_moving
 from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.poses.outside_trajectory import motion_from_trajectory
 from tasks.eval.poses.undistort import undistort_frames
-from tasks.eval.severity import measure_image, sampled_frames
 from tasks.render.camera import PIXEL_CENTRE
 
 Row = dict[str, Any]

@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 from studies.evaluation.clip_prompts import load_prompts
 from studies.evaluation.judged_clip import JudgedClip, Row, View
 from studies.evaluation.learned_judges import LoadedJudge
-from studies.evaluation.rows import figure_row, find_control, group_weather_families
-from tasks.eval.learned_scores import (
+from studies.evaluation.metrics.learned_scores import (
     ClipWeather,
     FlowAlignedDistance,
     WholeVideo,
     dover_scores,
 )
-from tasks.eval.severity import severity_agreement
+from studies.evaluation.metrics.severity import severity_agreement
+from studies.evaluation.rows import figure_row, find_control, group_weather_families
 from tasks.surface.weather import DRY
 
 METRICS = {

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flows.pages.figures import Figure, Line, Panel, pick_style
-from tasks.eval.video_motion import MotionProtocol
+from studies.evaluation.metrics.video_motion import MotionProtocol
 
 Floats = NDArray[np.float64]
 PROGRESS, PITCH = "change of progress", "pitch of the event [deg]"

@@ -8,17 +8,17 @@ import numpy as np
 
 from catalogs.entries import load
 from studies.evaluation.judged_clip import JudgedClip, Row
-from studies.evaluation.rows import Scored, figure_row, find_control, windowed_rows
-from studies.evaluation.standards import Floats, MeantMotion, Standard, opening_of, require_whole_way
-from tasks.eval.body_agreement import rms
-from tasks.eval.poses.motion import RecoveredMotion, motion_of_telemetry
-from tasks.eval.video_motion import (
+from studies.evaluation.metrics.video_motion import (
     PAPER_OPENING,
     geometry_error,
     path_error,
     reference_progress,
     weather_error,
 )
+from studies.evaluation.rows import Scored, figure_row, find_control, windowed_rows
+from studies.evaluation.standards import Floats, MeantMotion, Standard, opening_of, require_whole_way
+from tasks.eval.body_agreement import rms
+from tasks.eval.poses.motion import RecoveredMotion, motion_of_telemetry
 
 EventWindow = Literal["contact", "paper"]
 """When the event window opens: as the front axle meets the feature, or 2.2 s into the clip, as the paper's does."""

@@ -6,11 +6,11 @@ from numpy.typing import NDArray
 
 from flows.making.catalogue import Catalogue, catalogue_of
 from studies.evaluation.judged_clip import JudgedClip, Row, View
+from studies.evaluation.metrics.flip import flip_error
+from studies.evaluation.metrics.road_edit import score_road_edit, score_true_masks
 from studies.evaluation.rows import figure_row, find_control
 from tasks.conventions import ROAD_CLASSES
-from tasks.eval.flip import flip_error
 from tasks.eval.image_quality import ssim
-from tasks.eval.road_edit import score_road_edit, score_true_masks
 from tasks.render.camera import PIXEL_CENTRE
 
 LOOK_AHEAD = 40.0

@@ -8,8 +8,8 @@ import numpy as np
 
 from catalogs.scenario import SCENARIO_FIELDS
 from studies.evaluation.judged_clip import JudgedClip, Row
+from studies.evaluation.metrics.video_motion import WINDOWS
 from tasks.errors import InputError
-from tasks.eval.video_motion import WINDOWS
 from tasks.surface.weather import DRY, WEATHERS
 
 Scored = tuple[float | None, float]

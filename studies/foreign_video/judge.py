@@ -11,9 +11,9 @@ from catalogs.documents import read_content
 from catalogs.entries import load
 from catalogs.sentences import shorten
 from flows.store.outputs import Outputs
+from studies.evaluation.metrics.foreign_video import VideoClaim, judge_motion, sample_claim
 from studies.foreign_video.sources import read_camera, read_footage
 from tasks.errors import InputError
-from tasks.eval.foreign_video import VideoClaim, judge_motion, sample_claim
 
 NEEDS_DEPTH = (
     "pose by photometric alignment",

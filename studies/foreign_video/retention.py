@@ -3,10 +3,10 @@
 from typing import Any
 
 from flows.store.outputs import Outputs
+from studies.evaluation.metrics.video_motion import motion_retention
 from studies.foreign_video.judge import read_all
 from studies.foreign_video.sources import read_camera, read_footage
 from tasks.errors import InputError
-from tasks.eval.video_motion import motion_retention
 
 
 def measure_retention(

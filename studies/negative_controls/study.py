@@ -24,6 +24,7 @@ from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest, refuse_changed_content, require_frames
 from manifests.manifest import list_scenes
 from studies.evaluation.judged_clip import METHODS, JudgedClip, View, judge_clip
+from studies.evaluation.metrics.video_motion import path_error, weather_error
 from studies.evaluation.rows import find_control
 from studies.negative_controls.claims import (
     Claim,
@@ -39,7 +40,6 @@ from studies.negative_controls.figure import draw_roc
 from tasks.errors import InputError
 from tasks.eval.body_agreement import BodyClaim
 from tasks.eval.motion_agreement import PoseThresholds
-from tasks.eval.video_motion import path_error, weather_error
 
 CUTS: tuple[Variant, ...] = ("appearance-only", "vertical-only", "fixed-mu")
 """The paper's ablations, as false claims."""

@@ -14,6 +14,8 @@ from flows.store.outputs import Outputs
 from studies.evaluation.judged_clip import Row
 from studies.evaluation.learned_judges import load_judges
 from studies.evaluation.means import average_within_seeds
+from studies.evaluation.metrics.foreign_video import VideoClaim
+from studies.evaluation.metrics.video_motion import WINDOWS
 from studies.evaluation.motion_curves import draw_motion
 from studies.foreign_video.judge import read_claim
 from studies.foreign_video.sources import read_camera
@@ -24,8 +26,6 @@ from studies.video_sets.picture_rows import PIXELS
 from studies.video_sets.protocol import VideoProtocol, load_protocol
 from studies.video_sets.rows import set_rows
 from tasks.errors import InputError
-from tasks.eval.foreign_video import VideoClaim
-from tasks.eval.video_motion import WINDOWS
 
 COLUMNS = (
     "e_weather", "e_geometry_hump", "e_geometry_depression", "motion_retention", "e_path",

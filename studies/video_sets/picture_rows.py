@@ -8,12 +8,12 @@ import cv2
 
 from studies.evaluation.judged_clip import Row
 from studies.evaluation.learned_rows import rank_weathers
+from studies.evaluation.metrics.road_edit import score_road_edit
 from studies.evaluation.rows import figure_row
 from studies.foreign_video.sources import read_video
 from studies.video_sets.files import VIDEO_METHOD
 from studies.video_sets.motion import JudgedSet
 from tasks.errors import InputError
-from tasks.eval.road_edit import score_road_edit
 
 PIXELS = "pixels"
 """Method of figures that need no pose."""

@@ -14,6 +14,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from catalogs.entries import load
+from studies.evaluation.metrics.foreign_video import VideoClaim, judge_motion, sample_claim
 from studies.foreign_video import sources
 from studies.foreign_video.judge import judge_video, read_claim
 from studies.foreign_video.retention import measure_retention
@@ -25,7 +26,6 @@ from studies.foreign_video.sources import (
 )
 from studies.synthetic_street import Clip, drive_clip
 from tasks.errors import InputError
-from tasks.eval.foreign_video import VideoClaim, judge_motion, sample_claim
 from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.poses.undistort import undistort_frames
 from tests.laboratory.foreign_video.test_trajectories import tum_lines

@@ -8,10 +8,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from catalogs.entries import load
+from studies.evaluation.metrics.foreign_video import VideoClaim, sample_claim
 from studies.foreign_video.judge import read_claim
 from studies.foreign_video.sources import ForeignCamera, read_camera, scale_intrinsics
 from tasks.errors import InputError
-from tasks.eval.foreign_video import VideoClaim, sample_claim
 
 
 def test_intrinsics_follow_the_size_and_refuse_another_shape(tmp_path: Path) -> None:

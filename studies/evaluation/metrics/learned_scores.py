@@ -13,8 +13,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from studies.evaluation.metrics.severity import SAMPLED_FRAMES
 from tasks.errors import InputError
-from tasks.eval.severity import SAMPLED_FRAMES
 
 CLIP_SIDE = 224
 CLIP_MEAN = (0.48145466, 0.4578275, 0.40821073)

@@ -10,8 +10,7 @@ import torch
 
 from studies.evaluation.learned_judges import load_judges
 from studies.evaluation.learned_rows import learned_rows
-from tasks.errors import InputError
-from tasks.eval.learned_scores import (
+from studies.evaluation.metrics.learned_scores import (
     CLIP_MEAN,
     CLIP_STD,
     ClipWeather,
@@ -19,6 +18,7 @@ from tasks.eval.learned_scores import (
     WholeVideo,
     dover_scores,
 )
+from tasks.errors import InputError
 
 
 class MeanColour(torch.nn.Module):

@@ -4,13 +4,13 @@ import cv2
 import numpy as np
 import pytest
 
-from tasks.eval.road_edit import (
+from studies.evaluation.metrics.road_edit import (
     register_background,
     score_road_edit,
     score_true_masks,
     temporal_iou,
 )
-from tasks.eval.severity import measure_image, severity_agreement
+from studies.evaluation.metrics.severity import measure_image, severity_agreement
 
 DRAW = np.random.Generator(np.random.Philox(4))
 GROUND = cv2.GaussianBlur(DRAW.integers(0, 255, (160, 240, 3)).astype(np.uint8), (0, 0), 2.5)

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from studies.evaluation.metrics.video_motion import geometry_error
 from tasks.errors import InputError
 from tasks.eval.motion_agreement import PoseThresholds, judge_pose
 from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.poses.rigid import Floats
-from tasks.eval.video_motion import geometry_error
 
 EVENT_PITCH = np.deg2rad(0.3)
 """Least range of the claimed pitch that counts as an event: ten times the error of the chain over a second [rad]."""

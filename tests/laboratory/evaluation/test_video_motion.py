@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from tasks.errors import InputError
-from tasks.eval.video_motion import (
+from studies.evaluation.metrics.video_motion import (
     MotionProtocol,
     event_response,
     geometry_error,
@@ -15,6 +14,7 @@ from tasks.eval.video_motion import (
     smooth_signal,
     weather_error,
 )
+from tasks.errors import InputError
 
 TIMES = np.arange(81) * 0.1
 STOP = np.minimum(TIMES, 4.0) * 16 - np.minimum(TIMES, 4.0) ** 2 * 2
