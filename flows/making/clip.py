@@ -7,6 +7,7 @@ receipt last, by rename: where the receipt exists, the clip is complete. Making 
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import cv2
@@ -37,6 +38,7 @@ from flows.store.object_tables import hash_objects, make_object_table
 from flows.store.telemetry import content_hash, labelled_table, write_parquet
 from manifests.canonical import sha256_of_file
 from tasks.errors import InputError
+from tasks.render.camera import Camera, measure_mount
 from tasks.render.object_truth import measure_objects
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.rollout import Rollout, compute_lift_times, compute_peaks
@@ -57,6 +59,11 @@ class ClipWork:
     clip: ClipPlan
     plan: Plan
     catalogue: Catalogue
+
+    @cached_property
+    def camera(self) -> Camera:
+        """The camera of the clip."""
+        return self.catalogue.camera_of(int(self.clip.seed))
 
 
 def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
@@ -177,7 +184,7 @@ def check_motion(
 ) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
     """Step 4: the motion that the frames show, as columns of their table, and the verdict of the gate on it."""
     found = (
-        judge_motion(buffers, frames, surface.film_depth_mm, work.catalogue)
+        judge_motion(buffers, frames, surface.film_depth_mm, work.catalogue, work.camera)
         if buffers
         else nothing_to_judge(len(frames["frame"]))
     )
@@ -228,6 +235,7 @@ def commit_clip(
             "stopping_distance": ride.stopping_distance,
             **collect_motion_figures(ride.columns),
             "lateral_demand": peak_lateral_demand(ride, work.catalogue.scene.route),
+            **(measure_mount(work.camera) if work.camera.varies else {}),
             "static_pitch": ride.static_pitch,
             **_judge_approach(work, surface, ride),
             "calibration_extrapolated": ride.calibration_extrapolated,
@@ -247,8 +255,10 @@ def _observe_objects(
     if not work.clip.scenario.objects:
         return {}
     rig_at = rig_of(ride, frames, work.catalogue)
-    motion = gather_motion(work.clip.scenario, surface, frames, work.plan, work.catalogue, rig_at)
-    return measure_objects(buffers, work.catalogue.camera, motion)
+    motion = gather_motion(
+        work.clip.scenario, surface, frames, work.plan, work.catalogue, work.camera, rig_at
+    )
+    return measure_objects(buffers, work.camera, motion)
 
 
 def _judge_approach(work: ClipWork, surface: SurfaceState, ride: Rollout) -> dict[str, float | bool]:

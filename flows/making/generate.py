@@ -10,6 +10,7 @@ from typing import Any
 from catalogs.grids import Grid
 from catalogs.scenes import load_scene
 from catalogs.sentences import name_some
+from flows.making.catalogue import Catalogue
 from flows.making.clip import make_clip, warm_up
 from flows.making.input_changes import frozen_inputs, restore_inputs
 from flows.making.locations import find_scene
@@ -42,6 +43,7 @@ from flows.store.sealed import is_committed, read_manifest
 from flows.store.staging import BEGUN, is_of_begun_run, left_overs, remove_left_overs
 from manifests.manifest import is_quarantined
 from tasks.errors import InputError
+from tasks.render.camera import Camera
 from tasks.render.rasterise.backend import select_backend
 
 SHOWN = 8
@@ -210,8 +212,7 @@ def describe_frame_arrays(layout: Layout, plan: Plan) -> dict[str, Any]:
     camera = load("camera", layout.inputs / "camera.yaml")
     attributes = {
         "camera": camera.name,
-        "K": camera.K.tolist(),
-        "T_rig_camera": camera.T_rig_camera.tolist(),
+        **_describe_geometry(layout, plan, camera),
         "frame_rate_hz": plan.settings.frame_rate_hz,
         "axes": "rig: x forward, y left, z up (ISO 8855); camera: x right, y down, z forward",
     }
@@ -231,6 +232,15 @@ def describe_frame_arrays(layout: Layout, plan: Plan) -> dict[str, Any]:
         "attributes": attributes,
         "compression": plan.settings.compression,
     }
+
+
+def _describe_geometry(layout: Layout, plan: Plan, camera: Camera) -> dict[str, Any]:
+    """Intrinsics and mount of the camera; of each clip in its order where clips draw their own."""
+    if not camera.varies:
+        return {"K": camera.K.tolist(), "T_rig_camera": camera.T_rig_camera.tolist()}
+    kept = Catalogue(layout.inputs)
+    own = [kept.camera_of(int(clip.seed)) for clip in plan.clips]
+    return {name: [getattr(one, name).tolist() for one in own] for name in ("K", "T_rig_camera")}
 
 
 @contextmanager

@@ -156,7 +156,7 @@ def page_data(manifest: Mapping[str, Any], brought: set[str], pictures: bool) ->
 
 
 def locate_horizon(layout: Layout) -> dict[str, float] | None:
-    """Return where a level car's horizon stands in the picture, and how far it moves; None without a camera file.
+    """Return where a level car's horizon stands in the picture, and how far it moves; None without one camera.
 
     Parameters
     ----------
@@ -171,6 +171,8 @@ def locate_horizon(layout: Layout) -> dict[str, float] | None:
     if not path.is_file():
         return None
     camera = load("camera", path)
+    if camera.varies:
+        return None
     ahead, _, up = camera.T_rig_camera[:3, 2]
     focal, middle = camera.K[1, 1] / camera.height, camera.K[1, 2] / camera.height
     return {"level": float(middle + focal * up / ahead), "per_slope": float(focal)}
