@@ -87,13 +87,31 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
     cost.end_step("surface")
     ride, ranges = roll_out(work)
     cost.end_step("rollout")
-    frames, buffers = draw_frames(work, surface, ride)
+    frames = frame_rows(ride, work.plan, work.catalogue)
+    buffers = draw_frames(work, surface, ride, frames) if work.plan.settings.stores_frames else {}
     cost.end_step("frames")
     checked, verdict = check_motion(work, surface, frames, buffers)
     cost.end_step("check")
     receipt = commit_clip(layout, work, surface, ride, ranges, frames | checked, buffers, verdict)
     cost.end_step("commit")
     return receipt | {"cost": cost.as_json()}
+
+
+def draw_window(layout: Layout, index: int, scene: str, shown: range) -> tuple[dict[str, NDArray[Any]], str]:
+    """Return some frames of a clip, which are written nowhere, and the hash of the telemetry that they show.
+
+    Parameters
+    ----------
+    layout, index, scene : as of `make_clip`
+    shown : the frames; with labels the whole clip is made for them
+    """
+    work = open_work(layout, index, scene)
+    surface, ride = map_surface(work), _move_car(work)
+    frames, whole = frame_rows(ride, work.plan, work.catalogue), work.plan.settings.labels
+    buffers = draw_frames(work, surface, ride, frames, None if whole else shown)
+    if whole:
+        buffers = {name: values[shown.start : shown.stop] for name, values in buffers.items()}
+    return buffers, content_hash("ticks", ride.columns)
 
 
 def warm_up(layout: Layout, scene: str) -> None:
@@ -111,8 +129,10 @@ def warm_up(layout: Layout, scene: str) -> None:
     for clip in {clip.scenario.weather: clip for clip in reversed(shown)}.values():
         work = replace(first, clip=clip, plan=short)
         surface = map_surface(work)
-        frames, buffers = draw_frames(work, surface, _move_car(work))
-        check_motion(work, surface, frames, buffers)
+        ride = _move_car(work)
+        frames = frame_rows(ride, short, work.catalogue)
+        if short.settings.stores_frames:
+            check_motion(work, surface, frames, draw_frames(work, surface, ride, frames))
 
 
 def open_work(layout: Layout, index: int, scene: str) -> ClipWork:
@@ -166,27 +186,25 @@ def _move_car(work: ClipWork) -> Rollout:
 
 
 def draw_frames(
-    work: ClipWork, surface: SurfaceState, ride: Rollout
-) -> tuple[dict[str, NDArray[Any]], dict[str, NDArray[Any]]]:
-    """Step 3: the rows of the frames' table, and the finished frames with depth and class; no frames where none are
-    asked for.
-    """
-    frames = frame_rows(ride, work.plan, work.catalogue)
-    if not work.plan.settings.pictures:
-        return frames, {}
+    work: ClipWork, surface: SurfaceState, ride: Rollout, frames: Columns, shown: range | None = None
+) -> dict[str, NDArray[Any]]:
+    """Step 3: the finished frames with depth and class; ``shown`` is that of `tasks.render.clip.RigMotion`."""
     rig_at = rig_of(ride, frames, work.catalogue)
     seed = int(work.clip.seed)
-    return frames, render_frames(work.clip.scenario, surface, frames, work.plan, work.catalogue, seed, rig_at)
+    return render_frames(work.clip.scenario, surface, frames, work.plan, work.catalogue, seed, rig_at, shown)
 
 
 def check_motion(
     work: ClipWork, surface: SurfaceState, frames: Columns, buffers: Columns
 ) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
     """Step 4: the motion that the frames show, as columns of their table, and the verdict of the gate on it."""
+    later = work.plan.settings.pictures == "later"
     found = (
         judge_motion(buffers, frames, surface.film_depth_mm, work.catalogue, work.camera)
         if buffers
-        else nothing_to_judge(len(frames["frame"]))
+        else nothing_to_judge(
+            len(frames["frame"]), "frames are made later" if later else "no frames were made"
+        )
     )
     verdict = found.pop("verdict")
     return found, verdict
