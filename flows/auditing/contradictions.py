@@ -115,8 +115,8 @@ def _compare_json(
                 yield (
                     path,
                     [
-                        f"{path}: {place} must be {format_value(a)}, as in manifest.json; it is {format_value(b)}"
-                        for place, a, b in find_value_differences(manifest["grid"], found)
+                        f"{path}: {field} must be {format_value(a)}, as in manifest.json; it is {format_value(b)}"
+                        for field, a, b in find_value_differences(manifest["grid"], found)
                     ],
                 )
         except InputError as error:
@@ -131,8 +131,8 @@ def _compare_plan(layout: Layout, manifest: Manifest) -> Iterator[str]:
         return
     recorded: dict[str, Any] = {**manifest, "format": plan["format"]}
     recorded["clips"] = [{name: clip[name] for name in _list_names(ClipRecord)} for clip in manifest["clips"]]  # type: ignore[literal-required]
-    for place, a, b in find_value_differences({name: recorded[name] for name in plan}, plan):
-        yield f"plan.json: {place} must be {format_value(a)}, as in manifest.json; it is {format_value(b)}"
+    for field, a, b in find_value_differences({name: recorded[name] for name in plan}, plan):
+        yield f"plan.json: {field} must be {format_value(a)}, as in manifest.json; it is {format_value(b)}"
 
 
 def _list_names(record: type) -> Collection[str]:

@@ -311,29 +311,6 @@ COMMANDS = (
         ),
     ),
     Command(
-        name="lab sheets",
-        group=GROUP,
-        sentence="Draw one place in every weather, and each road feature before, at and after the wheels touch it.",
-        function="flows.reading.sheets:draw_sheets",
-        options=(
-            DATASET,
-            define_option("out", str, "Folder for weather.png and hazards.png."),
-            define_option(
-                "station",
-                float | None,
-                "Station on the route where the weathers are shown [m].",
-                None,
-                shown_default="12, or as far as every clip comes",
-            ),
-            define_option(
-                "beside",
-                list[str] | None,
-                "Finished dataset of another street, whose weathers come below; repeat it for more.",
-                None,
-            ),
-        ),
-    ),
-    Command(
         name="export",
         group=GROUP,
         sentence="Write a dataset in a format that other tools read, such as WebDataset, MCAP or LeRobot.",

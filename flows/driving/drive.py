@@ -99,7 +99,6 @@ def _drive_clips(
         raise InputError(entries.problems)
     driven: dict[str, list[float]] = {}
     outcomes: list[dict[str, Any]] = []
-    bumper = load("emergency braking").car
     with progress_bar("driven", len(grid.scenarios)) as advance:
         for label, scenario in grid.scenarios:
             simulator = Simulator(
@@ -112,7 +111,7 @@ def _drive_clips(
                     f"policy {policy.name}: clip {label}: must ask for the same pressures in the same drive; asked"
                     " again it asks for others: take chance and memory out, or make it a class"
                 )
-            found = simulator.judge(bumper.overhang_m.value, bumper.width_m.value)
+            found = simulator.judge()
             outcomes += [
                 {"scenario": label, "number": number, "kind": user.kind} | describe_outcome(outcome)
                 for number, (user, outcome) in enumerate(zip(scenario.objects, found, strict=True), start=1)

@@ -153,8 +153,12 @@ class ExportedDataset:
 
     @property
     def camera(self) -> Camera:
-        """The dataset's one camera."""
+        """The dataset's camera by the values of its file; each clip has its own where that varies."""
         return self.catalogue.camera
+
+    def camera_of(self, row: Mapping[str, Any]) -> Camera:
+        """Return the camera of a clip by its record."""
+        return self.catalogue.camera_of(int(row["seed"]))
 
     @property
     def vehicle(self) -> Vehicle:
@@ -201,9 +205,24 @@ class ExportedDataset:
                 record=row,
                 ticks_file=files["ticks"][row["clip_id"]],
                 frames_file=files["frames"][row["clip_id"]],
-                camera=self.camera,
+                camera=self.camera_of(row),
                 plan=self.plan,
             )
+
+
+def require_one_camera(dataset: ExportedDataset, to: str) -> None:
+    """Refuse clips with cameras of their own, where the format has one for all.
+
+    Raises
+    ------
+    InputError
+        If focal length or mount differ from clip to clip.
+    """
+    if dataset.camera.varies:
+        raise InputError(
+            f"{dataset.layout}: --to {to} has one camera for all clips; here each clip draws its own: export to another"
+            " format, or make the dataset with a camera without bounds"
+        )
 
 
 def require_pinhole(dataset: ExportedDataset, to: str) -> None:

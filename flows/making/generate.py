@@ -10,9 +10,10 @@ from typing import Any, Literal
 from catalogs.grids import Grid
 from catalogs.scenes import load_scene
 from catalogs.sentences import name_some
+from flows.making.catalogue import Catalogue
 from flows.making.clip import make_clip, warm_up
 from flows.making.input_changes import frozen_inputs, restore_inputs
-from flows.making.places import find_scene
+from flows.making.locations import find_scene
 from flows.making.plan import Plan, hold_plan, make_plan, plan_differences, read_plan
 from flows.making.run_report import RunCost, RunReport, list_step_times
 from flows.making.seal import seal_dataset
@@ -42,6 +43,7 @@ from flows.store.sealed import is_committed, read_manifest
 from flows.store.staging import BEGUN, is_of_begun_run, left_overs, remove_left_overs
 from manifests.manifest import is_quarantined
 from tasks.errors import InputError
+from tasks.render.camera import Camera
 from tasks.render.rasterise.backend import select_backend
 
 SHOWN = 8
@@ -210,8 +212,7 @@ def describe_frame_arrays(layout: Layout, plan: Plan) -> dict[str, Any]:
     camera = load("camera", layout.inputs / "camera.yaml")
     attributes = {
         "camera": camera.name,
-        "K": camera.K.tolist(),
-        "T_rig_camera": camera.T_rig_camera.tolist(),
+        **_describe_geometry(layout, plan, camera),
         "frame_rate_hz": plan.settings.frame_rate_hz,
         "axes": "rig: x forward, y left, z up (ISO 8855); camera: x right, y down, z forward",
     }
@@ -231,6 +232,15 @@ def describe_frame_arrays(layout: Layout, plan: Plan) -> dict[str, Any]:
         "attributes": attributes,
         "compression": plan.settings.compression,
     }
+
+
+def _describe_geometry(layout: Layout, plan: Plan, camera: Camera) -> dict[str, Any]:
+    """Intrinsics and mount of the camera; of each clip in its order where clips draw their own."""
+    if not camera.varies:
+        return {"K": camera.K.tolist(), "T_rig_camera": camera.T_rig_camera.tolist()}
+    kept = Catalogue(layout.inputs)
+    own = [kept.camera_of(int(clip.seed)) for clip in plan.clips]
+    return {name: [getattr(one, name).tolist() for one in own] for name in ("K", "T_rig_camera")}
 
 
 @contextmanager
@@ -257,9 +267,9 @@ def fan_out(layout: Layout, plan: Plan, indices: list[int], executor: Executor) 
     cost, committed = RunCost(), 0
     failures: dict[str, BaseException] = {}
     named = {index: plan.clips[index].scenario.scene for index in indices}
-    places = {scene: find_scene(plan.record_of(scene)) for scene in set(named.values())}
+    folders = {scene: find_scene(plan.record_of(scene)) for scene in set(named.values())}
     # a worker then loads each scene once
-    jobs = ((layout, index, places[named[index]]) for index in sorted(indices, key=lambda k: named[k] or ""))
+    jobs = ((layout, index, folders[named[index]]) for index in sorted(indices, key=lambda k: named[k] or ""))
     with progress_bar("clips", len(indices)) as advance:
         for (_, index, _), future in run_unordered(executor, make_clip, jobs):
             label, error = plan.clips[index].label, future.exception()

@@ -105,14 +105,14 @@ class Clip:
         return clip_card(self)
 
 
-def find_clip(rows: Sequence[Mapping[str, Any]], name: object, place: object) -> Mapping[str, Any]:
+def find_clip(rows: Sequence[Mapping[str, Any]], name: object, origin: object) -> Mapping[str, Any]:
     """Return the record of the clip of this label or id.
 
     Parameters
     ----------
     rows : all clips of a dataset
     name : label or id
-    place : what messages call the dataset
+    origin : what messages call the dataset
 
     Raises
     ------
@@ -121,7 +121,7 @@ def find_clip(rows: Sequence[Mapping[str, Any]], name: object, place: object) ->
     """
     found = next((row for row in rows if name in (row["label"], row["clip_id"])), None)
     if found is None:
-        raise suggest_clips(place, [name], [row["label"] for row in rows], "list(data)")
+        raise suggest_clips(origin, [name], [row["label"] for row in rows], "list(data)")
     return found
 
 

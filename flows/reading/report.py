@@ -127,7 +127,7 @@ def page_data(manifest: Mapping[str, Any], brought: set[str], pictures: bool) ->
     """
     grid, rows = manifest["grid"], manifest["clips"]
     settings = recorded_grid(grid, "manifest")
-    place = {row["clip_id"]: k for k, row in enumerate(rows)}
+    index = {row["clip_id"]: k for k, row in enumerate(rows)}
     kept = (
         "clip_id", "label", "seed", "split", "calibration", "scenario", "figures", "verdict", "content"
     )  # fmt: skip
@@ -148,7 +148,7 @@ def page_data(manifest: Mapping[str, Any], brought: set[str], pictures: bool) ->
             }
             for row in rows
         ],
-        "pairs": [[place[p["clip_id_a"]], place[p["clip_id_b"]], p["control"]] for p in iterate_pairs(rows)],
+        "pairs": [[index[p["clip_id_a"]], index[p["clip_id_b"]], p["control"]] for p in iterate_pairs(rows)],
         "figure": as_plotly(
             Figure(caption="", panels=[Panel(y="", lines=[]) for _ in TRACES], linked=True, panel_px=PANEL_PX)
         ),
@@ -156,7 +156,7 @@ def page_data(manifest: Mapping[str, Any], brought: set[str], pictures: bool) ->
 
 
 def locate_horizon(layout: Layout) -> dict[str, float] | None:
-    """Return where a level car's horizon stands in the picture, and how far it moves; None without a camera file.
+    """Return where a level car's horizon stands in the picture, and how far it moves; None without one camera.
 
     Parameters
     ----------
@@ -171,6 +171,8 @@ def locate_horizon(layout: Layout) -> dict[str, float] | None:
     if not path.is_file():
         return None
     camera = load("camera", path)
+    if camera.varies:
+        return None
     ahead, _, up = camera.T_rig_camera[:3, 2]
     focal, middle = camera.K[1, 1] / camera.height, camera.K[1, 2] / camera.height
     return {"level": float(middle + focal * up / ahead), "per_slope": float(focal)}

@@ -58,12 +58,12 @@ class ClipWindows(Dataset[dict[str, Any]]):
     def __getitem__(self, item: int) -> dict[str, Any]:
         if not 0 <= item < len(self):
             raise IndexError(item)
-        place, turn = divmod(item, len(self.starts))
-        clip, span = self.clips[place], slice(self.starts[turn], self.starts[turn] + self.window)
+        index, start = divmod(item, len(self.starts))
+        clip, span = self.clips[index], slice(self.starts[start], self.starts[start] + self.window)
         sample: dict[str, Any] = {
             "clip": clip,
             "start": span.start,
-            "telemetry": self.telemetry[place, span],
+            "telemetry": self.telemetry[index, span],
         }
         pictures = self.source.read_window(clip, span, self.arrays)
         return sample | {name: torch.from_numpy(values) for name, values in pictures.items()}
