@@ -95,6 +95,15 @@ def test_it_is_audited_and_questions_bring_no_frames(stored, machine, toy_datase
     assert result["verified"] and len(result["rerun"]) == 1
 
 
+def test_frames_of_an_address_are_made_when_they_are_read_and_nothing_is_sent(machine, grid, toy_dataset):
+    address, whole = "s3://data/sets/later", read_clip(toy_dataset.frames, 1, "rgb")
+    assert generate_dataset(grid, address, runner="threads", workers=1, pictures="later").made == 4
+    before, data = objects_of(address), musync.open(address)
+    assert not any(name.startswith("frames.zarr/") for name in before)
+    assert np.array_equal(data.torch(window=3, stride=3, clips=["dry/hump"])[1]["rgb"].numpy(), whole[3:6])
+    assert np.array_equal(data.frames["rgb"][1], whole) and objects_of(address) == before
+
+
 def test_analysts_read_single_frames_from_the_store_and_windows_from_their_cache(
     stored, machine, toy_dataset
 ):
