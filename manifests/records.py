@@ -12,10 +12,10 @@ from pydantic import AfterValidator, ConfigDict, Field, TypeAdapter, ValidationE
 from typing_extensions import TypedDict
 
 from catalogs.road_users import RoadUser
-from catalogs.scenario import SCENARIO_FIELDS, Scenario
+from catalogs.scenario import OPTIONAL_FIELDS, SCENARIO_FIELDS, Scenario
 from catalogs.sentences import cap_problems, describe_rules, shorten_value
 from manifests.canonical import ID_LENGTH
-from tasks.conventions import CLIP_CHANNELS
+from tasks.conventions import CLIP_CHANNELS, SOME_CLIPS_CHANNELS
 from tasks.errors import InputError
 from tasks.eval.motion_agreement import PoseVerdict
 
@@ -66,7 +66,7 @@ def _check_road_users(users: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return users
 
 
-_FIGURE_NAMES = {channel.name for channel in CLIP_CHANNELS}
+_FIGURE_NAMES = {channel.name for channel in (*CLIP_CHANNELS, *SOME_CLIPS_CHANNELS)}
 STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
 Inputs = Annotated[dict[InputName, Sha256], _require_keys(EVERY_INPUT)]
@@ -78,14 +78,20 @@ if TYPE_CHECKING:  # their keys follow from what they record
     VerdictRecord = dict[str, Any]
 else:
     _fields = get_type_hints(Scenario, include_extras=True)
+    _optional = {name: NotRequired[_fields[name]] for name in OPTIONAL_FIELDS}
     _users = Annotated[list[dict[str, Any]], AfterValidator(_check_road_users), Field(min_length=1)]
     ScenarioRecord = with_config(STRICT)(
         TypedDict(
-            "ScenarioRecord", {**_fields, "scene": NotRequired[LocalName], "objects": NotRequired[_users]}
+            "ScenarioRecord",
+            {**_fields, **_optional, "scene": NotRequired[LocalName], "objects": NotRequired[_users]},
         )
     )
     # a dataset decides what it has: a figure that came later is not represented
-    _figures = {c.name: NotRequired[float | None] for c in CLIP_CHANNELS if c.name not in SCENARIO_FIELDS}
+    _figures = {
+        c.name: NotRequired[float | None]
+        for c in (*CLIP_CHANNELS, *SOME_CLIPS_CHANNELS)
+        if c.unit and c.name not in {*SCENARIO_FIELDS, *OPTIONAL_FIELDS}
+    }
     FiguresRecord = with_config(STRICT)(
         TypedDict(
             "FiguresRecord",

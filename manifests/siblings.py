@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 CONTROLS: dict[str, tuple[str, ...]] = {
-    "weather": ("weather", "precipitation_mm_h", "snow_accumulation_h"),
+    "weather": ("weather", "precipitation_mm_h", "snow_accumulation_h", "falling"),
+    "light": ("sky", "sun_azimuth_deg", "sun_elevation_deg"),
     "speed": ("initial_speed_km_h",),
     "braking": (
         "peak_pressure_mpa",

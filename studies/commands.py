@@ -17,6 +17,7 @@ from flows.commands.command import (
 from flows.commands.measured import MODE
 from studies.evaluation import commands as evaluation
 
+EVALUATION = "Evaluation"
 MEASURED, KNOWN, PAPER = "Drives of real cars", "Known truths and faults", "The paper"
 ORIGINS, SPEED = "Where numbers come from", "Speed"
 WIDE_COLUMNS = {
@@ -262,6 +263,32 @@ COMMANDS = (
                 None,
             ),
         ),
+    ),
+    Command(
+        name="lab aeb",
+        group=EVALUATION,
+        sentence="Emergency brakes against UN R152 and Euro NCAP in every weather: the speed of the impact.",
+        function="studies.emergency_braking.compare:compare_brakes",
+        options=(
+            define_option("vehicle", str, VEHICLE.help, "bmw-320i", known=VEHICLE.known),
+            define_option(
+                "protocol",
+                list[str] | None,
+                "Protocol of emergency_braking.yaml, or an OpenSCENARIO file; by default each.",
+                None,
+            ),
+            define_option("weather", list[str] | None, "Weather of that file; by default each.", None),
+            define_option(
+                "brake",
+                list[str] | None,
+                "blind, friction or driver; by default each.",
+                None,
+                known=("blind", "friction", "driver"),
+            ),
+            define_option("bounds", bool, "Drive each approach under the bounds of the surface too.", True),
+            OUT,
+        ),
+        brief=lambda result: {"summary": result["summary"]},
     ),
     *evaluation.COMMANDS,
 )

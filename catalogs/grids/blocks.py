@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-from catalogs.names import Label, WeatherName
+from catalogs.names import Label, SkyName, WeatherName
 from catalogs.road_users import RoadUser
 from catalogs.scenario import NUMBERS
 from catalogs.sentences import shorten
@@ -49,6 +49,10 @@ class PartialScenario(Strict):
     hazard_center_m: Number | None = None
     hazard_length_m: Number | None = None
     hazard_height_m: Number | None = None
+    falling: bool | None = None
+    sky: SkyName | None = None
+    sun_azimuth_deg: Number | None = None
+    sun_elevation_deg: Number | None = None
     objects: tuple[RoadUser, ...] | None = Field(
         default=None,
         exclude_if=lambda users: users is None,

@@ -103,11 +103,12 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
         grade=catalogue.grade,
     )  # fmt: skip
     response = compute_surface_response(vehicle, state.kind, state.friction)
+    route = find_route(plan.record_of(scenario.scene))
     steps = [
         *surface_steps(weather_of(driven), surface, vehicle, row),
         *force_steps(vehicle, response, hazard, mode, row, state.grip),
         *pitch_steps(vehicle, response, hazard, row, ride, steady),
-        *picture_steps(vehicle, catalogue.camera, row, first, find_route(plan.record_of(scenario.scene))),
+        *picture_steps(vehicle, catalogue.camera_of(int(planned.seed)), row, first, route),
     ]  # fmt: skip
     result = {
         "dataset": str(layout.root),

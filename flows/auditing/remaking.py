@@ -91,7 +91,7 @@ def _compare_clip(
     again = read_receipt(remade, clip_id)
     changed: dict[str, dict[str, Any]] = {}
     settings = plan.settings
-    arrays = arrays_of(settings.labels, settings.has_objects) if settings.pictures else ()
+    arrays = arrays_of(settings.labels, settings.has_objects) if settings.stores_frames else ()
     objects = (OBJECTS,) if settings.has_objects else ()
     for name in (*STAGED_TABLES, *objects, *arrays):
         digest = again["content"][name]

@@ -35,7 +35,7 @@ def compare_frame_metadata(
     is_same_writer : whether code and libraries are those that wrote the dataset; else only attributes that both have
         are compared, and words among them may be others
     """
-    if not plan.settings.pictures or "inputs/camera.yaml" in damaged:
+    if not plan.settings.stores_frames or "inputs/camera.yaml" in damaged:
         return
     try:
         arguments = describe_frame_arrays(layout, plan)
@@ -100,7 +100,7 @@ def compare_sheet(
     layout, manifest, plan : of a sealed dataset
     damaged : paths that are not read
     """
-    if plan.settings.pictures and SHEET not in damaged:
+    if plan.settings.stores_frames and SHEET not in damaged:
         try:
             same = require_file(layout.root / SHEET).read_bytes() == draw_sheet_again(layout, manifest, plan)
         except InputError as error:

@@ -30,12 +30,17 @@ VEHICLE = define_option(
     None,
     known="catalogs/vehicles/*.yaml",
 )
+FRAMES = {"stored": True, "later": "later", "none": False}
 PICTURES = define_option(
     "pictures",
-    bool,
-    "Render the frames; --no-frames makes telemetry alone.",
+    str,
+    "Store the frames, make them later, when they are read, or none; --no-frames is short for none.",
     True,
+    shown_default="stored",
     spelling="frames",
+    known=tuple(FRAMES),
+    values=FRAMES,
+    off="none",
 )
 
 
@@ -114,6 +119,14 @@ COMMANDS = (
         ),
         brief=list_quarantined_clips,
         passed=lambda result: not result.get("telemetry_differs"),
+    ),
+    Command(
+        name="materialise",
+        group=GROUP,
+        sentence="Make frames that were left for later, of all clips or some, so that no reader waits for them.",
+        function="flows.reading.materialise:materialise_frames",
+        options=(DATASET, CLIPS, *RUNNER[:2]),
+        brief=list_quarantined_clips,
     ),
     Command(
         name="drive",

@@ -73,6 +73,7 @@ def write_coco(dataset: ExportedDataset, folder: Path) -> None:
                     images.append(
                         _describe_image(len(images) + 1, name, clip.label, frame, picture)
                         | {"T_world_camera": poses[frame].tolist()}
+                        | ({"K": clip.camera.K.tolist()} if dataset.camera.varies else {})
                         | ({} if named is None else {"scene": named})
                     )
                     masks = [

@@ -175,6 +175,7 @@ def describe_export(dataset: ExportedDataset, to: str) -> dict[str, Any]:
                 key: row[key]
                 for key in ("index", "clip_id", "label", "split", "scenario", "figures", "verdict")
             }
+            | ({"camera": describe_camera(dataset.camera_of(row))} if dataset.camera.varies else {})
             for row in dataset.rows
         ],
     }

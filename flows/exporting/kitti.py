@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flows.exporting.dataset import ExportedClip, ExportedDataset, require_pinhole
+from flows.exporting.dataset import ExportedClip, ExportedDataset, require_one_camera, require_pinhole
 from flows.exporting.inertial import compute_inertial_motion
 from flows.exporting.road_users import describe_kitti_label, list_objects_by_frame
 from tasks.render.camera import PIXEL_CENTRE, Camera
@@ -47,9 +47,10 @@ def write_kitti(dataset: ExportedDataset, folder: Path) -> None:
     Raises
     ------
     InputError
-        If the camera's lens distorts.
+        If the camera's lens distorts, or each clip has a camera of its own.
     """
     require_pinhole(dataset, "kitti")
+    require_one_camera(dataset, "kitti")
     raw = folder / "raw" / DATE
     poses = folder / "odometry" / "poses"
     for subfolder in (raw, poses):

@@ -42,7 +42,9 @@ CHANNEL = "CAM_FRONT"
 FIRST_SCENE = 2000
 MOST_SCENES = 8000
 """A scene's number has four digits."""
-STREAMED = ("ego_pose", "scene", "sample", "sample_data", "instance", "sample_annotation")
+STREAMED = (
+    "calibrated_sensor", "ego_pose", "scene", "sample", "sample_data", "instance", "sample_annotation",
+)  # fmt: skip
 VISIBILITIES = ("v0-40", "v40-60", "v60-80", "v80-100")
 RPM = 60 / (2 * np.pi)
 """Revolutions a minute in one radian a second."""
@@ -184,6 +186,13 @@ def _write_scene(
     count = len(frames["frame"])
     poses = compute_ego_poses(clip, dataset.vehicle)
     turns, pictures = compute_quaternions(poses, scalar_first=True), clip.read_array("rgb")
+    mount = np.linalg.inv(_rig_from_ego(dataset.vehicle)) @ clip.camera.T_rig_camera
+    rows_of["calibrated_sensor"].append(
+        {"token": make_token("calibrated_sensor", clip.clip_id), "sensor_token": make_token("sensor"),
+         "translation": mount[:3, 3].tolist(),
+         "rotation": compute_quaternions(mount[None], scalar_first=True)[0].tolist(),
+         "camera_intrinsic": (clip.camera.K - PIXEL_CENTRE).tolist()}
+    )  # fmt: skip
     rows_of["scene"].append(
         {"token": own, "log_token": make_token("log"), "nbr_samples": count, "name": scene,
          "description": clip.label, "first_sample_token": make_token("sample", clip.clip_id, 0),
@@ -203,7 +212,7 @@ def _write_scene(
         )
         rows_of["sample_data"].append(
             {"token": make_token("sample_data", clip.clip_id, frame), "sample_token": sample,
-             "ego_pose_token": ego, "calibrated_sensor_token": make_token("calibrated_sensor"),
+             "ego_pose_token": ego, "calibrated_sensor_token": make_token("calibrated_sensor", clip.clip_id),
              "timestamp": at_us, "fileformat": "png", "is_key_frame": True, "filename": name,
              "height": dataset.camera.height, "width": dataset.camera.width}
             | dict(_link("sample_data", clip, frame, count))
@@ -240,9 +249,7 @@ def _link(table: str, clip: ExportedClip, frame: int, count: int) -> Iterator[tu
 
 
 def _describe_fixed(dataset: ExportedDataset) -> dict[str, list[dict[str, Any]]]:
-    camera = dataset.camera
-    mount = np.linalg.inv(_rig_from_ego(dataset.vehicle)) @ camera.T_rig_camera
-    log, sensor = make_token("log"), make_token("sensor")
+    log = make_token("log")
     users = dataset.plan.settings.has_objects
     categories = dict.fromkeys(names.nuscenes for names in NAMES.values()) if users else {}
     attributes = dict.fromkeys(name for names in NAMES.values() for name in names[2:]) if users else {}
@@ -258,13 +265,7 @@ def _describe_fixed(dataset: ExportedDataset) -> dict[str, list[dict[str, Any]]]
                  "date_captured": "", "location": describe_scenes(dataset.manifest)}],
         "map": [{"token": make_token("map"), "log_tokens": [log], "category": "semantic_prior",
                  "filename": "maps/none.png"}],
-        "sensor": [{"token": sensor, "channel": CHANNEL, "modality": "camera"}],
-        "calibrated_sensor": [
-            {"token": make_token("calibrated_sensor"), "sensor_token": sensor,
-             "translation": mount[:3, 3].tolist(),
-             "rotation": compute_quaternions(mount[None], scalar_first=True)[0].tolist(),
-             "camera_intrinsic": (camera.K - PIXEL_CENTRE).tolist()}
-        ],
+        "sensor": [{"token": make_token("sensor"), "channel": CHANNEL, "modality": "camera"}],
     }  # fmt: skip
 
 

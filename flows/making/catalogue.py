@@ -79,8 +79,12 @@ class Catalogue:
 
     @cached_property
     def camera(self) -> Camera:
-        """The camera."""
+        """The camera by the values of its file; that of a clip is of `camera_of`."""
         return load("camera", self._inputs / "camera.yaml")
+
+    def camera_of(self, seed: int) -> Camera:
+        """Return the camera of a clip, whose visual seed draws what has bounds."""
+        return load("camera", self._inputs / "camera.yaml", seed) if self.camera.varies else self.camera
 
     @cached_property
     def gates(self) -> PoseThresholds:

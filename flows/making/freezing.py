@@ -272,7 +272,7 @@ def _plan_clips(grid: Grid) -> tuple[Plan, dict[str, bytes]]:
 
 def _read_parameters(plan: Plan, inputs: Mapping[str, bytes]) -> dict[str, Any]:
     parsed = {name: parse_input(name, content) for name, content in inputs.items()}
-    return parameters_that_matter(parsed, plan.settings.pictures)
+    return parameters_that_matter(parsed, bool(plan.settings.pictures))
 
 
 def _list_records(plan: Plan) -> list[dict[str, Any]]:

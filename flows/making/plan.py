@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,7 +149,11 @@ class Plan:
 
 
 def make_plan(
-    source: str | Path | Grid, backend: str, vehicle: str | None = None, *, pictures: bool = True
+    source: str | Path | Grid,
+    backend: str,
+    vehicle: str | None = None,
+    *,
+    pictures: bool | Literal["later"] = True,
 ) -> tuple[Plan, dict[str, bytes]]:
     """Check a grid against its catalogue entries and scene, and freeze it.
 
@@ -158,7 +162,8 @@ def make_plan(
     source : grid file, the name of one that ships, or a grid that is already read
     backend : rasteriser
     vehicle : takes the place of the grid's; a frozen one runs in the mode it was fitted in
-    pictures : False makes telemetry alone, with the clip ids of the same grid with frames
+    pictures : False makes telemetry alone, and ``later`` frames when they are read; True does as the grid says. The
+        ids of the clips are the same
 
     Returns
     -------
@@ -176,8 +181,8 @@ def make_plan(
         raise InputError([*faults.problems, *(f"{source}: {problem}" for problem in behind)]) from None
     if vehicle is not None:
         grid = replace(grid, settings=_with_vehicle(grid.settings, vehicle))
-    if not pictures:
-        grid = replace(grid, settings=grid.settings.model_copy(update={"pictures": False}))
+    if pictures is not True:
+        grid = replace(grid, settings=grid.settings.model_copy(update={"pictures": pictures}))
     name = source.settings.name if isinstance(source, Grid) else str(source)
     return freeze_grid(grid, name, backend)
 

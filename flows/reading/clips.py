@@ -78,10 +78,14 @@ class Clip:
         InputError
             If the dataset has no frames, the clip no such frame, or the picture is damaged.
         """
+        frames = self.dataset.head["grid"]["frames"]
+        chosen = frames // 2 if frame is None else frame
+        if not (is_whole(chosen) and 0 <= chosen < frames):
+            raise InputError(f"frame {frame}: must be one of the {frames} frames of the clip, from 0")
+        if self.dataset.head["grid"].get("pictures") == "later":
+            made = self.dataset.source.read_window(self.record["index"], slice(chosen, chosen + 1), ["rgb"])
+            return made["rgb"][0]
         rgb: Any = self.dataset.frames["rgb"]
-        chosen = rgb.shape[1] // 2 if frame is None else frame
-        if not (is_whole(chosen) and 0 <= chosen < rgb.shape[1]):
-            raise InputError(f"frame {frame}: must be one of the {rgb.shape[1]} frames of the clip, from 0")
         try:
             picture: NDArray[np.uint8] = rgb[self.record["index"], chosen]
         except (ValueError, RuntimeError, OSError) as error:

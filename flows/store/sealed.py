@@ -61,14 +61,20 @@ def read_manifest_head(layout: Layout) -> ManifestHead:
     return record
 
 
-def require_frames(manifest: Mapping[str, Any], origin: object) -> None:
+def require_frames(manifest: Mapping[str, Any], origin: object, *, stored: bool = False) -> None:
     """Raise `InputError` for a dataset of telemetry alone.
 
     Parameters
     ----------
     manifest : of the dataset
     origin : what messages call it
+    stored : refuse one whose frames are made when they are read, too
     """
+    if stored and manifest["grid"].get("pictures", True) == "later":
+        raise InputError(
+            f"{origin}: the dataset makes its frames when they are read (--frames later), and this needs them stored:"
+            " generate its grid with --frames stored into another folder"
+        )
     if not manifest["grid"].get("pictures", True):
         raise InputError(
             f"{origin}: the dataset was made without frames (--no-frames), which this needs:"

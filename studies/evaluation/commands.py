@@ -14,9 +14,8 @@ from flows.commands.command import (
     define_option,
     require_key,
 )
-from flows.commands.evaluation import GROUP
 
-PAPER = "The paper"
+GROUP, PAPER = "Evaluation", "The paper"
 EVALUATION_COLUMNS = ("metric", "method", "condition", "value", "unit", "paper")
 
 

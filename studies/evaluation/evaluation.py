@@ -82,7 +82,7 @@ def evaluate_dataset(
     results = Outputs(out, "lab evaluate", "evaluation.json", "evaluation.parquet", "evaluation.html")
     layout = open_for_reading(dataset)
     manifest, root = read_manifest(layout), layout.root
-    require_frames(manifest, layout)
+    require_frames(manifest, layout, stored=True)
     refuse_changed_content(layout, manifest, manifest["clips"])
     for scene in list_scenes(manifest):
         refuse_changed_scene(scene)

@@ -87,7 +87,7 @@ class View:
         if "depth" in buffers and read_plan(self.root).settings.has_objects:
             instances = read_clip(Layout(self.root).frames, index, "instance")
             buffers["depth"] = hide_moving(buffers["depth"], instances)
-        camera = catalogue_of(self.root).camera
+        camera = catalogue_of(self.root).camera_of(int(read_plan(self.root).clips[index].seed))
         return list(undistort_frames(buffers, camera.K - PIXEL_CENTRE, camera.distortion).values())
 
 
@@ -114,8 +114,9 @@ def judge_clip(
     frames = clip_columns(view.root, "frames", facts)
     times = np.asarray(frames["t_ns"] * 1e-9, np.float64)
     clip = prepare_for_checks(
-        {"rgb": rgb, "depth": depth, "class": kind}, frames, facts["film_depth_mm"], catalogue
-    )
+        {"rgb": rgb, "depth": depth, "class": kind}, frames, facts["film_depth_mm"], catalogue,
+        catalogue.camera_of(int(facts["seed"])),
+    )  # fmt: skip
     others = {name: read_trajectory(path) for name, path in (outside or {}).items()}
     sampled = rgb[sampled_frames(len(rgb))]
     small = rgb[[0, len(rgb) // 3, 2 * len(rgb) // 3]]

@@ -25,9 +25,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from catalogs.entries import load
 from catalogs.quantities import CatalogueEntry, Text, read_entry
 from catalogs.sentences import shorten
+from studies.evaluation.clip_prompts import load_prompts
 from tasks.errors import InputError
 
 JUDGES = ("clip", "dover", "fast_vqa", "lpips")
@@ -129,7 +129,7 @@ def _load_judge(path: Path, entry: Checkpoint) -> LoadedJudge:
             ) from None
         if not isinstance(features, np.ndarray) or not np.issubdtype(features.dtype, np.floating):
             raise InputError(f"{shorten(entry.text_features)} must be one array of floats; it is not")
-        kinds = list(load("list of prompts"))
+        kinds = list(load_prompts())
         if features.ndim != 2 or len(features) != len(kinds) or not np.isfinite(features).all():
             raise InputError(
                 f"{shorten(entry.text_features)} must hold finite features [{len(kinds)}, D] of"

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from catalogs.entries import load
+from studies.evaluation.clip_prompts import load_prompts
 from studies.evaluation.judged_clip import JudgedClip, Row, View
 from studies.evaluation.learned_judges import LoadedJudge
 from studies.evaluation.metrics.learned_scores import (
@@ -139,7 +139,7 @@ def score_pictures(
         scores["temporal_lpips"] = FlowAlignedDistance(network=lpips).score(frames)
     clip = judges["clip"]
     if clip.network is not None and clip.text_features is not None:
-        features = dict(zip(load("list of prompts"), clip.text_features, strict=True))
+        features = dict(zip(load_prompts(), clip.text_features, strict=True))
         scores |= {
             f"clip_{kind}": weather_judge(clip.network, features, kind).score(frames)
             for kind in kinds

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from catalogs.entries import load
-from catalogs.paper_metrics import ClipSet
 from studies.evaluation.judged_clip import JudgedClip, Row
+from studies.evaluation.paper_metrics import ClipSet, load_printed_figures
 from studies.evaluation.rows import figure_row, group_weather_families, read_visual_seed
 
 SETS: dict[ClipSet, Callable[[dict[str, Any]], bool]] = {
@@ -53,7 +52,7 @@ def mean_rows(rows: Sequence[Row], clips: list[JudgedClip]) -> Iterator[Row]:
     for row in rows:
         groups[row["metric"], row["method"], row["window"]].append(row)
     for (metric, _, _), figures in groups.items():
-        printed = load("table of printed figures").get(metric, {})
+        printed = load_printed_figures().get(metric, {})
         placed = [row for row in figures if row["condition"] in places]
         if not placed:
             for over, value in printed.items():

@@ -95,7 +95,8 @@ def prescribed_masks(
     clip: JudgedClip, depth: NDArray[np.float32], road: NDArray[np.bool_], catalogue: Catalogue
 ) -> NDArray[np.bool_]:
     """Road pixels whose place on the route is that of the clip's feature, bool [F, H, W]."""
-    facts, scene, camera = clip.facts, catalogue.scene, catalogue.camera
+    facts, scene = clip.facts, catalogue.scene
+    camera = catalogue.camera_of(int(facts["seed"]))
     near, far = (facts["hazard_center_m"] + s * facts["hazard_length_m"] / 2 for s in (-1, 1))
     masks = np.zeros(depth.shape, bool)
     inverse = np.linalg.inv(camera.K - PIXEL_CENTRE)

@@ -6,7 +6,7 @@ from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
-from catalogs.scenario import SCENARIO_FIELDS
+from catalogs.scenario import OPTIONAL_FIELDS, SCENARIO_FIELDS
 from studies.evaluation.judged_clip import JudgedClip, Row
 from studies.evaluation.metrics.video_motion import WINDOWS
 from tasks.errors import InputError
@@ -109,10 +109,10 @@ def find_control(clip: JudgedClip, clips: list[JudgedClip], *, weather: bool) ->
     clips : of the dataset
     weather : whether the sky or the road is the difference
     """
-    free = {"weather", "precipitation_mm_h", "snow_accumulation_h"} if weather else {
+    free = {"weather", "precipitation_mm_h", "snow_accumulation_h", "falling"} if weather else {
         "hazard_center_m", "hazard_length_m", "hazard_height_m"
     }  # fmt: skip
-    held = {*SCENARIO_FIELDS, "scene"} - free
+    held = {*SCENARIO_FIELDS, *OPTIONAL_FIELDS} - free
     seed = read_visual_seed(clip.facts["label"])
     for other in (c for c in clips if read_visual_seed(c.facts["label"]) == seed):
         plain = other.facts["weather"] == DRY if weather else other.facts["hazard_height_m"] == 0

@@ -91,7 +91,7 @@ def run_controls(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     inputs = read_plan(root).inputs
     refuse_traced(inputs, dataset, "lab controls")
     refuse_driven(inputs, dataset, "lab controls")
-    require_frames(manifest, dataset)
+    require_frames(manifest, dataset, stored=True)
     refuse_changed_content(layout, manifest, manifest["clips"])
     for scene in list_scenes(manifest):
         refuse_changed_scene(scene)

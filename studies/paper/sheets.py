@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 
 from flows.making.plan import read_plan
 from flows.making.seal import PREVIEW_CLIPS, pick_evenly
+from flows.reading.frames import Frames, open_frames
 from flows.store.address import open_for_reading
-from flows.store.frames import read_clip
-from flows.store.layout import Layout
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest, refuse_changed_clips, require_frames
 from flows.store.telemetry import read_columns
@@ -47,11 +46,11 @@ def draw_sheets(
         feature, another's has one weather only, no clip comes to the station, or what is shown is not as recorded.
     """
     results = Outputs(out, "lab sheets", "weather.png", "hazards.png")
-    (layout, manifest), *others = _open_finished([dataset, *(beside or ())])
+    (frames, manifest), *others = _open_finished([dataset, *(beside or ())])
     clips = manifest["clips"]
     features = pick_evenly([clip for clip in clips if clip["scenario"]["hazard_height_m"]], PREVIEW_CLIPS)
     hazards = [[clip, *[other for other in clips if is_flat_twin(other, clip)][:1]] for clip in features]
-    weathers = [[(layout, clip) for clip in row] for row in pick_evenly(_list_weathers(clips), PREVIEW_CLIPS)]
+    weathers = [[(frames, clip) for clip in row] for row in pick_evenly(_list_weathers(clips), PREVIEW_CLIPS)]
     if not hazards and not weathers:
         raise InputError(f"{dataset}: must have two weathers of one drive, or a road feature; it has neither")
     for name, (street, record) in zip(beside or (), others, strict=True):
@@ -61,14 +60,14 @@ def draw_sheets(
                 f"{name}: must have two weathers of one drive, to stand beside {dataset}; it has not"
             )
         weathers.append([(street, clip) for clip in more[0]])
-    for street, record in [(layout, manifest), *others]:
+    for street, record in [(frames, manifest), *others]:
         shown = [clip for row in weathers for at, clip in row if at is street]
-        shown += [clip for row in hazards for clip in row] if street is layout else []
-        refuse_changed_clips(street, record, shown, "frames")
+        shown += [clip for row in hazards for clip in row] if street is frames else []
+        refuse_changed_clips(street.layout, record, shown, "frames")
     place = _choose_station(station, [drive for row in weathers for drive in row])
     drawn = {
         "weather": [[_draw_still(*drive, place, drive[1]["label"]) for drive in row] for row in weathers],
-        "hazards": [_draw_contact(layout, *row) for row in hazards],
+        "hazards": [_draw_contact(frames, *row) for row in hazards],
     }
     written = {}
     for name, rows in drawn.items():
@@ -79,8 +78,8 @@ def draw_sheets(
     return written
 
 
-def _open_finished(datasets: Sequence[str]) -> list[tuple[Layout, Manifest]]:
-    """Return each dataset with its manifest; every folder that holds none is reported."""
+def _open_finished(datasets: Sequence[str]) -> list[tuple[Frames, Manifest]]:
+    """Return the frames of each dataset with its manifest; every folder that holds none is reported."""
     layouts = [open_for_reading(dataset) for dataset in datasets]
     lacking = [name for name, layout in zip(datasets, layouts, strict=True) if not layout.manifest.is_file()]
     if lacking:
@@ -88,7 +87,8 @@ def _open_finished(datasets: Sequence[str]) -> list[tuple[Layout, Manifest]]:
     manifests = [read_manifest(layout) for layout in layouts]
     for name, manifest in zip(datasets, manifests, strict=True):
         require_frames(manifest, name)
-    return list(zip(layouts, manifests, strict=True))
+    opened = [open_frames(layout, manifest) for layout, manifest in zip(layouts, manifests, strict=True)]
+    return list(zip(opened, manifests, strict=True))
 
 
 def _list_weathers(clips: Sequence[Mapping[str, Any]]) -> list[list[Mapping[str, Any]]]:
@@ -100,7 +100,7 @@ def _list_weathers(clips: Sequence[Mapping[str, Any]]) -> list[list[Mapping[str,
     return [row for row in groups.values() if len(row) > 1]
 
 
-def _choose_station(asked: float | None, drives: Sequence[tuple[Layout, Mapping[str, Any]]]) -> float:
+def _choose_station(asked: float | None, drives: Sequence[tuple[Frames, Mapping[str, Any]]]) -> float:
     """Return the station to show [m]: the one asked for, else `STATION_M` or as far as all clips come.
 
     Raises
@@ -108,7 +108,7 @@ def _choose_station(asked: float | None, drives: Sequence[tuple[Layout, Mapping[
     InputError
         If no clip comes to the one that is asked for.
     """
-    ways = [_read_frames(layout, clip, ["station"])["station"] for layout, clip in drives]
+    ways = [_read_rows(frames, clip, ["station"])["station"] for frames, clip in drives]
     if asked is None:
         return float(min([STATION_M, *(way[-1] for way in ways)]))
     if ways and not any(way[0] <= asked <= way[-1] for way in ways):
@@ -119,18 +119,18 @@ def _choose_station(asked: float | None, drives: Sequence[tuple[Layout, Mapping[
     return asked
 
 
-def _read_frames(layout: Layout, clip: Mapping[str, Any], names: list[str]) -> dict[str, NDArray[Any]]:
-    frames = read_plan(layout.root).settings.frames
-    return read_columns(layout.telemetry / "frames", clip["clip_id"], names, most=frames)
+def _read_rows(frames: Frames, clip: Mapping[str, Any], names: list[str]) -> dict[str, NDArray[Any]]:
+    rows = read_plan(frames.layout.root).settings.frames
+    return read_columns(frames.layout.telemetry / "frames", clip["clip_id"], names, most=rows)
 
 
-def _draw_contact(layout: Layout, clip: Mapping[str, Any], *twin: Mapping[str, Any]) -> list[Picture]:
+def _draw_contact(frames: Frames, clip: Mapping[str, Any], *twin: Mapping[str, Any]) -> list[Picture]:
     """Before, at and after contact; beside them the place before contact on the flat twin, where there is one."""
     scenario = clip["scenario"]
     half, center = scenario["hazard_length_m"] / 2, scenario["hazard_center_m"]
     places = {clip["label"]: center - half - BEFORE_M, "contact": center, "after": center + half + AFTER_M}
-    stills = [_draw_still(layout, clip, place, caption) for caption, place in places.items()]
-    return stills + [_draw_still(layout, flat, center - half - BEFORE_M, flat["label"]) for flat in twin]
+    stills = [_draw_still(frames, clip, place, caption) for caption, place in places.items()]
+    return stills + [_draw_still(frames, flat, center - half - BEFORE_M, flat["label"]) for flat in twin]
 
 
 def is_flat_twin(other: Mapping[str, Any], clip: Mapping[str, Any]) -> bool:
@@ -148,11 +148,12 @@ def is_flat_twin(other: Mapping[str, Any], clip: Mapping[str, Any]) -> bool:
     return same and other["seed"] == clip["seed"] and not other["scenario"]["hazard_height_m"]
 
 
-def _draw_still(layout: Layout, clip: Mapping[str, Any], station: float, caption: str) -> Picture:
+def _draw_still(frames: Frames, clip: Mapping[str, Any], station: float, caption: str) -> Picture:
     """The frame nearest to a station, and a caption with the body's pitch in it, and whether the car comes so far."""
-    columns = _read_frames(layout, clip, ["station", "pitch"])
+    columns = _read_rows(frames, clip, ["station", "pitch"])
     frame = int(np.argmin(np.abs(columns["station"] - station)))
     pitch = np.rad2deg(columns["pitch"][frame])
     if columns["station"][-1] < station:
         caption = f"{caption}, not reached"
-    return f"{caption}  {pitch:.2f} deg", read_clip(layout.frames, clip["index"], "rgb", [frame])[0]
+    still = frames.read_window(clip["index"], slice(frame, frame + 1), ["rgb"])["rgb"][0]
+    return f"{caption}  {pitch:.2f} deg", still

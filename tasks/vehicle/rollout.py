@@ -241,7 +241,8 @@ def compute_peaks(columns: Mapping[str, NDArray[Any]]) -> dict[str, float]:
     scale = np.minimum(columns["abs_scale_f"], columns["abs_scale_r"])
     acts = np.where(np.isnan(scale), np.nan, scale < 1)
     return {
-        "peak_deceleration": float(np.maximum(0.0, np.max(-acceleration))),
+        # 0 has no sign: a car that never slows down has the same figure in every file
+        "peak_deceleration": 0.0 + float(np.maximum(0.0, np.max(-acceleration))),
         "peak_pitch_rate": float(np.max(np.abs(pitch_rate))),
         "abs_time": float(np.sum(acts)) * TICK_NS / 1e9,
         "peak_slip": float(np.max(slip)),

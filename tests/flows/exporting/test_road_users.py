@@ -263,7 +263,7 @@ def test_no_check_reads_the_depth_of_what_moves(made, data, masks, monkeypatch):
 
     monkeypatch.setattr(gate, "prepare_for_checks", keep)
     with pytest.raises(InputError, match="enough"):
-        gate.judge_motion(stored, {}, 0.0, catalogue_of(made))
+        gate.judge_motion(stored, {}, 0.0, catalogue_of(made), catalogue_of(made).camera)
     for depth in (*seen, View(root=made).arrays(index, "depth")[0]):
         assert np.isnan(depth[masks > 0]).all()
         np.testing.assert_array_equal(depth[masks == 0], stored["depth"][masks == 0])

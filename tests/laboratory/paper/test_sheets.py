@@ -3,6 +3,7 @@
 import cv2
 import pytest
 
+from flows.reading.frames import Frames
 from flows.store.sealed import read_manifest
 from flows.store.telemetry import read_columns
 from studies.paper.sheets import _draw_still, draw_sheets, is_flat_twin
@@ -49,7 +50,7 @@ def test_a_place_that_no_clip_comes_to_is_refused_and_a_car_that_stops_before_it
             draw_sheets(str(toy_dataset.root), str(tmp_path), station=station)
     assert not any(tmp_path.iterdir())
     for station, told in ((ends[0] - 0.1, "at  "), (ends[0] + 0.1, "at, not reached  ")):
-        assert _draw_still(toy_dataset, clips[0], station, "at")[0].startswith(told)
+        assert _draw_still(Frames(layout=toy_dataset), clips[0], station, "at")[0].startswith(told)
 
 
 def test_a_flat_twin_is_the_same_drive_weather_and_seed_without_the_feature():

@@ -8,14 +8,15 @@ import pytest
 from catalogs.entries import load
 from catalogs.road_users import EGO, RoadUser
 from catalogs.scenario import Scenario
-from flows.driving.aeb import compare_brakes, drive_approach, find_tyre_friction, make_brake
-from flows.driving.cases import Case, list_cases
 from flows.making.driving import surface_of
-from tasks.driving.brakes import Approach, BlindTrigger, compute_impact_speed, find_threat
+from studies.emergency_braking.brakes import Approach, BlindTrigger, compute_impact_speed, find_threat
+from studies.emergency_braking.cases import Case, list_cases
+from studies.emergency_braking.compare import compare_brakes, drive_approach, find_tyre_friction, make_brake
+from studies.emergency_braking.table import load_table
 from tasks.driving.targets import Target, TargetTrack
 from tasks.errors import InputError
 
-TABLE = load("emergency braking")
+TABLE = load_table()
 CAR = load("vehicle", "bmw-320i")
 ASPHALT = load("wet friction").apply(load("surface", "dense-asphalt"))
 OVERHANG = load("road user sizes")[EGO][0]

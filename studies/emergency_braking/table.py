@@ -1,5 +1,7 @@
 """Emergency brakes, their line, and the protocols that they are held against."""
 
+from functools import cache
+from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import Field, model_validator
@@ -7,6 +9,7 @@ from pydantic import Field, model_validator
 from catalogs.grids.blocks import PartialScenario
 from catalogs.quantities import CatalogueEntry, Number, Scalar, Text, require_quantity
 from catalogs.road_users import Kind
+from studies.plans import load_plan
 
 Seconds = Annotated[Scalar, require_quantity("s", minimum=0)]
 Metres = Annotated[Scalar, require_quantity("m", minimum=0)]
@@ -105,3 +108,12 @@ class EmergencyBraking(CatalogueEntry):
     def list_weathers(self) -> dict[str, dict[str, Any]]:
         """Return the fields of a scenario that each weather sets."""
         return {name: one.model_dump(exclude_none=True) for name, one in self.weathers.items()}
+
+
+@cache
+def load_table() -> EmergencyBraking:
+    """Return the content of `emergency_braking.yaml`."""
+    table: EmergencyBraking = load_plan(
+        EmergencyBraking, Path(__file__).parent, "emergency_braking", "emergency braking"
+    )
+    return table

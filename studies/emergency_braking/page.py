@@ -12,7 +12,7 @@ def draw_page(result: dict[str, Any]) -> str:
 
     Parameters
     ----------
-    result : of `flows.driving.aeb.compare_brakes`
+    result : of `studies.emergency_braking.compare.compare_brakes`
     """
     rows = result["rows"]
     weathers, brakes = (list(dict.fromkeys(row[key] for row in rows)) for key in ("weather", "brake"))

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from typing import Annotated
 
 import numpy as np
@@ -10,6 +11,7 @@ from pydantic import Field, field_validator, model_validator
 from catalogs.entries import load
 from catalogs.quantities import CatalogueEntry, Number
 from catalogs.sentences import shorten_value
+from studies.plans import load_plan
 from tasks.vehicle.effects.ports import PORTS, VARIABLES
 from tasks.vehicle.effects.slots import Slot
 
@@ -119,6 +121,18 @@ class SizeFile(TruthFile):
             for parameter, values in parameters.items()
             for value in values
         )
+
+
+def load_truths(name_or_path: str | Path = "truths") -> tuple[Truth, ...]:
+    """Return the truths of `truths.yaml`, or of a file like it."""
+    truths: tuple[Truth, ...] = load_plan(TruthFile, Path(__file__).parent, name_or_path, "list of truths")
+    return truths
+
+
+def load_sizes(name_or_path: str | Path = "truths") -> tuple[Truth, ...]:
+    """Return the truths of several sizes of `truths.yaml`, or of a file like it."""
+    sizes: tuple[Truth, ...] = load_plan(SizeFile, Path(__file__).parent, name_or_path, "list of sizes")
+    return sizes
 
 
 def _make_slot(form: OutsideEntry) -> Slot:

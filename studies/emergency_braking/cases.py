@@ -6,10 +6,10 @@ from itertools import product
 from math import copysign, inf
 from typing import Any
 
-from catalogs.emergency_braking import ProtocolEntry
 from catalogs.entries import load
 from catalogs.road_users import EGO, RoadUser
 from catalogs.scenario import Scenario
+from studies.emergency_braking.table import ProtocolEntry
 from tasks.driving.targets import TargetTrack, follow_track
 
 

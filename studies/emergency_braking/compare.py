@@ -9,18 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from catalogs.emergency_braking import EmergencyBraking
 from catalogs.entries import load
-from catalogs.openscenario import format_openscenario, read_openscenario
 from catalogs.road_users import EGO
 from catalogs.scenario import Scenario
 from catalogs.scenes.opendrive import find_street, format_opendrive
-from flows.driving.aeb_page import draw_page
-from flows.driving.cases import Case, list_cases
 from flows.making.driving import surface_of, weather_of
 from flows.running.progress import progress_bar
 from flows.store.outputs import Outputs
-from tasks.driving.brakes import (
+from studies.emergency_braking.brakes import (
     Approach,
     BlindTrigger,
     BrakeLine,
@@ -28,6 +24,10 @@ from tasks.driving.brakes import (
     FrictionTrigger,
     Trigger,
 )
+from studies.emergency_braking.cases import Case, list_cases
+from studies.emergency_braking.openscenario import format_openscenario, read_openscenario
+from studies.emergency_braking.page import draw_page
+from studies.emergency_braking.table import EmergencyBraking, load_table
 from tasks.driving.outcome import (
     TICK_S,
     Outcome,
@@ -57,8 +57,8 @@ def compare_brakes(
     Parameters
     ----------
     vehicle : catalogue name or file of the car
-    protocol, weather, brake : names of `catalogs/emergency_braking.yaml`; None takes all. A protocol may also be an
-        OpenSCENARIO file with one road user
+    protocol, weather, brake : names of `emergency_braking.yaml`; None takes all. A protocol may also be an OpenSCENARIO
+        file with one road user
     bounds : drive each at the 5th, 50th and 95th percentile of friction under the surface bounds too
     out : folder for aeb.json, the page, and each approach as an OpenSCENARIO file
 
@@ -74,7 +74,7 @@ def compare_brakes(
     InputError
         For names that do not exist.
     """
-    table: EmergencyBraking = load("emergency braking")
+    table = load_table()
     chosen = _choose(table, protocol, weather, brake)
     cases = [case for name in chosen["protocol"] for case in _open_protocol(table, name)]
     scenarios = {f"openscenario/{_name_file(case)}": case for case in cases}

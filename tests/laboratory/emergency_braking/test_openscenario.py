@@ -8,15 +8,16 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from catalogs.entries import load
-from catalogs.openscenario import format_openscenario, read_openscenario
 from catalogs.road_users import RoadUser
 from catalogs.scenario import Scenario
 from catalogs.scenes.opendrive import find_street
-from flows.driving.aeb import compare_brakes
-from flows.driving.cases import list_cases
+from studies.emergency_braking.cases import list_cases
+from studies.emergency_braking.compare import compare_brakes
+from studies.emergency_braking.openscenario import format_openscenario, read_openscenario
+from studies.emergency_braking.table import load_table
 from tasks.errors import InputError
 
-TABLE, STREET = load("emergency braking"), find_street("street")
+TABLE, STREET = load_table(), find_street("street")
 
 
 def write(folder: Path, scenario: Scenario) -> Path:
