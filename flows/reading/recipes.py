@@ -26,7 +26,7 @@ from catalogs.sentences import shorten_value
 from flows.making.clip import draw_window, make_clip
 from flows.making.generate import create_frame_arrays
 from flows.making.input_changes import read_kept, refuse_changed_records
-from flows.making.places import find_scene, refuse_changed_scene
+from flows.making.locations import find_scene, refuse_changed_scene
 from flows.making.plan import Plan, read_plan
 from flows.reading.frames import Frames
 from flows.store.layout import STAGED_TABLES, Layout, read_json, write_atomically, write_pieces
