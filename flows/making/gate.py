@@ -19,7 +19,7 @@ from tasks.eval.poses.checks import (
     prepare_clip,
 )
 from tasks.eval.poses.undistort import undistort_frames
-from tasks.render.camera import PIXEL_CENTRE
+from tasks.render.camera import PIXEL_CENTRE, Camera
 
 
 def judge_motion(
@@ -27,14 +27,14 @@ def judge_motion(
     frames: Mapping[str, NDArray[Any]],
     film_depth_mm: float,
     catalogue: Catalogue,
+    camera: Camera,
 ) -> dict[str, Any]:
     """Motion that the gate's pose check recovers from the finished frames, compared with the telemetry."""
-    camera = catalogue.camera
     shown = {name: buffers[name] for name in ("rgb", "depth", "class")}
     if "instance" in buffers:
         shown["depth"] = hide_moving(buffers["depth"], buffers["instance"])
     pinhole = undistort_frames(shown, camera.K - PIXEL_CENTRE, camera.distortion)
-    recovered = POSE_CHECKS[GATE_CHECK](prepare_for_checks(pinhole, frames, film_depth_mm, catalogue))
+    recovered = POSE_CHECKS[GATE_CHECK](prepare_for_checks(pinhole, frames, film_depth_mm, catalogue, camera))
     body = pose_body(
         frames["heave"], frames["pitch"], catalogue.vehicle.cg_to_front_axle, catalogue.vehicle.cg_height
     )
@@ -52,9 +52,9 @@ def prepare_for_checks(
     frames: Mapping[str, NDArray[Any]],
     film_depth_mm: float,
     catalogue: Catalogue,
+    camera: Camera,
 ) -> CheckedClip:
     """Return a clip's undistorted ``rgb``, ``depth`` and ``class`` as every pose check takes them."""
-    camera = catalogue.camera
     return prepare_clip(
         pinhole,
         JudgeCamera(
@@ -69,11 +69,17 @@ def prepare_for_checks(
     )
 
 
-def nothing_to_judge(frames: int) -> dict[str, Any]:
-    """Return the result of `judge_motion` where there is no picture: every value is not represented."""
+def nothing_to_judge(frames: int, reason: str) -> dict[str, Any]:
+    """Return the result of `judge_motion` where there is no picture: every value is not represented.
+
+    Parameters
+    ----------
+    frames : of the clip [1]
+    reason : why there is none
+    """
     verdict = {figure.name: None for figure in fields(PoseVerdict)}
     return {
         "recovered_pitch": np.full(frames, np.nan),
         "recovered_progress": np.full(frames, np.nan),
-        "verdict": verdict | {"reasons": ["no frames were made"]},
+        "verdict": verdict | {"reasons": [reason]},
     }

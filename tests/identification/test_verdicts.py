@@ -9,6 +9,7 @@ import pytest
 
 from catalogs.entries import load
 from studies.closing_benchmark.synthetic import RICH, TOLERANCES, make_synthetic_campaign
+from studies.closing_benchmark.truths import load_truths
 from tasks.campaign.campaign import CHANNELS, SESSION, Campaign
 from tasks.campaign.planned_runs import RunPlan, make_planned_run, plan_experiments
 from tasks.identification.decision import experiment
@@ -37,7 +38,7 @@ BUMPS = (
     RunPlan(speed=8.9, peak=0.8, duration=2.0, hazard=(9.0, 3.7, 0.05)),
 )  # fmt: skip
 """What the suspension does: five runs train, two are held out."""
-OUTSIDE = {truth.name: truth for truth in load("list of truths") if not truth.in_library}
+OUTSIDE = {truth.name: truth for truth in load_truths() if not truth.in_library}
 SEED = 31
 RULES = load("set of decision rules")
 

@@ -11,8 +11,8 @@ import pyarrow.parquet as pq
 import pytest
 import yaml
 
-from flows.judging.foreign import read_claim
-from flows.judging.foreign_sources import read_camera
+from studies.foreign_video.judge import read_claim
+from studies.foreign_video.sources import read_camera
 from studies.synthetic_street import (
     drive_clip,
     hump_drive,
@@ -25,8 +25,8 @@ from studies.video_sets.motion import JudgedSet, look_at_clip
 from studies.video_sets.motion_panels import list_set_panels
 from studies.video_sets.protocol import load_protocol
 from tasks.errors import InputError
-from tests.flows.judging.test_foreign import encode
-from tests.flows.judging.test_trajectories import tum_lines
+from tests.laboratory.foreign_video.test_foreign import encode
+from tests.laboratory.foreign_video.test_trajectories import tum_lines
 
 Drive = tuple[np.ndarray, np.ndarray, np.ndarray]
 STOPS = {"sunny": 7.0, "rain-50": 4.0, "snow-3": 2.0}
