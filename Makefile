@@ -84,10 +84,10 @@ study-drives: $(READY)
 
 # How memory and time grow with the clips; SCALE="100000 --folder /dev/shm" takes some 4 CPU-minutes.
 study-scale: $(READY)
-	$(BIN)/python -m benchmarks.scale $(SCALE)
+	$(BIN)/python -m studies.scale $(SCALE)
 
 study-production: $(READY)
-	$(BIN)/python -m benchmarks.production
+	$(BIN)/python -m studies.production
 
 study-mutants: $(READY)
 	$(BIN)/python -m studies.mutants

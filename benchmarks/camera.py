@@ -1,8 +1,6 @@
 """Rolling shutter and motion blur out of one render: what they cost, and how near they come to many renders."""
 
 import sys
-import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.side_by_side import least_cpu_s, make_row, print_rows
 from catalogs.entries import load
 from catalogs.scenes import load_scene
 from tasks.eval.image_quality import psnr
@@ -21,7 +20,7 @@ from tasks.render.readout import Field, read_out, sensor_field
 
 SPEED, PITCH_RATE, STATION = 16.0, 0.15, 8.0
 """The drive: along the route [m/s], nose down [rad/s], from a station on [m]."""
-RENDERS, ROW_STEP, REPEATS = 32, 8, 3
+RENDERS, ROW_STEP = 32, 8
 Light = NDArray[np.float32]
 
 
@@ -68,10 +67,8 @@ def measure_rows(scene_name: str = "street") -> list[dict[str, Any]]:
         seen = [draw(pose)[0][r] for r, pose in zip(chosen, poses(camera.row_times[1][chosen]), strict=True)]
         return chosen, np.stack(seen)
 
-    plain, clear_ms = draw(here)[0], _cpu_ms(lambda: draw(here))
-    found = [
-        {"name": "one shutter, no blur", "value": clear_ms, "unit": "CPU-ms", "peer": None, "ratio": None}
-    ]
+    plain, clear_ms = draw(here)[0], 1e3 * least_cpu_s(lambda: draw(here))
+    found = [make_row("one shutter, no blur", clear_ms, "CPU-ms")]
     blurred, rolling = replace(pinhole, line_delay_s=0.0), replace(pinhole, motion_blur=False)
     exact = mean_of(RENDERS)
     row_numbers, row_pictures = row_by_row(rolling, ROW_STEP)
@@ -83,13 +80,13 @@ def measure_rows(scene_name: str = "street") -> list[dict[str, Any]]:
     ):
         field = sensor_field(camera)
         picture = sensed(camera, field)
-        spent = _cpu_ms(lambda camera=camera, field=field: sensed(camera, field))  # type: ignore[misc]
-        found.append(_make_row(f"{name}: cost", spent, "CPU-ms", "one shutter, no blur", clear_ms))
+        spent = 1e3 * least_cpu_s(lambda camera=camera, field=field: sensed(camera, field))  # type: ignore[misc]
+        found.append(make_row(f"{name}: cost", spent, "CPU-ms", "one shutter, no blur", clear_ms))
         if camera is blurred:
             near, far = _compute_psnr(picture, exact), _compute_psnr(plain, exact)
-            found.append(_make_row("blur: to 32 renders", near, "dB", "blur left out", far))
+            found.append(make_row("blur: to 32 renders", near, "dB", "blur left out", far))
             found.append(
-                _make_row(
+                make_row(
                     "blur of two renders: to 32 renders",
                     _compute_psnr(mean_of(2), exact),
                     "dB",
@@ -102,7 +99,7 @@ def measure_rows(scene_name: str = "street") -> list[dict[str, Any]]:
                 _compute_psnr(picture[row_numbers], row_pictures),
                 _compute_psnr(plain[row_numbers], row_pictures),
             )
-            found.append(_make_row("rolling shutter: to a render a row", near, "dB", "one shutter", far))
+            found.append(make_row("rolling shutter: to a render a row", near, "dB", "one shutter", far))
     return found
 
 
@@ -110,23 +107,7 @@ def _compute_psnr(picture: Light, exact: Light) -> float:
     return psnr(encode_8bit(exact), encode_8bit(picture))
 
 
-def _make_row(name: str, value: float, unit: str, peer: str, held: float) -> dict[str, Any]:
-    return {"name": name, "value": value, "unit": unit, "peer": peer, "ratio": value / held}
-
-
-def _cpu_ms(call: Callable[[], object]) -> float:
-    """Median CPU time of a few calls after a first one that may compile [ms]."""
-    call()
-    spent = []
-    for _ in range(REPEATS):
-        started = time.process_time()
-        call()
-        spent.append(time.process_time() - started)
-    return 1e3 * float(np.median(spent))
-
-
 if __name__ == "__main__":
     for scene_name in sys.argv[1:] or ["street"]:
-        for row in measure_rows(scene_name):
-            ratio = "" if row["ratio"] is None else f"{row['ratio']:.2f} of {row['peer']}"
-            print(f"{Path(scene_name).name:8} {row['name']:36} {row['value']:8.1f} {row['unit']:7} {ratio}")
+        print(Path(scene_name).name)
+        print_rows(measure_rows(scene_name))

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from benchmarks.side_by_side import print_rows
+from benchmarks.side_by_side import make_row, print_rows
 from flows.cli import run_to_end
 from flows.making.generate import generate_dataset
 
@@ -50,13 +50,13 @@ def measure_rows(grid: str = "demo") -> list[dict[str, Any]]:
     work, cpu, memory = report.cost.wall_s / WORKERS, report.cost.cpu_s, report.cost.peak_memory_mib
     user, system = after[0] - before[0], after[1] - before[1]
     return [
-        _make_row("pipeline wall", wall, "s", f"sum of the clips' wall time over {WORKERS} workers", work),
-        _make_row("pipeline cpu", user + system, "CPU-s", "sum of the clips' processor time", cpu),
-        _make_row("pipeline cpu beside its clips", user + system - cpu, "CPU-s"),
-        _make_row("system time", system, "CPU-s", "all processor time", user + system),
-        _make_row("clip cpu", cpu / report.clips, "CPU-s/clip"),
-        _make_row("worker peak memory", memory, "MiB", "limit 1536", 1536),
-        _make_row("finished run called again", resume_wall, "s", "limit 3", 3),
+        make_row("pipeline wall", wall, "s", f"sum of the clips' wall time over {WORKERS} workers", work),
+        make_row("pipeline cpu", user + system, "CPU-s", "sum of the clips' processor time", cpu),
+        make_row("pipeline cpu beside its clips", user + system - cpu, "CPU-s"),
+        make_row("system time", system, "CPU-s", "all processor time", user + system),
+        make_row("clip cpu", cpu / report.clips, "CPU-s/clip"),
+        make_row("worker peak memory", memory, "MiB", "limit 1536", 1536),
+        make_row("finished run called again", resume_wall, "s", "limit 3", 3),
         *(_measure_clip(*size) for size in SIZES),
     ]
 
@@ -69,16 +69,9 @@ def _measure_clip(width: int, height: int, limit_cpu_s: float | None) -> dict[st
             grid.write_text(CLIP.format(width=width, height=height, frames=frames))
             report = generate_dataset(str(grid), str(Path(folder) / str(frames)), runner="threads", workers=1)
     peer = None if limit_cpu_s is None else f"limit {limit_cpu_s:g}"
-    return _make_row(
+    return make_row(
         f"dry clip, {FRAMES} frames, {width}x{height}", report.cost.cpu_s, "CPU-s", peer, limit_cpu_s
     )
-
-
-def _make_row(
-    name: str, value: float, unit: str, peer: str | None = None, held_against: float | None = None
-) -> dict[str, Any]:
-    ratio = None if held_against is None else value / held_against
-    return {"name": name, "value": value, "unit": unit, "peer": peer, "ratio": ratio}
 
 
 def _count_processor_time() -> tuple[float, float]:

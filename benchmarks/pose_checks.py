@@ -1,25 +1,24 @@
 """Every check of a clip of 81 frames, 480 x 320 px: pose error against known motion, and CPU time."""
 
-import time
 from collections.abc import Callable
-from statistics import median
-from typing import Any, TypeVar
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.synthetic_street import Clip, drive_clip
+from benchmarks.side_by_side import least_cpu_s, make_row, print_rows
+from studies.evaluation.metrics.flip import flip_error
+from studies.evaluation.metrics.no_reference import piqe, temporal_error
+from studies.evaluation.metrics.road_edit import score_road_edit
+from studies.evaluation.metrics.severity import measure_image, sampled_frames
+from studies.synthetic_street import Clip, drive_clip
 from tasks.conventions import SemanticClass
-from tasks.eval.flip import flip_error
 from tasks.eval.image_quality import ssim
-from tasks.eval.no_reference import piqe, temporal_error
 from tasks.eval.poses.essential import recover_motion_essential
 from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.poses.photometric import recover_motion_photometric
 from tasks.eval.poses.pnp import recover_motion_pnp
-from tasks.eval.road_edit import score_road_edit
-from tasks.eval.severity import measure_image, sampled_frames
 
 PITCH_LIMITS_DEG = {"pnp": 0.04, "photometric": 0.02, "essential": 0.06}
 """Pitch RMSE allowed in clear weather [deg]."""
@@ -35,8 +34,6 @@ SHADE = 40
 """How much darker the feature clip is there than its flat twin, 8-bit [1]."""
 AROUND = 18
 """How far about the feature its shade may reach [px]."""
-REPEATS = 3
-T = TypeVar("T")
 
 
 def measure_rows() -> list[dict[str, Any]]:
@@ -55,11 +52,11 @@ def measure_rows() -> list[dict[str, Any]]:
     }
     result, total = [], 0.0
     for name, check in checks.items():
-        seen, cpu_s = _measure_time(check)
+        seen, cpu_s = check(), least_cpu_s(check)
         total += cpu_s
         result += [
             *_error_rows(name, seen, clip),
-            _make_row(f"{name}: CPU time", cpu_s, "CPU-s", "limit, all checks", CPU_LIMIT_S),
+            make_row(f"{name}: CPU time", cpu_s, "CPU-s", "limit, all checks", CPU_LIMIT_S),
         ]
     others: dict[str, Callable[[], object]] = {
         "piqe": lambda: [piqe(picture) for picture in clip.frames[sampled_frames(len(clip.frames))]],
@@ -69,12 +66,12 @@ def measure_rows() -> list[dict[str, Any]]:
     totals = {}
     for kind, measures in {"a clip": others, "a feature clip": _feature_checks(clip)}.items():
         for name, measure in measures.items():
-            _, cpu_s = _measure_time(measure)
+            cpu_s = least_cpu_s(measure)
             total += cpu_s
-            result.append(_make_row(f"{name}: CPU time", cpu_s, "CPU-s", "limit, all checks", CPU_LIMIT_S))
+            result.append(make_row(f"{name}: CPU time", cpu_s, "CPU-s", "limit, all checks", CPU_LIMIT_S))
         totals[kind] = total
     return result + [
-        _make_row(f"all checks of {kind}: CPU time", cpu_s, "CPU-s", "limit", CPU_LIMIT_S)
+        make_row(f"all checks of {kind}: CPU time", cpu_s, "CPU-s", "limit", CPU_LIMIT_S)
         for kind, cpu_s in totals.items()
     ]
 
@@ -115,15 +112,15 @@ def _find_targets(clip: Clip) -> NDArray[np.bool_]:
 
 def _error_rows(name: str, seen: RecoveredMotion, clip: Clip) -> list[dict[str, Any]]:
     pitch_deg = _compute_rms(np.rad2deg(seen.pitch - clip.pitch))
-    result = [_make_row(f"{name}: pitch RMSE", pitch_deg, "deg", "limit", PITCH_LIMITS_DEG[name])]
+    result = [make_row(f"{name}: pitch RMSE", pitch_deg, "deg", "limit", PITCH_LIMITS_DEG[name])]
     if name in PROTOTYPE_PROGRESS_M:
         progress = _compute_rms(seen.progress - clip.station)
         result.append(
-            _make_row(f"{name}: progress RMSE", progress, "m", "prototype", PROTOTYPE_PROGRESS_M[name])
+            make_row(f"{name}: progress RMSE", progress, "m", "prototype", PROTOTYPE_PROGRESS_M[name])
         )
     normalised = _compute_rms(seen.normalised_path[:, 0] - clip.station / clip.station[-1])
     result.append(
-        _make_row(f"{name}: normalised progress RMSE", normalised, "1", "prototype", PROTOTYPE_NORMALISED)
+        make_row(f"{name}: normalised progress RMSE", normalised, "1", "prototype", PROTOTYPE_NORMALISED)
     )
     return result
 
@@ -132,21 +129,5 @@ def _compute_rms(error: np.ndarray) -> float:
     return float(np.sqrt(np.mean(error**2)))
 
 
-def _measure_time(check: Callable[[], T]) -> tuple[T, float]:
-    """A check's result and its median CPU time, after a run that compiles or loads what it needs [CPU-s]."""
-    seen = check()
-    times = []
-    for _ in range(REPEATS):
-        started = time.process_time()
-        check()
-        times.append(time.process_time() - started)
-    return seen, median(times)
-
-
-def _make_row(name: str, value: float, unit: str, peer: str, peer_value: float) -> dict[str, Any]:
-    return {"name": name, "value": value, "unit": unit, "peer": peer, "ratio": value / peer_value}
-
-
 if __name__ == "__main__":
-    for row in measure_rows():
-        print(f"{row['name']:44} {row['value']:10.5f} {row['unit']:8} {row['ratio']:.4f} of {row['peer']}")
+    print_rows(measure_rows())

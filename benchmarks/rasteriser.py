@@ -4,13 +4,12 @@ import resource
 import subprocess
 import sys
 import time
-from collections.abc import Callable
-from statistics import median
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.side_by_side import least_cpu_s, make_row, print_rows
 from tasks.conventions import SemanticClass
 from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view, splat_back
 from tasks.render.rasterise.reference_rasteriser import rasterise_reference
@@ -25,7 +24,6 @@ VIEWS = (
     (1_000_000, 1280, 720, None),
 )
 """Gaussians, width, height, and the CPU time per frame asked for [1, px, px, CPU-ms]."""
-FRAMES = 9
 CLIP_FRAMES, CLIP_END = 81, 85.0
 """Frames of a clip along the corridor, and where it ends [1, m]: every ninth of them is drawn."""
 NUMPY_LIMIT = 200_000
@@ -54,7 +52,7 @@ def measure_rows() -> list[dict[str, Any]]:
     command = (sys.executable, "-m", __spec__.name, "memory")
     memory = float(subprocess.run(command, capture_output=True, check=True).stdout)
     name = f"peak memory of a worker, {VIEWS[1][0] // 1000}k Gaussians"
-    result.append(_make_row(name, memory, "MiB", f"limit {MEMORY_LIMIT_MIB:g}", MEMORY_LIMIT_MIB))
+    result.append(make_row(name, memory, "MiB", f"limit {MEMORY_LIMIT_MIB:g}", MEMORY_LIMIT_MIB))
     return result
 
 
@@ -63,48 +61,31 @@ def _view_rows(count: int, width: int, height: int, limit_ms: float | None) -> l
     gaussians, (viewmat, K) = make_corridor(count), driver_view(STATION, width, height)
     prepared = prepare_gaussians(gaussians)
     label = f"{count // 1000}k Gaussians, {width}x{height}"
-    frame_ms = _cpu_ms(lambda: rasterise_view(prepared, viewmat, K, width, height))
+    frame_ms = 1e3 * least_cpu_s(lambda: rasterise_view(prepared, viewmat, K, width, height))
     drives = [driver_view(x, width, height)[0] for x in np.linspace(STATION, CLIP_END, CLIP_FRAMES)[::9]]
-    drawn_ms = _cpu_ms(
+    drawn_ms = 1e3 * least_cpu_s(
         lambda: [rasterise_view(prepared, view, K, width, height, normals=False) for view in drives],
         repeats=3,
     )
     clip_s = drawn_ms / 1000 * CLIP_FRAMES / len(drives)
-    clip = _make_row(f"clip of {CLIP_FRAMES} frames, {label}", clip_s, "CPU-s", None, None)
+    clip = make_row(f"clip of {CLIP_FRAMES} frames, {label}", clip_s, "CPU-s")
     if limit_ms is None:
-        return [_make_row(f"frame, {label}", frame_ms, "CPU-ms", None, None), clip]
+        return [make_row(f"frame, {label}", frame_ms, "CPU-ms"), clip]
     residual = np.ones((height, width, 3), dtype=np.float32)
-    back_ms = _cpu_ms(lambda: splat_back(prepared, viewmat, K, width, height, residual))
-    prepare_ms = _cpu_ms(lambda: prepare_gaussians(gaussians), repeats=3)
+    back_ms = 1e3 * least_cpu_s(lambda: splat_back(prepared, viewmat, K, width, height, residual))
+    prepare_ms = 1e3 * least_cpu_s(lambda: prepare_gaussians(gaussians), repeats=3)
     result = [
-        _make_row(f"frame, {label}", frame_ms, "CPU-ms", f"limit {limit_ms:g}", limit_ms),
-        _make_row(f"transpose, {label}", back_ms, "CPU-ms", "frame", frame_ms),
-        _make_row(f"preparation, {label}", prepare_ms, "CPU-ms", "frame", frame_ms),
+        make_row(f"frame, {label}", frame_ms, "CPU-ms", f"limit {limit_ms:g}", limit_ms),
+        make_row(f"transpose, {label}", back_ms, "CPU-ms", "frame", frame_ms),
+        make_row(f"preparation, {label}", prepare_ms, "CPU-ms", "frame", frame_ms),
         clip,
     ]
     if count <= NUMPY_LIMIT:
-        numpy_ms = _cpu_ms(lambda: rasterise_reference(gaussians, viewmat, K, width, height), repeats=1)
-        result.append(_make_row(f"frame, {label}", frame_ms, "CPU-ms", "NumPy twin", numpy_ms))
-    return result
-
-
-def _make_row(
-    name: str, value: float, unit: str, peer: str | None, peer_value: float | None
-) -> dict[str, Any]:
-    ratio = None if peer_value is None else value / peer_value
-    return {"name": name, "value": value, "unit": unit, "peer": peer, "ratio": ratio}
-
-
-def _cpu_ms(work: Callable[[], object], repeats: int = FRAMES) -> float:
-    """Median CPU time of one call, after one that compiles or loads what it needs [CPU-ms]."""
-    if repeats > 1:
-        work()
-    times = []
-    for _ in range(repeats):
         started = time.process_time()
-        work()
-        times.append(time.process_time() - started)
-    return 1000 * median(times)
+        rasterise_reference(gaussians, viewmat, K, width, height)
+        numpy_ms = 1e3 * (time.process_time() - started)
+        result.append(make_row(f"frame, {label}", frame_ms, "CPU-ms", "NumPy twin", numpy_ms))
+    return result
 
 
 def _peak_memory_mib() -> float:
@@ -121,9 +102,7 @@ if __name__ == "__main__":
     if sys.argv[1:] == ["memory"]:
         print(_peak_memory_mib())
     else:
-        for row in measure_rows():
-            ratio = "" if row["ratio"] is None else f"{row['ratio']:.4f} of {row['peer']}"
-            print(f"{row['name']:48} {row['value']:10.1f} {row['unit']:8} {ratio}")
+        print_rows(measure_rows())
 
 
 def make_corridor(count: int, sh_count: int = 16, seed: int = 0) -> Gaussians:

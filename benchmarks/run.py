@@ -7,8 +7,12 @@ from flows.store.outputs import Outputs
 from tasks.errors import InputError
 
 BENCHMARKS = (
-    "rasteriser", "vehicle", "weather", "camera", "pose_checks", "pipeline", "queries", "store", "loading", "rollouts",
-)  # fmt: skip
+    *(
+        f"benchmarks.{name}"
+        for name in ("rasteriser", "vehicle", "weather", "camera", "pose_checks", "pipeline")
+    ),
+    *(f"studies.peers.{name}" for name in ("queries", "store", "loading", "rollouts")),
+)
 
 
 def run_benchmarks(name: str | None = None, *, out: str | None = None) -> dict[str, Any]:
@@ -19,13 +23,11 @@ def run_benchmarks(name: str | None = None, *, out: str | None = None) -> dict[s
     InputError
         For an unknown name.
     """
-    if name is not None and name not in BENCHMARKS:
-        raise InputError(f"bench {name}: no such benchmark; there are: {', '.join(BENCHMARKS)}")
+    modules = {module.rpartition(".")[2]: module for module in BENCHMARKS}
+    if name is not None and name not in modules:
+        raise InputError(f"bench {name}: no such benchmark; there are: {', '.join(modules)}")
     results = Outputs(out, "lab bench", "bench.json")
-    rows = [
-        row
-        for chosen in ([name] if name else BENCHMARKS)
-        for row in import_module(f"benchmarks.{chosen}").measure_rows()
-    ]
+    chosen = [modules[name]] if name else modules.values()
+    rows = [row for module in chosen for row in import_module(module).measure_rows()]
     results.write_json("bench.json", {"rows": rows})
     return {"rows": rows}

@@ -3,22 +3,19 @@
 ``python -m benchmarks.vehicle``
 """
 
-import time
-from collections.abc import Callable
 from dataclasses import replace
 from math import ceil
-from statistics import median
 from typing import Any
 
 import numpy as np
 
-from benchmarks.side_by_side import make_row, print_rows
+from benchmarks.side_by_side import least_cpu_s, make_row, print_rows
 from catalogs.entries import load
 from catalogs.studies import Condition
+from studies.paper.stop_curves import sensitivity_study
 from studies.paper.vehicle_modes import simulate_condition
 from tasks.campaign.campaign import CHANNELS, Run
 from tasks.identification.inference.forward import prepare_run, simulate_run
-from tasks.studies.sensitivity import sensitivity_study
 from tasks.surface.road_profile import FLAT_ROAD
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle import reference
@@ -42,7 +39,6 @@ SPEED = 60 / 3.6
 INFERENCE_PRESSURE_MPA = 0.8
 LONGEST = 100_000
 TWIN_STEPS = 200
-REPEATS = 7
 
 
 def measure_rows() -> list[dict[str, Any]]:
@@ -59,7 +55,7 @@ def measure_rows() -> list[dict[str, Any]]:
         result += _rollout_rows(conditions[name])
     result.append(_inference_row(vehicle, surface))
     protocol, _ = load("sensitivity study")
-    study_s = _cpu_s(lambda: sensitivity_study(vehicle, surface, protocol), repeats=3)
+    study_s = least_cpu_s(lambda: sensitivity_study(vehicle, surface, protocol), repeats=3)
     limit = f"limit {STUDY_LIMIT_S:g} CPU-s"
     result.append(make_row("sensitivity study, 4,434 stops", study_s, "CPU-s", limit, STUDY_LIMIT_S))
     return result
@@ -79,7 +75,7 @@ def _stop_rows(vehicle: Vehicle) -> list[dict[str, Any]]:
                 for surface in surfaces:
                     simulate_stop(SPEED, INTERNAL_STEP_S, LONGEST, brake, wheels, tyres[surface])
 
-        return _cpu_s(work) / 20 / len(surfaces)
+        return least_cpu_s(work) / 20 / len(surfaces)
 
     asked = f"asked {STOPS_PER_CPU_S:g}"
     mean = 1 / stop_s(*FLAT_SURFACES, LONGEST_STOP)  # snow 2 and snow 3 are the same surface
@@ -111,14 +107,14 @@ def _twin_step_s(vehicle: Vehicle) -> float:
             steps=TWIN_STEPS, step=INTERNAL_STEP_S,
         )  # fmt: skip
 
-    return _cpu_s(run, repeats=3) / TWIN_STEPS
+    return least_cpu_s(run, repeats=3) / TWIN_STEPS
 
 
 def _rollout_rows(condition: Condition) -> list[dict[str, Any]]:
     """Logged 10 s rollouts of one condition in both modes."""
     vehicle, surface = load("vehicle", "paper-reference"), load("surface", "dense-asphalt")
     paper_ms, coupled_ms = (
-        1000 * _cpu_s(lambda mode=mode: simulate_condition(vehicle, surface, condition.scenario, mode))
+        1000 * least_cpu_s(lambda mode=mode: simulate_condition(vehicle, surface, condition.scenario, mode))
         for mode in ("paper", "coupled")
     )
     limit = f"limit {COUPLED_LIMIT_MS:g} CPU-ms"
@@ -145,18 +141,9 @@ def _inference_row(vehicle: Vehicle, surface: SurfaceParameters) -> dict[str, An
             simulate_run(model, theta)
 
     limit = f"limit {INFERENCE_LIMIT_MS:g} CPU-ms"
-    return make_row("6 s run for inference", 1000 * _cpu_s(work) / 20, "CPU-ms", limit, INFERENCE_LIMIT_MS)
-
-
-def _cpu_s(work: Callable[[], object], repeats: int = REPEATS) -> float:
-    """Median CPU time of one call, after one that compiles what it needs [CPU-s]."""
-    work()
-    times = []
-    for _ in range(repeats):
-        started = time.process_time()
-        work()
-        times.append(time.process_time() - started)
-    return median(times)
+    return make_row(
+        "6 s run for inference", 1000 * least_cpu_s(work) / 20, "CPU-ms", limit, INFERENCE_LIMIT_MS
+    )
 
 
 if __name__ == "__main__":

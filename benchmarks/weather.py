@@ -2,10 +2,12 @@
 
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from benchmarks.side_by_side import least_cpu_s, make_row, print_rows
 from catalogs.entries import load
 from catalogs.scenes import load_scene
 from catalogs.weather.look import load_weather
@@ -40,7 +42,6 @@ LIMIT = {"rain": 1.2, "snow": 0.6}
 
 SPEED = 16.0
 STATION = 40
-REPEATS = 9
 
 
 def measure_rows(scene_name: str = "street", camera_name: str = "dashcam-480x320") -> list[dict[str, Any]]:
@@ -69,8 +70,9 @@ def measure_rows(scene_name: str = "street", camera_name: str = "dashcam-480x320
             rasterise_view(clear_cloud, view, K, *size), clear_sky, scene.gaussians.display_encoded
         )
 
-    clear_ms = _cpu_ms(clear)
-    found = [{"name": "clear frame", "value": clear_ms, "unit": "CPU-ms", "peer": None, "ratio": None}]
+    clear_ms = 1e3 * least_cpu_s(clear)
+    beside_clear = ("CPU-ms", "clear frame", clear_ms)
+    found = [make_row("clear frame", clear_ms, "CPU-ms")]
     for name, state in STATES.items():
         started = time.process_time()
         gaussians, weather = weather_scene(
@@ -88,20 +90,19 @@ def measure_rows(scene_name: str = "street", camera_name: str = "dashcam-480x320
         cloud = prepare_gaussians(gaussians)
         gbuffer = rasterise_view(cloud, view, K, *size)
         picture = compose_over_sky(gbuffer, clear_sky, gaussians.display_encoded)
-        raster_ms = _cpu_ms(rasterise_view, cloud, view, K, *size)
-        bare_ms = _cpu_ms(rasterise_view, clear_cloud, view, K, *size)
+        draw = partial(rasterise_view, viewmat=view, K=K, width=size[0], height=size[1])
+        raster_ms = 1e3 * least_cpu_s(partial(draw, cloud))
+        bare_ms = 1e3 * least_cpu_s(partial(draw, clear_cloud))
         stages = _list_stages(weather, picture, clear_sky, gbuffer, shutter)
-        whole_ms = _cpu_ms(apply_weather, weather, picture, clear_sky, gbuffer, shutter)
+        whole_ms = 1e3 * least_cpu_s(partial(apply_weather, weather, picture, clear_sky, gbuffer, shutter))
         added = whole_ms + max(raster_ms - bare_ms, 0)
         for stage, call in stages.items():
-            found.append(_make_row(f"{name}: {stage}", _cpu_ms(call), clear_ms))
+            found.append(make_row(f"{name}: {stage}", 1e3 * least_cpu_s(call), *beside_clear))
         found.append(
-            _make_row(f"{name}: snow layer in the rasteriser", max(raster_ms - bare_ms, 0), clear_ms)
+            make_row(f"{name}: snow layer in the rasteriser", max(raster_ms - bare_ms, 0), *beside_clear)
         )
-        found.append(_make_row(f"{name}: added", added, clear_ms) | {"limit": LIMIT[state.kind]})
-        found.append(
-            {"name": f"{name}: once a clip", "value": once_s, "unit": "CPU-s", "peer": None, "ratio": None}
-        )
+        found.append(make_row(f"{name}: added", added, *beside_clear) | {"limit": LIMIT[state.kind]})
+        found.append(make_row(f"{name}: once a clip", once_s, "CPU-s"))
     return found
 
 
@@ -138,23 +139,5 @@ def _list_stages(
     return stages
 
 
-def _make_row(name: str, value: float, clear_ms: float) -> dict[str, Any]:
-    return {"name": name, "value": value, "unit": "CPU-ms", "peer": "clear frame", "ratio": value / clear_ms}
-
-
-def _cpu_ms(call: Callable[..., object], *arguments: object) -> float:
-    """Median CPU time of a few calls after a first one that may compile [ms]."""
-    call(*arguments)
-    spent = []
-    for _ in range(REPEATS):
-        started = time.process_time()
-        call(*arguments)
-        spent.append(time.process_time() - started)
-    return 1e3 * float(np.median(spent))
-
-
 if __name__ == "__main__":
-    for row in measure_rows():
-        ratio = "" if row["ratio"] is None else f"{row['ratio']:6.1%} of {row['peer']}"
-        limit = f" (limit {row['limit']:.0%})" if "limit" in row else ""
-        print(f"{row['name']:42} {row['value']:9.2f} {row['unit']:7} {ratio}{limit}")
+    print_rows(measure_rows())

@@ -14,6 +14,8 @@ from tasks.scene.road_users.track import Track
 
 ROAD_USERS = "road_users.yaml"
 """Name among a dataset's kept inputs, where its grid has road users."""
+EGO = "ego"
+"""What is ahead of the front axle and behind the rear one, and the width of the ego vehicle, beside the sizes [m]."""
 Kind = Literal["car", "van", "truck", "adult", "child", "bicycle"]
 LONGEST_M = 30.0
 """Greatest side of a body [m]: longer than any road train of Council Directive 96/53/EC."""
@@ -27,11 +29,18 @@ def _check_size(table: Table) -> Table:
     return table
 
 
+def _check_ego(table: Table) -> Table:
+    if len(table.value) != 2:
+        raise ValueError(f"must be overhang and width; it has {len(table.value)} values")
+    return table
+
+
+Ego = Annotated[Table, require_quantity("m", above=0.0), AfterValidator(_check_ego)]
 Size = Annotated[Table, require_quantity("m", above=0.0), AfterValidator(_check_size)]
 
 
 class RoadUserSizes(CatalogueEntry):
-    """Content of the file: the box of the body of each kind."""
+    """Content of the file: the box of the body of each kind, and what the ego vehicle takes."""
 
     car: Size
     van: Size
@@ -39,9 +48,10 @@ class RoadUserSizes(CatalogueEntry):
     adult: Size
     child: Size
     bicycle: Size
+    ego: Ego
 
     def build(self) -> dict[str, tuple[float, ...]]:
-        """Kind to length, width and height [m]."""
+        """Kind to length, width and height [m], and `EGO`."""
         return {kind: getattr(self, kind).value for kind in type(self).model_fields}
 
 

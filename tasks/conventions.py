@@ -25,6 +25,8 @@ class SemanticClass(IntEnum):
     OTHER = 10
 
 
+GRAVITY = 9.80665
+"""Standard acceleration of free fall (CGPM 1901) [m/s2]."""
 ROAD_CLASSES = (SemanticClass.ROAD, SemanticClass.MARKING)
 """Classes that hold the water film and the snow cover, and that follow the road profile."""
 ANY_HEADING = "any-heading"
@@ -131,6 +133,11 @@ CLIP_CHANNELS: tuple[Channel, ...] = (
     Channel(name="abs_time", unit="s", symbol="", description="time for which ABS holds back torque of either axle"),
     Channel(name="peak_slip", unit="1", symbol="", description="largest braking slip of either axle"),
     Channel(name="lateral_demand", unit="m s-2", symbol="", description="largest lateral acceleration that the route's bends ask, speed squared times curvature; the model brakes with all of the grip, surface friction times g, as on a straight road"),
+    Channel(name="collided", unit="", symbol="", description="the front of the car met a road user; null without road users, as the next four"),
+    Channel(name="impact_speed", unit="m s-1", symbol="", description="speed over that of the road user that was met first, along the route; 0 where none was met"),
+    Channel(name="min_ttc", unit="s", symbol="", description="smallest time to collision, gap over closing speed, with a road user in the path; 0 where one was met, null where no gap closed"),
+    Channel(name="clearance", unit="m", symbol="", description="smallest gap from the front to a road user in the path; 0 where one was met, null where none was in the path"),
+    Channel(name="avoided_speed", unit="m s-1", symbol="", description="impact speed of a car that keeps its speed, less impact_speed; null for tracks by world_m"),
     Channel(name="static_pitch", unit="rad", symbol="theta_0", description="pitch of the resting body, not contained in the pitch column"),
 )  # fmt: skip
 

@@ -15,7 +15,7 @@ from flows.making.catalogue import Catalogue
 from flows.making.driven import refuse_driven
 from flows.making.driving import collect_surface_depths, controls_of, hazard_of, surface_of, weather_of
 from flows.making.input_changes import refuse_changed_records
-from flows.making.places import find_scene
+from flows.making.locations import find_scene
 from flows.making.plan import ClipPlan, Plan, read_plan
 from flows.making.traced import refuse_traced
 from flows.reading.suggestions import suggest_clips

@@ -1,7 +1,7 @@
 """``musync drive``: a grid whose clips a policy brakes, as an ordinary dataset."""
 
 from dataclasses import fields, replace
-from typing import Any
+from typing import Any, Literal
 
 from catalogs.driven import DrivenClips, PolicyEntry, encode_driven
 from catalogs.entries import load
@@ -20,7 +20,13 @@ from tasks.errors import InputError
 
 
 def drive_grid(
-    grid: str, policy: str, out: str, *, rate_hz: float = 20.0, pictures: bool = True, **execution: Any
+    grid: str,
+    policy: str,
+    out: str,
+    *,
+    rate_hz: float = 20.0,
+    pictures: bool | Literal["later"] = True,
+    **execution: Any,
 ) -> dict[str, Any]:
     """Make the dataset of a grid whose clips a policy brakes.
 
@@ -93,7 +99,6 @@ def _drive_clips(
         raise InputError(entries.problems)
     driven: dict[str, list[float]] = {}
     outcomes: list[dict[str, Any]] = []
-    bumper = load("emergency braking").car
     with progress_bar("driven", len(grid.scenarios)) as advance:
         for label, scenario in grid.scenarios:
             simulator = Simulator(
@@ -106,7 +111,7 @@ def _drive_clips(
                     f"policy {policy.name}: clip {label}: must ask for the same pressures in the same drive; asked"
                     " again it asks for others: take chance and memory out, or make it a class"
                 )
-            found = simulator.judge(bumper.overhang_m.value, bumper.width_m.value)
+            found = simulator.judge()
             outcomes += [
                 {"scenario": label, "number": number, "kind": user.kind} | describe_outcome(outcome)
                 for number, (user, outcome) in enumerate(zip(scenario.objects, found, strict=True), start=1)

@@ -5,6 +5,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from catalogs.entries import load
+from catalogs.road_users import EGO
 from flows.driving.simulator import Observation, Simulator
 
 HIGHEST_MPA = 12.0
@@ -22,12 +24,11 @@ class BrakingEnvironment(gymnasium.Env):
     Parameters
     ----------
     simulator : that is stepped; with its own rate, targets and frames
-    overhang : of the car before its front axle [m]
-    width : of the car [m]
     """
 
-    def __init__(self, simulator: Simulator, *, overhang: float = 0.8, width: float = 1.8) -> None:
-        self._simulator, self._overhang, self._width = simulator, overhang, width
+    def __init__(self, simulator: Simulator) -> None:
+        self._simulator = simulator
+        self._overhang, self._width = load("road user sizes")[EGO]
         self.action_space = gymnasium.spaces.Box(0.0, 1.0, (1,), np.float64)
         spaces = {
             "state": gymnasium.spaces.Box(-np.inf, np.inf, (4,), np.float64),

@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from catalogs.entries import load
+from catalogs.road_users import EGO
 from catalogs.scenario import Scenario, find_scenario_problems
 from catalogs.sentences import describe_rules, shorten_value
 from flows.driving.view import StepCamera
 from flows.making.driving import hazard_of, surface_of
 from flows.making.grid_inputs import grade_of
-from tasks.driving.outcome import Outcome, judge_approach
+from tasks.driving.outcome import TICK_S, Outcome, find_unbraked_impact, judge_approach
 from tasks.driving.stepped import DriveSettings, SteppedDrive
 from tasks.driving.targets import Target, TargetTrack, follow_track
 from tasks.errors import InputError
@@ -148,21 +149,21 @@ class Simulator:
         """Return a column of the model at every millisecond so far [its unit]."""
         return self._drive.read_column(name)
 
-    def judge(self, overhang: float, width: float) -> list[Outcome]:
-        """Return what became of the approach to each target so far.
-
-        Parameters
-        ----------
-        overhang : of the front bumper before the front axle [m]
-        width : of the car [m]
-        """
+    def judge(self) -> list[Outcome]:
+        """Return what became of the approach to each target so far."""
         station, speed, pressure = (
             self.read_column(name) for name in ("station", "speed", "brake_pressure_mpa")
         )
+        overhang, width = load("road user sizes")[EGO]
+        time = TICK_S * np.arange(len(station), dtype=np.float64)
+        bumper = float(station[0]) + overhang
         return [
-            judge_approach(station, speed, pressure, track, overhang=overhang, width=width)
+            judge_approach(
+                station, speed, pressure, track.locate(time), overhang=overhang, width=width,
+                unbraked_impact=find_unbraked_impact(float(speed[0]), bumper, track, width),
+            )
             for track in self._targets
-        ]
+        ]  # fmt: skip
 
     def _observe(self) -> Observation:
         drive = self._drive

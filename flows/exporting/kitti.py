@@ -53,8 +53,8 @@ def write_kitti(dataset: ExportedDataset, folder: Path) -> None:
     require_one_camera(dataset, "kitti")
     raw = folder / "raw" / DATE
     poses = folder / "odometry" / "poses"
-    for place in (raw, poses):
-        place.mkdir(parents=True)
+    for subfolder in (raw, poses):
+        subfolder.mkdir(parents=True)
     for name, content in _describe_raw_calibration(dataset.camera).items():
         (raw / name).write_text(content)
     shown = 0

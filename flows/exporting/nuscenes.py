@@ -91,8 +91,8 @@ def write_nuscenes(dataset: ExportedDataset, folder: Path) -> None:
             f"{dataset.layout}: --to nuscenes takes {MOST_SCENES} clips at most: name some with --clip"
         )
     tables = folder / VERSION
-    for place in (tables, folder / "samples" / CHANNEL, folder / "can_bus", folder / "maps"):
-        place.mkdir(parents=True)
+    for subfolder in (tables, folder / "samples" / CHANNEL, folder / "can_bus", folder / "maps"):
+        subfolder.mkdir(parents=True)
     (folder / "maps" / "none.png").write_bytes(encode_png(np.full((1, 1, 3), 255, np.uint8)))
     for name, rows in _describe_fixed(dataset).items():
         write_json(tables / f"{name}.json", rows)
@@ -132,7 +132,7 @@ def describe_can_bus(clip: ExportedClip, vehicle: Vehicle, start_us: int) -> dic
     ticks = clip.ticks
     poses = compute_ego_poses(clip, vehicle)
     motion = compute_inertial_motion(clip, vehicle, _rig_from_ego(vehicle)[:3, 3])
-    turns, places = compute_quaternions(poses, scalar_first=True).tolist(), poses[:, :3, 3].tolist()
+    turns, positions = compute_quaternions(poses, scalar_first=True).tolist(), poses[:, :3, 3].tolist()
     at = (start_us + clip.frames["t_ns"] // 1000).tolist()
     speeds, forces, rates = (
         motion.attitude.inv().apply(vectors).tolist()
@@ -140,7 +140,7 @@ def describe_can_bus(clip: ExportedClip, vehicle: Vehicle, start_us: int) -> dic
     )
     return {
         "pose": [
-            {"accel": forces[k], "orientation": turns[k], "pos": places[k], "rotation_rate": rates[k],
+            {"accel": forces[k], "orientation": turns[k], "pos": positions[k], "rotation_rate": rates[k],
              "utime": at[k], "vel": speeds[k]}
             for k in range(len(at))
         ],
@@ -221,7 +221,7 @@ def _write_scene(
 
 def _write_annotations(clip: ExportedClip, rows_of: dict[str, JsonArray]) -> None:
     frames = list_objects_by_frame(clip)
-    for place, first in enumerate(frames[0]):
+    for index, first in enumerate(frames[0]):
         number = first["object"]
         token = make_token("instance", clip.clip_id, number)
         boxes = [make_token("sample_annotation", clip.clip_id, number, frame) for frame in range(len(frames))]
@@ -230,7 +230,7 @@ def _write_annotations(clip: ExportedClip, rows_of: dict[str, JsonArray]) -> Non
              "nbr_annotations": len(boxes), "first_annotation_token": boxes[0], "last_annotation_token": boxes[-1]}
         )  # fmt: skip
         for frame, rows in enumerate(frames):
-            row = rows[place]
+            row = rows[index]
             length, width, height = row["size"]
             rows_of["sample_annotation"].append(
                 {"token": boxes[frame], "sample_token": make_token("sample", clip.clip_id, frame),

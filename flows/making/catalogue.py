@@ -17,7 +17,7 @@ from catalogs.vehicles import VehicleFile, open_vehicle
 from catalogs.weather.grip import WeatherFolder
 from catalogs.weather.look import load_weather
 from catalogs.wet_friction import WET_FRICTION
-from flows.making.places import find_scene
+from flows.making.locations import find_scene
 from flows.making.plan import read_plan
 from flows.making.traced import Reference
 from flows.store.layout import Layout

@@ -25,9 +25,10 @@ from flows.making.driving import (
     surface_of,
 )
 from flows.making.gate import judge_motion, nothing_to_judge
+from flows.making.locations import note_location
 from flows.making.pictures import frame_rows, gather_motion, render_frames, rig_of
-from flows.making.places import remember_place
 from flows.making.plan import ClipPlan, Plan, read_plan
+from flows.making.road_users import judge_road_users
 from flows.making.traced import replay_drive, unknown_ranges
 from flows.running.processors import measure_peak_memory
 from flows.store.address import find_local, send_files
@@ -40,8 +41,7 @@ from tasks.errors import InputError
 from tasks.render.camera import Camera, measure_mount
 from tasks.render.object_truth import measure_objects
 from tasks.surface.state import SurfaceState
-from tasks.vehicle.peaks import compute_peaks
-from tasks.vehicle.rollout import Rollout, compute_lift_times
+from tasks.vehicle.rollout import Rollout, compute_lift_times, compute_peaks
 
 Columns = Mapping[str, NDArray[Any]]
 
@@ -87,13 +87,31 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
     cost.end_step("surface")
     ride, ranges = roll_out(work)
     cost.end_step("rollout")
-    frames, buffers = draw_frames(work, surface, ride)
+    frames = frame_rows(ride, work.plan, work.catalogue)
+    buffers = draw_frames(work, surface, ride, frames) if work.plan.settings.stores_frames else {}
     cost.end_step("frames")
     checked, verdict = check_motion(work, surface, frames, buffers)
     cost.end_step("check")
     receipt = commit_clip(layout, work, surface, ride, ranges, frames | checked, buffers, verdict)
     cost.end_step("commit")
     return receipt | {"cost": cost.as_json()}
+
+
+def draw_window(layout: Layout, index: int, scene: str, shown: range) -> tuple[dict[str, NDArray[Any]], str]:
+    """Return some frames of a clip, which are written nowhere, and the hash of the telemetry that they show.
+
+    Parameters
+    ----------
+    layout, index, scene : as of `make_clip`
+    shown : the frames; with labels the whole clip is made for them
+    """
+    work = open_work(layout, index, scene)
+    surface, ride = map_surface(work), _move_car(work)
+    frames, whole = frame_rows(ride, work.plan, work.catalogue), work.plan.settings.labels
+    buffers = draw_frames(work, surface, ride, frames, None if whole else shown)
+    if whole:
+        buffers = {name: values[shown.start : shown.stop] for name, values in buffers.items()}
+    return buffers, content_hash("ticks", ride.columns)
 
 
 def warm_up(layout: Layout, scene: str) -> None:
@@ -111,8 +129,10 @@ def warm_up(layout: Layout, scene: str) -> None:
     for clip in {clip.scenario.weather: clip for clip in reversed(shown)}.values():
         work = replace(first, clip=clip, plan=short)
         surface = map_surface(work)
-        frames, buffers = draw_frames(work, surface, _move_car(work))
-        check_motion(work, surface, frames, buffers)
+        ride = _move_car(work)
+        frames = frame_rows(ride, short, work.catalogue)
+        if short.settings.stores_frames:
+            check_motion(work, surface, frames, draw_frames(work, surface, ride, frames))
 
 
 def open_work(layout: Layout, index: int, scene: str) -> ClipWork:
@@ -126,7 +146,7 @@ def open_work(layout: Layout, index: int, scene: str) -> ClipWork:
     cv2.setNumThreads(1)  # one thread a clip: more within a frame cost more than they give
     plan = read_plan(layout.root)
     clip = plan.clips[index]
-    remember_place(plan.record_of(clip.scenario.scene)["sha256"], scene)
+    note_location(plan.record_of(clip.scenario.scene)["sha256"], scene)
     return ClipWork(clip=clip, plan=plan, catalogue=catalogue_of(layout.root, clip.scenario.scene))
 
 
@@ -166,27 +186,25 @@ def _move_car(work: ClipWork) -> Rollout:
 
 
 def draw_frames(
-    work: ClipWork, surface: SurfaceState, ride: Rollout
-) -> tuple[dict[str, NDArray[Any]], dict[str, NDArray[Any]]]:
-    """Step 3: the rows of the frames' table, and the finished frames with depth and class; no frames where none are
-    asked for.
-    """
-    frames = frame_rows(ride, work.plan, work.catalogue)
-    if not work.plan.settings.pictures:
-        return frames, {}
+    work: ClipWork, surface: SurfaceState, ride: Rollout, frames: Columns, shown: range | None = None
+) -> dict[str, NDArray[Any]]:
+    """Step 3: the finished frames with depth and class; ``shown`` is that of `tasks.render.clip.RigMotion`."""
     rig_at = rig_of(ride, frames, work.catalogue)
     seed = int(work.clip.seed)
-    return frames, render_frames(work.clip.scenario, surface, frames, work.plan, work.catalogue, seed, rig_at)
+    return render_frames(work.clip.scenario, surface, frames, work.plan, work.catalogue, seed, rig_at, shown)
 
 
 def check_motion(
     work: ClipWork, surface: SurfaceState, frames: Columns, buffers: Columns
 ) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
     """Step 4: the motion that the frames show, as columns of their table, and the verdict of the gate on it."""
+    later = work.plan.settings.pictures == "later"
     found = (
         judge_motion(buffers, frames, surface.film_depth_mm, work.catalogue, work.camera)
         if buffers
-        else nothing_to_judge(len(frames["frame"]))
+        else nothing_to_judge(
+            len(frames["frame"]), "frames are made later" if later else "no frames were made"
+        )
     )
     verdict = found.pop("verdict")
     return found, verdict
@@ -237,6 +255,7 @@ def commit_clip(
             "lateral_demand": peak_lateral_demand(ride, work.catalogue.scene.route),
             **(measure_mount(work.camera) if work.camera.varies else {}),
             "static_pitch": ride.static_pitch,
+            **_judge_approach(work, surface, ride),
             "calibration_extrapolated": ride.calibration_extrapolated,
         } | ranges),
         "verdict": _json_numbers(verdict),
@@ -258,6 +277,16 @@ def _observe_objects(
         work.clip.scenario, surface, frames, work.plan, work.catalogue, work.camera, rig_at
     )
     return measure_objects(buffers, work.camera, motion)
+
+
+def _judge_approach(work: ClipWork, surface: SurfaceState, ride: Rollout) -> dict[str, float | bool]:
+    """Return the outcome columns of a clip of a dataset with road users."""
+    if not work.plan.settings.has_objects:
+        return {}
+    catalogue = work.catalogue
+    return judge_road_users(
+        work.clip.scenario, catalogue.road_user_sizes, catalogue.scene.route, surface.friction, ride.columns
+    )
 
 
 def collect_motion_figures(columns: Columns) -> dict[str, float]:

@@ -69,11 +69,17 @@ def prepare_for_checks(
     )
 
 
-def nothing_to_judge(frames: int) -> dict[str, Any]:
-    """Return the result of `judge_motion` where there is no picture: every value is not represented."""
+def nothing_to_judge(frames: int, reason: str) -> dict[str, Any]:
+    """Return the result of `judge_motion` where there is no picture: every value is not represented.
+
+    Parameters
+    ----------
+    frames : of the clip [1]
+    reason : why there is none
+    """
     verdict = {figure.name: None for figure in fields(PoseVerdict)}
     return {
         "recovered_pitch": np.full(frames, np.nan),
         "recovered_progress": np.full(frames, np.nan),
-        "verdict": verdict | {"reasons": ["no frames were made"]},
+        "verdict": verdict | {"reasons": [reason]},
     }

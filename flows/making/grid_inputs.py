@@ -15,8 +15,8 @@ from catalogs.studies.ablation import cut_coupling
 from flows.making.bends import find_bend_problems
 from flows.making.driving import hazard_of, surface_of
 from flows.making.grid_entries import GridEntries, read_entries, recorded_reference
+from flows.making.locations import note_location
 from flows.making.memory import find_memory_problems
-from flows.making.places import remember_place
 from flows.making.road_users import find_road_user_problems
 from flows.making.traced import read_trace_inputs
 from tasks.errors import InputError
@@ -114,7 +114,7 @@ def _identify_scene(name_or_folder: str) -> dict[str, Any]:
         "name": recorded_reference(name_or_folder),
         "sha256": scene_identity(name_or_folder),
     }
-    remember_place(scene["sha256"], name_or_folder)
+    note_location(scene["sha256"], name_or_folder)
     street = parse_street_name(name_or_folder)
     return scene if street is None else scene | {"kind": street.kind, "seed": street.seed}
 

@@ -64,8 +64,9 @@ def render_frames(
     catalogue: Catalogue,
     seed: int,
     rig_at: RigAt,
+    shown: range | None = None,
 ) -> dict[str, NDArray[Any]]:
-    """Render the clip's finished frames, depth and class."""
+    """Render the clip's finished frames, depth and class; ``shown`` is that of `RigMotion`."""
     T_world_rig = frames["T_world_rig"].reshape(-1, 4, 4)
     scene, camera = catalogue.scene, catalogue.camera_of(seed)
     if (street := catalogue.street) is not None:
@@ -87,7 +88,7 @@ def render_frames(
     buffers = render_clip(
         replace(scene, gaussians=gaussians),
         camera,
-        gather_motion(scenario, state, frames, plan, catalogue, camera, rig_at),
+        replace(gather_motion(scenario, state, frames, plan, catalogue, camera, rig_at), shown=shown),
         ClipConditions(
             state=state,
             pavement=catalogue.surface,

@@ -2,28 +2,32 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from math import isfinite, nan
 
 import numpy as np
 from numpy.typing import NDArray
 
 from catalogs.grids import Grid
-from catalogs.road_users import ROAD_USERS
+from catalogs.road_users import EGO, ROAD_USERS
 from catalogs.scenario import Scenario, find_scenario_problems
 from catalogs.scenes import load_scene
 from flows.making.driving import hazard_of, surface_of
 from flows.making.grid_entries import GridEntries
+from tasks.driving.outcome import TICK_S, find_unbraked_impact, join_outcomes, judge_approach
+from tasks.driving.targets import follow_track, locate_body
 from tasks.errors import InputError
 from tasks.scene.road_users.ground import find_meeting, find_obstacle, measure_ground
 from tasks.scene.road_users.motion import Motion, move_on_track
+from tasks.scene.route import Route
 from tasks.scene.scene import Scene
 from tasks.surface.road_profile import road_elevation
 
 Sizes = Mapping[str, tuple[float, ...]]
 
+OUTCOMES = ("collided", "impact_speed", "min_ttc", "clearance", "avoided_speed")
+"""Columns of clips that say what became of the approach to road users."""
 CHECK_STEP_S = 0.05
 """Time between the poses that are held against the street [s]."""
-EGO_OVERHANG_M, EGO_WIDTH_M = 0.9, 1.8
-"""Of the ego vehicle before its front axle and behind its rear one, and its width, to be free at its start [m]."""
 
 
 def move_road_users(
@@ -64,6 +68,40 @@ def move_road_users(
     return motions
 
 
+def judge_road_users(
+    scenario: Scenario, sizes: Sizes, route: Route, friction: float, ticks: Mapping[str, NDArray[np.float64]]
+) -> dict[str, float | bool]:
+    """Return what became of a clip's approach to its road users, by the columns of clips; NaN without any.
+
+    Parameters
+    ----------
+    scenario, sizes, friction : as of `move_road_users`
+    route : of the scene
+    ticks : station [m], speed [m/s] and brake_pressure_mpa [MPa] of the car at every millisecond, [N] each
+    """
+    if not scenario.objects:
+        return dict.fromkeys(OUTCOMES, nan)
+    overhang, width = sizes[EGO]
+    station, speed, pressure = (ticks[name] for name in ("station", "speed", "brake_pressure_mpa"))
+    time = TICK_S * np.arange(len(station), dtype=np.float64)
+    found = []
+    for user in scenario.objects:
+        track = user.build_track(size := user.choose_size(sizes))
+        unbraked = nan
+        if not track.in_world:
+            straight = follow_track(track, size, friction)
+            unbraked = find_unbraked_impact(float(speed[0]), float(station[0]) + overhang, straight, width)
+        path = locate_body(move_on_track(track, route, time, friction), size, route, time)
+        found.append(
+            judge_approach(
+                station, speed, pressure, path, overhang=overhang, width=width, unbraked_impact=unbraked
+            )
+        )
+    joined = join_outcomes(found)
+    figures = {name: getattr(joined, name) for name in OUTCOMES}
+    return {name: value if isfinite(value) else nan for name, value in figures.items()}
+
+
 def find_road_user_problems(grid: Grid, entries: GridEntries) -> list[str]:
     """Return a sentence for each road user that leaves the route, drives into something, or stands where another does.
 
@@ -94,10 +132,10 @@ def _find_problems(scenario: Scenario, grid: Grid, entries: GridEntries) -> list
     problems = []
     for name, motion, size in zip(names, motions, boxes, strict=True):
         if (met := find_obstacle(motion.T_world_body, size, scene.gaussians)) is not None:
-            place, kind = met
-            station, lateral, _ = scene.route.project(motion.T_world_body[place, None, :3, 3])
+            moment, kind = met
+            station, lateral, _ = scene.route.project(motion.T_world_body[moment, None, :3, 3])
             problems.append(
-                f"{name} must keep clear of the street; at {time[place]:g} s, station {station[0]:.1f} m and"
+                f"{name} must keep clear of the street; at {time[moment]:g} s, station {station[0]:.1f} m and"
                 f" {lateral[0]:.1f} m to the left, it is in something of class {kind.name.lower()}: move its track"
             )
         ego, ego_size = _place_ego(scene, entries)
@@ -116,7 +154,8 @@ def _find_problems(scenario: Scenario, grid: Grid, entries: GridEntries) -> list
 
 def _place_ego(scene: Scene, entries: GridEntries) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the pose [1, 4, 4] of the ego vehicle's middle at its start, and its size [3] [m]."""
+    overhang, width = entries.values[ROAD_USERS][EGO]
     wheelbase = entries.vehicle.cg_to_front_axle + entries.vehicle.cg_to_rear_axle
     pose = scene.route.pose(np.zeros(1))
     pose[:, :3, 3] -= pose[:, :3, 0] * wheelbase / 2
-    return pose, np.array((wheelbase + 2 * EGO_OVERHANG_M, EGO_WIDTH_M, 1.5))
+    return pose, np.array((wheelbase + 2 * overhang, width, 1.5))

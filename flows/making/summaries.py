@@ -102,9 +102,9 @@ class Outcomes(Sequence[Mapping[str, Any]]):
     def __len__(self) -> int:
         return len(self.clips)
 
-    def __getitem__(self, place: Any) -> Any:
-        clip = self.clips[place]
-        figures = {name: values[place] for name, values in self.figures.items()}
+    def __getitem__(self, index: Any) -> Any:
+        clip = self.clips[index]
+        figures = {name: values[index] for name, values in self.figures.items()}
         return {
             "clip_id": clip.clip_id,
             "label": clip.label,

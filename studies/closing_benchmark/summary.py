@@ -2,15 +2,74 @@
 
 import json
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
+from scipy.special import betaincinv
 
-from tasks.identification.benchmark import compute_exact_interval
+from tasks.identification.decision.answer import Verdict
 
 Rows = list[dict[str, Any]]
 KINDS = {"null", "library", "outside", "size", "pair", "poor", "poor null"}
+
+
+def classify_outcome(verdict: Verdict, truth: str | None, form: tuple[str, str] | None = None) -> str:
+    """Return how a verdict compares with the truth: right, wrong, a set with or without the truth, a form, or refused.
+
+    Parameters
+    ----------
+    verdict : verdict of `judge_runs`
+    truth : name of the effect in the data; None where there is none
+    form : port and variable of a truth outside the library
+    """
+    names = [effect.name for effect in verdict.effects]
+    if truth is None:
+        return "right" if not names else "false discovery"
+    if not names:
+        return "refused"
+    if form is not None and verdict.verdict in ("UNKNOWN_FORM", "SET"):
+        right = form in {(e.port, e.variable) for e in verdict.effects if e.effect_class == "form"}
+        if verdict.verdict == "UNKNOWN_FORM":
+            return "right form" if right else "wrong form"
+        return "set with truth" if right else "set without truth"
+    if verdict.verdict == "UNKNOWN_FORM":
+        return "form"
+    if verdict.verdict == "SET":
+        contained = truth in {*names, *(rival.name for _, rival in verdict.rivals)}
+        return "set with truth" if contained else "set without truth"
+    return "right" if names == [truth] else "wrong"
+
+
+def measure_interval_miss(verdict: Verdict, truth: str, values: Mapping[str, float]) -> float | None:
+    """Return how far the truth is from the first parameter's value, in halves of its 95 % interval on that side [1].
+
+    The interval holds the truth up to 1. None unless the truth alone is named.
+
+    Parameters
+    ----------
+    verdict : verdict of `judge_runs`
+    truth : name of the effect in the data
+    values : its parameters by name [units of the table]
+    """
+    if [effect.name for effect in verdict.effects] != [truth]:
+        return None
+    first = verdict.effects[0].parameters[0]
+    off = values[first.name] - first.value
+    half = first.ci_high - first.value if off > 0.0 else first.value - first.ci_low
+    return float(abs(off) / max(half, np.finfo(np.float64).tiny))
+
+
+def compute_exact_interval(hits: int, trials: int) -> tuple[float, float]:
+    """Return the Clopper-Pearson interval of 95 % of a share (Clopper and Pearson 1934, doi:10.1093/biomet/26.4.404).
+
+    Parameters
+    ----------
+    hits, trials : number of successes and of trials [1]
+    """
+    low = float(betaincinv(hits, trials - hits + 1, 0.025)) if hits else 0.0
+    high = float(betaincinv(hits + 1, trials - hits, 0.975)) if hits < trials else 1.0
+    return low, high
 
 
 def pair_outcome(

@@ -13,8 +13,8 @@ from typing import Any
 import yaml
 
 import musync
-from benchmarks.scale.copies import grid_of
 from flows.auditing.verify import verify_dataset
+from studies.scale.copies import grid_of
 from tasks.errors import InputError
 
 PROCESSES = 2
@@ -45,7 +45,7 @@ def read_while_written(place: Path, clips: int, readers: int) -> dict[str, Any]:
     made = 100 * -(-clips // 100)
     found: Counter[str] = Counter()
     writer = subprocess.Popen(
-        [sys.executable, "-m", "benchmarks.scale.make", str(grid), str(folder)], stdout=subprocess.DEVNULL
+        [sys.executable, "-m", "studies.scale.make", str(grid), str(folder)], stdout=subprocess.DEVNULL
     )
     try:
         with ProcessPoolExecutor(PROCESSES, get_context("spawn")) as pool:

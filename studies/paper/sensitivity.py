@@ -9,7 +9,7 @@ from flows.pages.figures import Figure, Line, Panel, Style
 from flows.pages.static import as_svg
 from flows.pages.writer import Section, Table, write_page
 from flows.store.outputs import Outputs
-from tasks.studies.sensitivity import beside_print, sensitivity_study
+from studies.paper.stop_curves import beside_print, sensitivity_study
 
 STYLES = {"rain": Style("a"), "snow": Style("d")}
 RATE = {"rain": "rain [mm/h]", "snow": "snow, water equivalent [mm/h]"}
@@ -50,7 +50,7 @@ def draw_sensitivity(
 
     Parameters
     ----------
-    curves : of `tasks.studies.sensitivity.sensitivity_study`, by kind of weather
+    curves : of `studies.paper.stop_curves.sensitivity_study`, by kind of weather
     printed : its figures beside the published ones
     """
     marks = [mark for mark in map(_place_print, printed) if mark is not None]

@@ -34,24 +34,6 @@ class RunPlan:
     hazard: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
-RICH: tuple[RunPlan, ...] = (
-    RunPlan(speed=32.0, peak=0.0, duration=8.0), RunPlan(speed=16.7, peak=0.0, duration=8.0),
-    RunPlan(speed=25.0, peak=2.0, disc_rise=350.0), RunPlan(speed=27.8, peak=1.5, disc_rise=150.0),
-    RunPlan(speed=26.4, peak=-2.4), RunPlan(speed=16.7, peak=2.3), RunPlan(speed=11.1, peak=3.5, duration=4.0),
-    RunPlan(weather="rain", rate=10.0, speed=22.2, peak=2.3), RunPlan(weather="rain", rate=25.0, speed=12.5, peak=3.0),
-    RunPlan(weather="snow", rate=3.0, speed=13.9, peak=2.3), RunPlan(weather="snow", rate=1.0, speed=9.7, peak=0.6),
-    RunPlan(speed=11.1, peak=0.0, duration=4.0, hazard=(12.0, 3.7, 0.075)),
-    RunPlan(speed=9.7, peak=0.0, duration=4.0, hazard=(10.0, 2.0, -0.08)),
-    RunPlan(speed=7.8, peak=0.5, duration=4.0, hazard=(10.0, 3.7, 0.06)),
-    RunPlan(speed=25.0, peak=0.0, duration=8.0), RunPlan(speed=22.2, peak=2.6, disc_rise=250.0),
-    RunPlan(speed=33.3, peak=2.0, disc_rise=80.0), RunPlan(speed=13.9, peak=1.6, duration=5.0),
-    RunPlan(weather="rain", rate=10.0, speed=16.7, peak=2.6), RunPlan(weather="snow", rate=1.0, speed=12.5, peak=2.0),
-    RunPlan(speed=8.9, peak=0.8, duration=4.0, hazard=(9.0, 3.7, 0.05)),
-    RunPlan(speed=9.7, peak=0.0, duration=4.0, hazard=(12.0, 2.5, 0.06)),
-)  # fmt: skip
-"""An experiment design that excites every port, 14 training runs first."""
-TRAINING = 14
-
 GENTLE, SNOW_STOP, HARD, ABS_STOP = 1.4, 4.8, 5.7, 6.2
 """Decelerations that the brakes of planned runs would give if no tyre reached its limit [m/s2]."""
 

@@ -8,7 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.errors import InputError
+from tasks.scene.road_users.motion import Motion
 from tasks.scene.road_users.track import Track, drive_track, limit_acceleration
+from tasks.scene.route import Route
+
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,6 +34,22 @@ class Target:
     lateral: float = 0.0
     lateral_speed: float = 0.0
     width: float = 1.8
+
+
+@dataclass(frozen=True, kw_only=True)
+class TargetPath:
+    """Where a target is at some times, as `Target` has it.
+
+    Parameters
+    ----------
+    station, speed, lateral : float64 [N] [m, m/s, m]
+    width : across the route, or float64 [N] [m]
+    """
+
+    station: Floats
+    speed: Floats
+    lateral: Floats
+    width: Floats | float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,9 +105,7 @@ class TargetTrack:
         change = self.final_speed - self.speed
         return self.change_at + (change / self.acceleration if self.acceleration * change > 0 else 0.0)
 
-    def trace(
-        self, time: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def trace(self, time: Floats) -> tuple[Floats, Floats, Floats]:
         """Return way along the heading [m], speed along it [m/s] and its rate [m/s2] at times, any shape each.
 
         Parameters
@@ -100,11 +118,20 @@ class TargetTrack:
         )  # fmt: skip
         return drive_track(track, time, friction=inf)
 
+    def locate(self, time: Floats) -> TargetPath:
+        """Return the path of the target at times since the start, float64 [N] [s]."""
+        way, speed, _ = self.trace(time)
+        ahead, aside = cos(self.heading), sin(self.heading)
+        return TargetPath(
+            station=self.station + ahead * way, speed=ahead * speed, lateral=self.lateral + aside * way,
+            width=self.width,
+        )  # fmt: skip
+
     def find(self, time: float) -> Target:
         """Return the target at a time since the start [s]."""
         return next(self.follow(np.array([time])))
 
-    def follow(self, time: NDArray[np.float64]) -> Iterator[Target]:
+    def follow(self, time: Floats) -> Iterator[Target]:
         """Yield the target at times since the start, float64 [N] [s]."""
         ahead, aside = cos(self.heading), sin(self.heading)
         for way, speed, rate in zip(*(column.tolist() for column in self.trace(time)), strict=True):
@@ -139,3 +166,22 @@ def follow_track(track: Track, size: tuple[float, ...], friction: float) -> Targ
         speed=track.speed, change_at=track.change_at, acceleration=limit_acceleration(track.acceleration, friction),
         final_speed=track.final_speed, width=aside * length + ahead * width,
     )  # fmt: skip
+
+
+def locate_body(motion: Motion, size: tuple[float, ...], route: Route, time: Floats) -> TargetPath:
+    """Return the path of a road user's body along a route, bends included: that of the end that the car meets.
+
+    Parameters
+    ----------
+    motion : of the middle of its footprint
+    size : length, width and height of its body [m]
+    route : of the car
+    time : of the motion, float64 [N], at least two [s]
+    """
+    corners = 0.5 * np.array([(a * size[0], b * size[1], 0.0) for a in (-1, 1) for b in (-1, 1)])
+    places = motion.T_world_body[:, None, :3, 3] + corners @ motion.T_world_body[:, :3, :3].swapaxes(1, 2)
+    station, lateral, _ = (one.reshape(-1, 4) for one in route.project(places.reshape(-1, 3)))
+    nearest, right, left = station.min(axis=1), lateral.min(axis=1), lateral.max(axis=1)
+    return TargetPath(
+        station=nearest, speed=np.gradient(nearest, time), lateral=0.5 * (left + right), width=left - right
+    )

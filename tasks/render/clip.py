@@ -37,6 +37,8 @@ class RigMotion:
     rig_at : rig poses about each frame; a camera that `moves` during a frame needs them
     bodies : road users; during a frame they stand still, as in its middle
     first_frame : number of the first frame, from which particles and noise count [1]
+    shown : places of the frames that are rendered, with the bytes that they have among all; with labels, which follow
+        from two frames, None. None renders all
     """
 
     T_world_rig: NDArray[np.float64]
@@ -44,6 +46,7 @@ class RigMotion:
     rig_at: RigAt | None = None
     bodies: Sequence[MovingBody] = ()
     first_frame: int = 0
+    shown: range | None = None
 
 
 def render_clip(
@@ -57,7 +60,7 @@ def render_clip(
     labels: bool = False,
     composition: Literal["linear", "paper"] = "linear",
 ) -> dict[str, NDArray[np.generic]]:
-    """Render every frame of a clip.
+    """Render the frames of a clip.
 
     Parameters
     ----------
@@ -98,7 +101,9 @@ def render_clip(
     moving = BodiesInClip(motion.bodies, scene, weathered, weather, backend, T_world_camera)
     velocity = np.gradient(T_world_camera[:, :3, 3], 1 / motion.frame_rate_hz, axis=0)
     clip: dict[str, NDArray[Any]] = {}
-    for frame, pose in enumerate(T_world_camera):
+    chosen = range(len(T_world_camera)) if motion.shown is None else motion.shown
+    for place, frame in enumerate(chosen):
+        pose = T_world_camera[frame]
         view = world_to_camera(pose)
         gbuffer = backend.rasterise_view(
             prepared, view, field.K, field.width, field.height,
@@ -144,9 +149,9 @@ def render_clip(
                 seen.normal, seen.class_id, seen.points, seen.changes, scene.route, elevation
             )
         for name, values in buffers.items():
-            if not frame:
-                clip[name] = np.empty((len(T_world_camera), *values.shape), values.dtype)
-            clip[name][frame] = values
+            if not place:
+                clip[name] = np.empty((len(chosen), *values.shape), values.dtype)
+            clip[name][place] = values
     if labels:
         clip["flow"], occluded = _label_flow(clip, motion.bodies, camera, field, T_world_camera, T_world_rows)
         clip["marks"] |= occluded

@@ -1,4 +1,4 @@
-"""From controls to telemetry: one rollout, logged at 1 kHz in the columns of the tick table."""
+"""From controls to telemetry: one rollout, logged at 1 kHz in the columns of the tick table, and its largest values."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,14 +16,13 @@ from tasks.vehicle.brake import BrakeCommand
 from tasks.vehicle.history import History
 from tasks.vehicle.model.brake_input import make_command_input
 from tasks.vehicle.model.chassis import Conditions
-from tasks.vehicle.model.simulation import COLUMNS, Recording, Simulation, simulate
+from tasks.vehicle.model.simulation import COLUMNS, INTERNAL_STEP_S, Recording, Simulation, simulate
 from tasks.vehicle.paper.low_speed import SteadyStop
 from tasks.vehicle.paper.paper_mode import StepGrid, run_paper_mode, sample_history
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle, compute_surface_response
 
 Mode = Literal["paper", "coupled"]
 MODES: tuple[Mode, ...] = ("paper", "coupled")
-INTERNAL_STEP_S = 0.0005
 TICK_NS = 1_000_000
 
 
@@ -226,3 +225,25 @@ def _check_arguments(
     if problems:
         raise InputError(problems)
     return per_tick
+
+
+def compute_peaks(columns: Mapping[str, NDArray[Any]]) -> dict[str, float]:
+    """Return ``peak_deceleration``, ``peak_pitch_rate``, ``abs_time`` and ``peak_slip`` of a clip.
+
+    Each is NaN where a column that it follows from has no number at some tick: what is not known there may be larger.
+
+    Parameters
+    ----------
+    columns : of the ticks, in the units of `tasks.conventions.TICK_CHANNELS`
+    """
+    acceleration, pitch_rate = columns["longitudinal_acceleration"], columns["pitch_rate"]
+    slip = np.maximum(columns["braking_slip_f"], columns["braking_slip_r"])
+    scale = np.minimum(columns["abs_scale_f"], columns["abs_scale_r"])
+    acts = np.where(np.isnan(scale), np.nan, scale < 1)
+    return {
+        # 0 has no sign: a car that never slows down has the same figure in every file
+        "peak_deceleration": 0.0 + float(np.maximum(0.0, np.max(-acceleration))),
+        "peak_pitch_rate": float(np.max(np.abs(pitch_rate))),
+        "abs_time": float(np.sum(acts)) * TICK_NS / 1e9,
+        "peak_slip": float(np.max(slip)),
+    }

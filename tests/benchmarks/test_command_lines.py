@@ -4,9 +4,10 @@ import sys
 
 import pytest
 
-from benchmarks import pipeline, queries
+from benchmarks import pipeline
 from flows.cli import run_to_end
 from studies import severity
+from studies.peers import queries
 
 
 @pytest.mark.parametrize(
@@ -22,6 +23,6 @@ def test_a_wrong_word_is_one_sentence(monkeypatch, capsys, benchmark, word, sent
     monkeypatch.setattr(sys, "argv", ["benchmark", word])
     with pytest.raises(SystemExit) as end:
         run_to_end(benchmark.run_benchmark)
-    told = capsys.readouterr().err
+    message = capsys.readouterr().err
     assert end.value.code == 2
-    assert sentence in told and "Traceback" not in told
+    assert sentence in message and "Traceback" not in message

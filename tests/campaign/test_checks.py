@@ -10,7 +10,7 @@ from catalogs.campaign_checks import MEASURES, CheckTableEntry
 from catalogs.entries import find_entry
 from catalogs.quantities import read_entry
 from tasks.campaign.channels import CHANNELS_BY_NAME
-from tasks.campaign.checks import Check, Figure, apply_checks, list_names
+from tasks.campaign.checks import Check, Figure, apply_checks
 from tasks.campaign.measured import BRAKES, Clock
 
 ENTRY = read_entry(CheckTableEntry, find_entry("table of checks"), "table of checks")
@@ -66,7 +66,3 @@ def test_a_check_that_another_one_tells_better_is_silent_on_its_channel() -> Non
     better, worse = check_numbers(figure(3.0, "a", "r")), [figure(4.0, "a", "r"), figure(4.0, "b", "r")]
     told = apply_checks([better, check_numbers(*worse, name="two", unless=("one",))], Clock(time=None))  # type: ignore[arg-type]
     assert [(one.check.name, one.channel) for one in told] == [("one", "a"), ("two", "b")]
-
-
-def test_a_sentence_names_no_more_places_than_one_reads() -> None:
-    assert list_names([f"r{n}" for n in range(9)]) == "r0, r1, r2, r3, r4, r5 and 3 more"

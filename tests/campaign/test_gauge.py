@@ -7,8 +7,8 @@ from scipy.signal import lfilter
 
 from catalogs.entries import load
 from studies.closing_benchmark.harder import load_harder
+from studies.closing_benchmark.synthetic import make_synthetic_campaign
 from tasks.campaign.gauge import denoise_pressure, estimate_gauge_noise
-from tasks.identification.benchmark import make_synthetic_campaign
 from tasks.identification.decision.verdict import judge_runs
 
 TIME = np.arange(600) * 0.01

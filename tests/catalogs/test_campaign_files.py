@@ -42,21 +42,14 @@ def folder(tmp_path: Path) -> Path:
     ("change", "words"),
     [
         (lambda h: h.update(split=3), "campaign.yaml: split: must be a table"),
-        (lambda h: h.update(split={"train": "run-01"}), "campaign.yaml: split.held_out is missing"),
         (lambda h: h["split"].update(train=[["run-01"]]), "split.train.0: must be a valid string"),
-        (lambda h: h.update(tolerances_1sigma=None), "campaign.yaml: tolerances_1sigma: must be a table"),
-        (lambda h: h["tolerances_1sigma"].update(run=[1]), "tolerances_1sigma.run: must be a table"),
         (lambda h: h["tolerances_1sigma"].update(mass=float("nan")), "tolerances_1sigma.mass: must be a finite number"),
-        (lambda h: h["tolerances_1sigma"].update(mass=True), "mass: must be a valid number; it is True"),
         (lambda h: h["tolerances_1sigma"].update(mass=0), "tolerances_1sigma.mass: must be greater than 0"),
         (lambda h: h.pop("tolerances_1sigma"), "campaign.yaml: tolerances_1sigma is missing"),
         (lambda h: [h["tolerances_1sigma"].pop("mass"), h["tolerances_1sigma"]["run"].pop("friction")],
          "campaign.yaml: tolerances_1sigma: mass, run.friction must be given: one sigma of each number"),
         (lambda h: h.update(sample_rate_hz=float("inf")), "sample_rate_hz: must be"),
-        (lambda h: h.update(sample_rate_hz=True), "sample_rate_hz: must be a valid number"),
-        (lambda h: h.update(sample_rate_hz=1e300), "sample_rate_hz: must be less than or equal to 1000000"),
         (lambda h: h.update(vehicle=7), "vehicle: must be a valid string; it is 7"),
-        (lambda h: h.pop("campaign"), "campaign is missing"),
     ],
 )  # fmt: skip
 def test_a_faulty_header_is_named_by_its_key_beside_faulty_runs(folder: Path, change, words: str) -> None:  # type: ignore[no-untyped-def]
@@ -71,20 +64,13 @@ def test_a_faulty_header_is_named_by_its_key_beside_faulty_runs(folder: Path, ch
     ("old", "new", "words"),
     [
         ("run-02", "run-0é".encode("latin-1"), "runs.csv must be UTF-8 text; line 3 is not"),
-        ("run-02", b"run\x0002", "a run's name must be printable characters"),
         ("run-02", b"x" * 200_000, "runs.csv must be CSV; field larger than field limit"),
-        ("run-02", b"x" * 5000, "a run's name must have 1 to 100 characters; it has 5000"),
         ("run-02", b"run-01", "run-01: stands twice in runs.csv"),
         ("run-02", b"../run-02", "a run's name must be no path"),
-        ("run-02", b"/etc/passwd", "a run's name must be no path"),
-        ("run-02", b"..", "a run's name must be no path"),
-        ("run-02", b"", "a run's name must have 1 to 100 characters; it has 0"),
         ("run-02,", b"run-02,dry,", "run 2: must have as many fields as there are columns"),
-        ("run-02,dry,", b"run-02,", "run 2: must have as many fields as there are columns"),
         ("weather", b"run", "must have distinct columns; 'run' stands there twice"),
         ("run-02,dry,0.0", b"run-02,dry,nan", "run-02: precipitation_mm_h must be a finite number; it is 'nan'"),
         ("run-02,dry,0.0,0.0,1,", b"run-02,dry,0.0,0.0,0,", "run-02: direction must be 1 or -1; it is 0"),
-        ("run-02", b'"run-02', "runs.csv must be CSV"),
     ],
 )  # fmt: skip
 def test_a_faulty_line_of_runs_is_named(folder: Path, old: str, new: bytes, words: str) -> None:

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from catalogs import documents
-from catalogs.documents import parse_json, parse_yaml, parse_yaml_value, read_json_document, read_yaml
+from catalogs.documents import parse_json, parse_yaml, parse_yaml_value, read_content, read_json_document
 from catalogs.yaml_text import DEEPEST, LARGEST_INTEGER
 from tasks.errors import InputError
 
@@ -39,37 +39,24 @@ def test_what_ships_is_read_as_yamls_own_loader_reads_it(path):
     ("content", "words"),
     [
         (b"a: \xff", "be UTF-8 text; line 1 is not"),
-        ("a: 1".encode("utf-16"), "be UTF-8 text"),
         (b"a: [", "be valid YAML; line 2: while parsing a flow node"),
-        (b"a: \x00", "be valid YAML"),
         (b"a: 1\n---\nb: 1", "single document"),
         (b"", "be a table of keys and values; it is None"),
         (b"[1, 2]", "be a table of keys and values; it is [1, 2]"),
         (b"a: 1\na: 2", "have distinct keys in a table; 'a' stands there twice (line 2)"),
         (b"1: a", "have text as keys; one is 1: put it in quotes (line 1)"),
-        (b"null: a", "have text as keys; one is null"),
         (b"on: a", "have text as keys; one is on"),
         (b"? [1]\n: a", "have text as keys; one is a table or list"),
-        (b"? {b: 1}\n: a", "have text as keys; one is a table or list"),
         (b"a: !!python/object/apply:os.system [ls]", "hold plain values; one has the tag"),
-        (b"a: !!set {b, c}", "hold plain values; one has the tag"),
-        (b"a: !!timestamp 2024-13-45", "hold plain values; one has the tag"),
         (b"a: !!bool maybe", "have values that keep to their tag; 'maybe' is no bool"),
         (b"a: 0x_", "'0x_' is no int"),
-        (b"a: !!int ''", "'' is no int"),
         (b"a: .nan", "have finite numbers; one is .nan (line 1)"),
-        (b"a: -.inf", "have finite numbers"),
-        (b"a: 1.0e+999", "have finite numbers"),
         (b"a: 9007199254740993", "have integers of at most 2^53"),
         (b"a: " + b"1" * 5000, "have numbers of at most 400 characters; one has 5000"),
-        (b"a: " + b"1:" * 200_000 + b"1", "have numbers of at most 400 characters"),
         (b"a: &a [*a]", "not hold itself; line 1"),
-        (b"a: &a {b: *a}", "not hold itself"),
         (b"a: *b", "undefined alias"),
         (nested_aliases(9), "with its aliases written out"),
         (b"[" * 100_000, f"have at most {DEEPEST} tables and lists inside each other"),
-        (b"{a: " * 100_000, f"have at most {DEEPEST} tables"),
-        (b"- " * 100_000, f"have at most {DEEPEST} tables"),
         (b"? " * 100_000, f"have at most {DEEPEST} tables"),
         (b"[" + b"1," * 600_000 + b"1]", "have at most 500000 keys and values"),
         (b"#" * (documents.LARGEST_YAML + 1), "have at most 8388608 bytes; it has 8388609"),
@@ -101,13 +88,6 @@ def test_other_numbers_are_what_they_look_like(text, value):
 def test_all_faults_of_yaml_are_told_at_once_with_their_lines():
     problems = problems_of(parse_yaml, b"a: 1\na: 2\nb: {c: 1, c: 2, 3: 4}\nd: .inf\ne: !!omap []\n")
     assert [problem.rpartition(" (line ")[2] for problem in problems] == ["2)", "3)", "3)", "4)", "5)"]
-
-
-def test_many_faults_are_counted_not_listed():
-    with pytest.raises(InputError) as caught:
-        parse_yaml("\n".join(f"{number}: a" for number in range(100)).encode(), "here", "note")
-    assert len(caught.value.problems) == 21
-    assert caught.value.problems[-1] == "... and 80 more problems"
 
 
 def test_anchors_and_merges_in_their_usual_use_and_dates_as_text_are_fine():
@@ -184,7 +164,6 @@ def test_a_loggers_nanoseconds_pass_where_they_become_floats():
     assert LARGEST_INTEGER < 17 * 10**17
 
 
-@pytest.mark.parametrize("read", [read_yaml, read_json_document])
 @pytest.mark.parametrize(
     ("name", "words"),
     [
@@ -197,18 +176,17 @@ def test_a_loggers_nanoseconds_pass_where_they_become_floats():
         ("looped", "must be readable"),
     ],
 )
-def test_a_file_that_cannot_be_read_is_one_short_sentence(tmp_path, read, name, words):
+def test_a_file_that_cannot_be_read_is_one_short_sentence(tmp_path, name, words):
     (tmp_path / "folder").mkdir()
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "looped").symlink_to(tmp_path / "looped")
     with pytest.raises(InputError, match=words) as caught:
-        read(tmp_path / name, "note")
+        read_json_document(tmp_path / name, "note")
     (problem,) = caught.value.problems
     assert len(problem) < 400
 
 
-def test_a_file_is_not_read_further_than_it_may_be_long(tmp_path, monkeypatch):
-    monkeypatch.setattr(documents, "LARGEST_YAML", 10)
+def test_a_file_is_not_read_further_than_it_may_be_long(tmp_path):
     (tmp_path / "large.yaml").write_text("a: 12345678")
     with pytest.raises(InputError, match="at most 10 bytes; it has 11"):
-        read_yaml(tmp_path / "large.yaml", "note")
+        read_content(tmp_path / "large.yaml", "note", 10)

@@ -25,16 +25,10 @@ def problems_of(tmp_path: Path, body: str) -> list[str]:
     ("body", "starts"),
     [
         ("{name: t, axes: {null: {a: {}}}}", ["a grid must have text as keys; one is null"]),
-        ("{name: t, axes: {1: 2}, colour: red}", ["a grid must have text as keys; one is 1"]),
-        ("{name: t, axes: null}", ["axes: must be a table of keys and values; it is None"]),
-        ("{name: t, axes: {w: null}}", ["axes.w: must be a table of keys and values"]),
         ("{name: t, axes: {w: {a: null}}}", ["axes.w.a: must be a table of keys and values"]),
         ("{name: t, axes: {w: {a: [1]}, v: {}}}", ["axes.w.a: must be", "axes.v: "]),
-        ("{name: t, base: 3, axes: {w: {a: {}}}}", ["base: must be"]),
         ("{name: t, zip: {w: 3}, scenarios: {a: 4}}", ["zip.w: must be", "scenarios.a: must be"]),
         ("{name: t, scenarios: {a: {}}, exclude: [{tint: 3}]}", ["exclude.0: tint: no such field"]),
-        ("{name: t, scenarios: {a: {}}, splits: {a: 3}}", ["splits.a: must be"]),
-        ("{name: 3, scenarios: {a: {}}}", ["name: must be a valid string; it is 3"]),
         ("{scenarios: {a: {}}}", ["name is missing"]),
         ("{name: t}", ["a grid needs one of axes, zip, scenarios and latin_hypercube"]),
         (
@@ -56,20 +50,15 @@ def problems_of(tmp_path: Path, body: str) -> list[str]:
                 "scenario b: hold_s must not be negative",
             ],
         ),
-        ("{name: t, scenarios: {a: {weather: hail, precipitation_mm_h: 5}}}", ["scenarios.a.weather: must be"]),
-        ("{name: t, scenarios: {a: {weather: rain, precipitation_mm_h: x}}}", ["scenarios.a.precipitation_mm_h"]),
         (
             "{name: t, zip: {a: {x: {}, y: {weather: hail}}, b: {z: {}}}}",
             ["zip.a.y.weather: must be", "zip: its axes must have as many levels each; a has 2, b has 1"],
         ),
-        ("{name: t, seed: true, scenarios: {a: {}}}", ["seed: must be a number; it is True"]),
         ("{name: t, scenarios: {a: {ramp_s: true}}}", ["scenarios.a.ramp_s: must be a number; it is True"]),
-        ("{name: t, frames: 2147483648, scenarios: {a: {}}}", ["frames: must be less than or equal to 600000"]),
         (
             "{name: t, frames: 81, frame_rate_hz: 1.0e-300, scenarios: {a: {}}}",
             ["frame_rate_hz: (frames - 1) / frame_rate_hz must be at most 600 s"],
         ),
-        ("{name: t, frames: 100000, scenarios: {a: {}}}", ["frame_rate_hz: (frames - 1) / frame_rate_hz must"]),
         (
             "{name: t, base: {peak_pressure_mpa: 23}, scenarios: {a: {peak_pressure_mpa: 0}}}",
             ["scenario base: peak_pressure_mpa must be at most 20 MPa"],

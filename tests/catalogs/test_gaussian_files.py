@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import gaussforge
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -36,17 +35,6 @@ def test_the_normal_is_the_shortest_axis(tmp_path):
     axes = Rotation.from_quat(cloud.quats_wxyz, scalar_first=True).as_matrix()
     shortest = axes[np.arange(50), :, cloud.scales.argmin(axis=1)]
     np.testing.assert_allclose(cloud.normals, shortest, atol=1e-5)
-
-
-@pytest.mark.parametrize("ending", ["ply", "splat", "spz"])
-def test_a_truncated_file_is_refused_with_its_name(tmp_path, ending):
-    write_inria(tmp_path / "a.ply")
-    whole = (tmp_path / "a.ply").read_bytes()
-    if ending != "ply":
-        whole = gaussforge.GaussForge().convert(whole, "ply", ending)["data"]
-    (tmp_path / f"cut.{ending}").write_bytes(whole[: len(whole) - 37])
-    with pytest.raises(InputError, match=f"cut.{ending}"):
-        read_gaussians(tmp_path / f"cut.{ending}")
 
 
 def test_a_ply_with_nan_is_refused_with_the_gaussian(tmp_path):

@@ -104,18 +104,6 @@ def test_a_rule_broken_by_many_scenarios_is_told_once(tmp_path):
     )
 
 
-@pytest.mark.parametrize("body", ["[1, 2]", "name: [", "3", ""])
-def test_a_file_that_is_no_mapping_is_refused_with_one_sentence(tmp_path, body):
-    with pytest.raises(InputError) as caught:
-        load("grid", grid_file(tmp_path, body))
-    assert len(caught.value.problems) == 1
-
-
-def test_an_unknown_grid_lists_those_that_exist():
-    with pytest.raises(InputError, match="demo"):
-        load("grid", "nowhere")
-
-
 @pytest.mark.parametrize(
     ("fields", "rule"),
     [
@@ -137,13 +125,6 @@ def test_an_unknown_grid_lists_those_that_exist():
 def test_each_rule_of_a_scenario_is_enforced(fields, rule):
     problems = find_scenario_problems(Scenario(**fields))
     assert any(rule in problem for problem in problems), problems
-
-
-def test_a_sound_scenario_has_no_problems():
-    assert (
-        find_scenario_problems(Scenario(weather="snow", precipitation_mm_h=1.0, snow_accumulation_h=1.0))
-        == []
-    )
 
 
 @pytest.mark.parametrize(

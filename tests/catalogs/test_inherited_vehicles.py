@@ -120,12 +120,6 @@ def test_a_line_of_files_has_an_end(write):
     )
 
 
-def test_a_problem_of_the_other_vehicle_wants_notice_its_file(write):
-    base = write("base.yaml", "extends: paper-reference\nwheel_radius: {value: -1, unit: m, source: tape}")
-    problem = refusal(write("car.yaml", "extends: base.yaml"))
-    assert problem.startswith(f"{base}: wheel_radius")
-
-
 @pytest.mark.parametrize("name", entry_names("vehicle"))
 def test_a_vehicle_that_extends_none_is_kept_as_its_file_is(name):
     assert open_vehicle(name).content == find_entry("vehicle", name).read_bytes()
@@ -182,12 +176,6 @@ def test_a_frozen_vehicle_that_was_changed_lends_nothing(write):
     frozen = find_entry("vehicle", "multibody-grown").read_text()
     write("base.yaml", frozen.replace("sprung_mass: {value: 12", "sprung_mass: {value: 13"))
     assert "a frozen vehicle must be as it was frozen" in refusal(write("car.yaml", "extends: base.yaml"))
-
-
-def test_a_frozen_vehicle_extends_none(write):
-    body = "extends: paper-reference\nprovenance:\n  mode: paper\n"
-    path = write("car.yaml", f"{body}  sha256: {hashlib.sha256(body.encode()).hexdigest()}\n")
-    assert "a frozen vehicle must be whole; it has provenance and extends" in refusal(path)
 
 
 def test_the_tyre_lies_beside_the_file_that_names_it(write, tmp_path):

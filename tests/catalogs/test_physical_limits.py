@@ -4,17 +4,12 @@ from dataclasses import replace
 
 import pytest
 
-from catalogs.entries import find_entry, load
+from catalogs.entries import load
 from catalogs.scenario import Scenario, find_scenario_problems
 from studies.paper.ablation import load_ablation
 
 BRAKING = Scenario(peak_pressure_mpa=2.3, brake_onset_s=1.0)
 SNOW = Scenario(weather="snow", precipitation_mm_h=1.0, snow_accumulation_h=1.0)
-
-
-def test_every_limit_says_why():
-    for name, limit in load("table of physical limits"):
-        assert len(limit.source) > 20, name
 
 
 def test_the_heaviest_rain_is_that_of_one_minute_in_an_hour():
@@ -65,9 +60,3 @@ def test_what_lies_beyond_a_limit_is_refused_with_the_limits_reason(scenario, wo
 def test_a_number_that_is_not_finite_is_refused(value):
     problems = find_scenario_problems(replace(SNOW, precipitation_mm_h=value))
     assert f"precipitation_mm_h must be a finite number; it is {value}" in problems
-
-
-def test_the_catalogue_is_a_table_of_value_unit_and_source():
-    assert find_entry("table of physical limits").read_text().count("source:") == len(
-        type(load("table of physical limits")).model_fields
-    )

@@ -6,22 +6,7 @@ import pytest
 
 from catalogs.entries import load
 from catalogs.references import ReferenceCase
-from catalogs.scenario import find_scenario_problems
 from catalogs.studies.agreement import find_printed_name, put_beside_print
-
-
-def test_there_are_nineteen_development_and_twelve_held_out_conditions():
-    splits = [condition.split for condition in load("list of conditions")]
-    assert (splits.count("development"), splits.count("held-out")) == (19, 12)
-    assert len({condition.name for condition in load("list of conditions")}) == 31
-
-
-def test_every_condition_is_a_sound_scenario():
-    assert not [
-        problem
-        for condition in load("list of conditions")
-        for problem in find_scenario_problems(condition.scenario)
-    ]
 
 
 def test_held_out_conditions_change_one_control_each():

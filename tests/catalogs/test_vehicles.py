@@ -43,11 +43,6 @@ def test_a_vehicle_file_elsewhere_loads_like_the_shipped_one(tmp_path, entry):
     assert load("vehicle", saved(tmp_path, entry)).sprung_mass == 1300
 
 
-def test_an_unknown_name_lists_what_exists():
-    with pytest.raises(InputError, match=r"tractor: no such vehicle.*paper-reference"):
-        load("vehicle", "tractor")
-
-
 def test_all_problems_of_a_file_are_listed_at_once(tmp_path, entry):
     entry["sprung_mass"]["value"] = -1200
     entry["cg_height"]["unit"] = "mm"

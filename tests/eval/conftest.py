@@ -2,7 +2,7 @@
 
 import pytest
 
-from benchmarks.synthetic_street import Clip, drive_clip
+from studies.synthetic_street import Clip, drive_clip
 
 SMALL = {"width": 240, "height": 160, "focal": 200.0}
 

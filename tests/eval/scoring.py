@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from benchmarks.synthetic_street import Clip
+from studies.synthetic_street import Clip
 from tasks.eval.poses.motion import RecoveredMotion
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import tasks.eval.poses.photometric as photometric
-from benchmarks.synthetic_street import Clip
+from studies.synthetic_street import Clip
 from tasks.conventions import SemanticClass
 from tasks.eval.poses.air import LEAST_SKY, Air, fit_extinction, measure_sky_light, take_air_away
 from tasks.eval.poses.motion import RecoveredMotion

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from benchmarks.synthetic_street import Clip
 from catalogs.entries import load
 from studies.negative_controls.false_rigs import FALSE_RIGS, show_rig
+from studies.synthetic_street import Clip
 from tasks.errors import InputError
 from tasks.eval.body_agreement import BodyClaim, compare_body, pose_body
 from tasks.eval.motion_agreement import PoseVerdict, judge_pose

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from benchmarks.synthetic_street import camera_matrix, make_mount
+from studies.synthetic_street import camera_matrix, make_mount
 from tasks.eval.poses.corners import (
     corner_strength,
     even_contrast,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.synthetic_street import Clip
+from studies.synthetic_street import Clip
 from tasks.errors import InputError
 from tasks.eval.image_quality import psnr, ssim
 

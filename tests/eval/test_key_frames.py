@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.synthetic_street import Clip, rig_poses
+from studies.synthetic_street import Clip, rig_poses
 from tasks.eval.poses.essential import EssentialSettings
 from tasks.eval.poses.key_frames import KeyFrame, keep_sharper_depth, make_key_frame
 from tasks.eval.poses.point_pairs import Tracker, correct_turn

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from benchmarks.synthetic_street import hump_drive, make_mount, rig_poses
+from studies.synthetic_street import hump_drive, make_mount, rig_poses
 from tasks.eval.poses.motion import MAX_GAP, FrameStep, Placement, failed_step, integrate_motion, place_frames
 from tasks.eval.poses.rigid import invert_pose
 

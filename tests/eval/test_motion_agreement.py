@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from benchmarks.synthetic_street import Clip
+from studies.synthetic_street import Clip
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
 from tasks.eval.motion_agreement import PoseThresholds, PoseVerdict, judge_pose

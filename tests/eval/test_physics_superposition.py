@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flows.judging.physics import clip_columns, clip_facts
-from flows.judging.physics_constants import read_constants
+from flows.auditing.physics import clip_columns, clip_facts
+from flows.auditing.physics_constants import read_constants
 from flows.making.generate import generate_dataset
 from tasks.eval.physics import body
 from tasks.eval.physics.audit import audit_clip
+from tasks.eval.physics.body import follow_moment
 from tasks.eval.physics.constants import Constants
-from tasks.eval.physics.superposition import follow_moment
 from tests.toy_street import write_toy_grid
 
 GRID = """

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.synthetic_street import Clip
+from studies.synthetic_street import Clip
 from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.eval.poses.checks import GATE_CHECK, POSE_CHECKS, CheckedClip, JudgeCamera, prepare_clip
 from tasks.eval.poses.depth_chain import (

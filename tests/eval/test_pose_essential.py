@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from benchmarks.synthetic_street import Clip, camera_matrix, drive_clip, render_clip
+from studies.synthetic_street import Clip, camera_matrix, drive_clip, render_clip
 from tasks.errors import InputError
 from tasks.eval.poses import essential
 from tasks.eval.poses.essential import recover_motion_essential

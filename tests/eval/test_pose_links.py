@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.synthetic_street import Clip, drive_clip
+from studies.synthetic_street import Clip, drive_clip
 from tasks.eval.poses import essential
 from tasks.eval.poses.essential import EssentialSettings, recover_motion_essential
 from tasks.eval.poses.links import Link, chained_poses, link_placements

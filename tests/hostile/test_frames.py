@@ -54,15 +54,6 @@ def put_payload(stage: Stage, place: Path) -> None:
     place.write_bytes(pickle.dumps(Payload(stage.victim / "PWNED")))
 
 
-def consolidated(stage: Stage) -> None:
-    metadata = json.loads((stage.dataset.frames / "rgb" / "zarr.json").read_text())
-    metadata["codecs"] = [{"name": "numcodecs.pickle"}]
-    edit(stage, "", lambda m: m.update(
-        consolidated_metadata={"kind": "inline", "must_understand": False, "metadata": {"rgb": metadata}}
-    ))  # fmt: skip
-    put_payload(stage, stage.dataset.frames / "rgb" / "c" / "0" / "0" / "0" / "0" / "0")
-
-
 def another_array(stage: Stage) -> None:
     shutil.copytree(stage.dataset.frames / "rgb", stage.dataset.frames / "evil")
     edit(stage, "evil", lambda m: m.update(codecs=[{"name": "numcodecs.pickle"}]))
@@ -75,12 +66,10 @@ def shard(metadata: Any) -> Any:
 METADATA: dict[str, Callable[[Stage], object]] = {
     "the codec of pickles": pickle_codec,
     "the codec of pickles in Zarr 2": zarr_2_with_pickle,
-    "the codec of pickles in copied metadata": consolidated,
     "the codec of pickles inside a shard": lambda s: edit(
         s, "rgb", lambda m: shard(m)["codecs"].insert(0, {"name": "numcodecs.pickle"})
     ),
     "an array that nobody knows": another_array,
-    "a codec of a package": lambda s: edit(s, "rgb", lambda m: m.update(codecs=[{"name": "os.system"}])),
     "pictures of Python objects": lambda s: edit(s, "rgb", lambda m: m.update(data_type="object")),
     "a remote store": lambda s: edit(
         s, "rgb", lambda m: m.update(storage_transformers=[{"name": "fsspec", "url": "file:///etc/passwd"}])
@@ -88,29 +77,22 @@ METADATA: dict[str, Callable[[Stage], object]] = {
     "references to other files": lambda s: edit(
         s, "", lambda m: m.update(refs={"rgb/0": ["/etc/passwd", 0, 9]})
     ),
-    "chunk keys that climb": lambda s: edit(
-        s,
-        "rgb",
-        lambda m: m.update(chunk_key_encoding={"name": "default", "configuration": {"separator": "/../"}}),
-    ),
     "pictures of a million by a million": lambda s: edit(
         s, "rgb", lambda m: m["shape"].__setitem__(slice(2, 4), [10**6, 10**6])
     ),
     "a thousand million frames": lambda s: edit(s, "rgb", lambda m: m["shape"].__setitem__(1, 10**9)),
-    "a negative shape": lambda s: edit(s, "rgb", lambda m: m["shape"].__setitem__(0, -1)),
     "two sizes of pictures": lambda s: edit(s, "depth", lambda m: m["shape"].__setitem__(2, 32)),
     "no JSON": lambda s: (s.dataset.frames / "rgb" / "zarr.json").write_text("{" * 100_000),
 }
 
 
-@pytest.mark.parametrize("sealed", [False, True], ids=["", "sealed again"])
 @pytest.mark.parametrize("attack", METADATA)
-def test_frames_with(stage, attack, sealed):
+def test_frames_with(stage, attack):
     METADATA[attack](stage)
-    if sealed:
-        reseal(stage.dataset, lambda m: m["artifacts"].pop("frames.zarr/rgb/zarr.json", None)
-               if attack.endswith("Zarr 2") else None)  # fmt: skip
-    outcomes = endure(stage, "verify", *READS_PICTURES)
+    assert refused(endure(stage, "verify")["verify"])
+    reseal(stage.dataset, lambda m: m["artifacts"].pop("frames.zarr/rgb/zarr.json", None)
+           if attack.endswith("Zarr 2") else None)  # fmt: skip
+    outcomes = endure(stage, *READS_PICTURES)
     # windows open the arrays that they were asked for, here rgb alone
     of_rgb = attack not in {
         "an array that nobody knows",
@@ -118,8 +100,6 @@ def test_frames_with(stage, attack, sealed):
         "references to other files",
     }
     assert unrefused(outcomes, "open frames", *(["open windows"] if of_rgb else [])) == []
-    if not sealed:
-        assert refused(outcomes["verify"])
 
 
 def test_attributes_of_frames_are_texts_and_nothing_more(stage):
@@ -132,10 +112,7 @@ def test_attributes_of_frames_are_texts_and_nothing_more(stage):
 
 
 SHARDS = {
-    "nothing": lambda content: b"",
     "its first half": lambda content: content[: len(content) // 2],
-    "noise": lambda content: bytes(reversed(content)),
-    "zeros": lambda content: bytes(len(content)),
     "an index that leads far out": lambda content: (
         content[:-180] + struct.pack("<QQ", 2**62, 2**40) * 11 + content[-4:]
     ),

@@ -11,9 +11,6 @@ from tests.flows.reseal import reseal
 from tests.hostile.stage import Stage, endure, refused, unrefused
 
 READS_INPUTS = ("verify", "explain", "audit-physics", "generate")
-BOMB = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
-    f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]\n" for i in range(1, 10)
-)
 
 
 def write_input(name: str, text: str) -> Callable[[Stage], object]:
@@ -53,34 +50,24 @@ INPUTS: dict[str, Callable[[Stage], object]] = {
     "a command in the vehicle": write_input(
         "vehicle.yaml", "!!python/object/apply:os.mkdir ['{victim}/PWNED']"
     ),
-    "a command in the weather": write_input("weather/air.yaml", "a: !!python/name:os.system"),
-    "a bomb of aliases": write_input("vehicle.yaml", BOMB),
     "a hundred thousand brackets": write_input("camera.yaml", "[" * 100_000),
-    "nothing": write_input("vehicle.yaml", ""),
     "a number": write_input("surface.yaml", "7"),
     "the same key twice": replace_in(
         "camera.yaml", "width:", "height: {value: 1, unit: px, source: x}\nwidth:"
     ),
     "a picture of a million by a million": replace_in("camera.yaml", "value: 96", "value: 1000000"),
-    "a picture of no pixels": replace_in("camera.yaml", "value: 96", "value: 0"),
     "an infinite focal length": replace_in("camera.yaml", "value: 80", "value: .inf"),
-    "a name with an escape": replace_in("camera.yaml", "toy-96x64", "'\\e[31m[/red]</script>'"),
     "a grid with a scene elsewhere": write_input("grid.json", '{{"scene": "/etc"}}'),
-    "gates that are a list": write_input("gates.yaml", "- 1\n- 2\n"),
     "a plan that is another dataset's": edit_plan(lambda p: p.update(run_id="f" * 16)),
     "a plan with other clips": edit_plan(
         lambda p: p["clips"][0].update(clip_id="0123456789abcdef", label="x")
     ),
-    "a plan without clips": edit_plan(lambda p: p.update(clips=[])),
     "a plan with a hundred thousand frames": edit_plan(lambda p: p["grid"].update(frames=100_000)),
     "a plan with paths as inputs": edit_plan(
         lambda p: p["inputs"].update({"../../../victim/vehicle.yaml": "0" * 64})
     ),
     "a scene elsewhere": both(lambda r: r["grid"].update(scene="/etc")),
-    "a scene of the stranger's": both(lambda r: r["grid"].update(scene="../evil")),
     "a scene's name elsewhere": both(lambda r: r["scene"].update(name="../../victim")),
-    "a vehicle elsewhere": both(lambda r: r["grid"].update(vehicle="/etc/passwd")),
-    "a camera elsewhere": both(lambda r: r["grid"].update(camera="../../victim/vehicle.yaml")),
 }
 
 

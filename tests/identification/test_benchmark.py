@@ -13,15 +13,15 @@ from catalogs.entries import load
 from flows.measured.closing_error_rates import JUDGES
 from manifests.provenance import source_hashes
 from studies.closing_benchmark import benchmark as closing_benchmark
-from studies.closing_benchmark.harder import load_harder
-from studies.closing_benchmark.summary import pair_outcome, summarise_benchmark
-from tasks.campaign.planned_runs import TRAINING
-from tasks.identification.benchmark import (
+from studies.closing_benchmark.summary import (
     classify_outcome,
     compute_exact_interval,
-    make_synthetic_campaign,
     measure_interval_miss,
+    pair_outcome,
+    summarise_benchmark,
 )
+from studies.closing_benchmark.synthetic import TRAINING, make_synthetic_campaign
+from studies.closing_benchmark.truths import load_sizes, load_truths
 
 ROOT = Path(closing_benchmark.__file__).parents[2]
 VEHICLE, SURFACE = load("vehicle", "paper-reference"), load("surface", "dense-asphalt")
@@ -48,12 +48,6 @@ def test_the_exact_interval_is_clopper_and_pearsons() -> None:
     assert compute_exact_interval(0, 100) == pytest.approx((0.0, 1.0 - 0.025**0.01))
     low, high = compute_exact_interval(3, 40)
     assert binom.sf(2, 40, low) == pytest.approx(0.025) and binom.cdf(3, 40, high) == pytest.approx(0.025)
-
-
-def test_every_truth_is_of_the_library_or_a_form_outside_it() -> None:
-    truths = load("list of truths")
-    assert sum(t.in_library for t in truths) >= 20 and sum(not t.in_library for t in truths) >= 6
-    assert all((t.form is None) == t.in_library for t in truths)
 
 
 @pytest.mark.parametrize(("truth", "miss"), [(0.06, 0.0), (0.08, 1.0), (0.1, 2.0), (0.05, 1.0), (0.045, 1.5)])
@@ -91,12 +85,12 @@ def test_a_benchmark_goes_on_where_it_was_stopped_and_starts_anew_with_another_e
     result = closing_benchmark.close_loop_benchmark(out=str(tmp_path), seeds=2, nulls=4, harder=1)
     seeds = [row["seed"] for row in result["campaigns"]]
     assert len(judged) == len(seeds) + 1 and len(set(seeds)) == len(seeds)
-    library = [truth for truth in load("list of truths") if truth.in_library]
+    library = [truth for truth in load_truths() if truth.in_library]
     harder = 3 * len(library)  # as many pairs as truths, and each truth and a null on the poor design
-    assert len(seeds) == 4 + 2 * len(load("list of truths")) + 2 * len(load("list of sizes")) + harder
+    assert len(seeds) == 4 + 2 * len(load_truths()) + 2 * len(load_sizes()) + harder
     # round by round: no truth has its second campaign before all have their first
     order = [row["truth"] for row in result["campaigns"] if row["kind"] in ("library", "outside")]
-    assert order[: len(load("list of truths"))] == [t.name for t in load("list of truths")]
+    assert order[: len(load_truths())] == [t.name for t in load_truths()]
     tables = (tmp_path / "closing-benchmark.md").read_text()
     assert "| false discoveries on nulls | 0 | 4 of 4 |" in tables
     assert "| brake_fade | fade 0.005 | 2 of 2 | 1.00 |" in tables
@@ -159,15 +153,6 @@ def test_a_form_counts_by_its_port_and_variable_and_a_set_by_the_truth_in_it(
     assert classify_outcome(found, "lag" if form is None else "hump", form) == expected
 
 
-def test_every_truth_is_in_two_pairs_and_no_pair_comes_twice() -> None:
-    library = tuple(truth for truth in load("list of truths") if truth.in_library)
-    pairs = [frozenset(truth.name for truth in pair) for pair in load_harder().pairs(library)]
-    assert len(set(pairs)) == len(pairs) == len(library)
-    assert {name: sum(name in pair for pair in pairs) for name in set().union(*pairs)} == {
-        truth.name: 2 for truth in library
-    }
-
-
 def test_the_summary_counts_each_kind_once() -> None:
     rows = [
         row(None, "right"), row(None, "false discovery"), row("brake_lag", "right", covered=True),
@@ -186,14 +171,6 @@ def test_the_summary_counts_each_kind_once() -> None:
     # sizes and poor designs have shares of their own
     assert result["confusion"]["brake_lag"] == {"right": 1, "wrong": 1}
     assert result["named_instead"] == {"brake_lag": {"brake_dead_time": 1}, "nothing": {"brake_dead_time": 1}}
-
-
-def test_a_later_first_seed_makes_other_campaigns_of_the_same_truths_and_the_same_nulls() -> None:
-    first, later = (list(closing_benchmark._plan(2, seed, 4, 1)) for seed in (0, 5))
-    assert [(p.kind, p.name) for p in first] == [(p.kind, p.name) for p in later]
-    moved = {p.kind for p, q in zip(first, later, strict=True) if p.seed != q.seed}
-    assert moved == {"library", "outside", "size"}
-    assert {q.seed - p.seed for p, q in zip(first, later, strict=True) if p.kind in moved} == {5}
 
 
 NO_JUDGE = (
@@ -221,8 +198,3 @@ def test_every_source_that_a_verdict_imports_counts_in_its_hash_or_is_known_to_d
     untold = [file for file in own if not file.startswith((*JUDGES, *NO_JUDGE))]
     assert untold == []
     assert all(any(file.startswith(place) for file in source_hashes()) for place in JUDGES)
-
-
-def test_the_counts_of_the_benchmark_are_no_source_of_a_verdict() -> None:
-    """Else the file that says which version judged again would make that version another one."""
-    assert not "catalogs/studies/closing_error_rates.json".startswith(JUDGES)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from catalogs.entries import load
-from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.derivatives import differentiate_run
 from tasks.identification.inference.discrepancy import estimate_run_noise, set_run_noise
 from tasks.identification.inference.disturbance import Disturbance
+from tasks.identification.inference.evidence import Evidence
 from tasks.identification.inference.fit import fit_hypotheses
 from tasks.identification.inference.forward import RunModel
 from tasks.vehicle.effects.table import EFFECT_TABLE

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from catalogs.entries import load
-from tasks.campaign.planned_runs import RICH, RunPlan, make_planned_run, plan_experiments
+from studies.closing_benchmark.synthetic import RICH
+from tasks.campaign.planned_runs import RunPlan, make_planned_run, plan_experiments
 from tasks.identification.decision import experiment
 from tasks.identification.decision.experiment import plan_next_experiment
-from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.derivatives import differentiate_run
 from tasks.identification.inference.disturbance import Disturbance
+from tasks.identification.inference.evidence import Evidence
 from tasks.identification.inference.fit import fit_hypotheses
 from tasks.identification.inference.forward import prepare_run
 from tasks.identification.inference.hypothesis import make_library_hypothesis

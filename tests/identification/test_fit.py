@@ -21,9 +21,9 @@ from tasks.identification.decision.forms import (
 from tasks.identification.decision.odds import search_explanations
 from tasks.identification.decision.search import gather_grams
 from tasks.identification.inference import evidence as inference_evidence
-from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.derivatives import differentiate_run
 from tasks.identification.inference.disturbance import Disturbance
+from tasks.identification.inference.evidence import Evidence
 from tasks.identification.inference.fit import Fit, _measure_scatter, fit_hypotheses
 from tasks.identification.inference.forward import (
     RunModel,

@@ -8,8 +8,8 @@ import pytest
 from catalogs.entries import load
 from tasks.campaign.campaign import CHANNELS, Campaign
 from tasks.identification.decision.forms import differentiate_by_splines
-from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.discrepancy import RunNoise, set_run_noise
+from tasks.identification.inference.evidence import Evidence
 from tasks.identification.inference.fit import Fit
 from tasks.identification.inference.linearisation import prepare_evidence
 from tasks.vehicle.effects.table import EFFECT_TABLE

@@ -21,7 +21,6 @@ from tasks.identification.decision.open_explanations import OpenExplanation
 from tasks.identification.decision.words import describe_open_explanations, describe_unnamed
 from tasks.identification.inference.disturbance import Disturbance
 from tasks.vehicle.effects.library import Effect
-from tasks.vehicle.tyres.burckhardt import compute_burckhardt_friction, scale_burckhardt
 from tests.identification.explained import effect_of, grams_of
 
 RULES = load("set of decision rules")
@@ -131,13 +130,6 @@ def test_own_numbers_are_told_where_resamples_agree_or_the_error_is_halved() -> 
         assert (". Its own numbers" in told) is is_said
 
 
-def test_own_numbers_are_told_with_a_stop_that_they_miss_by_more() -> None:
-    speed = replace(ERROR, frozen=0.4, retuned=0.27, after=0.27, change_low=-0.3, change_high=-0.1)
-    stop = replace(ERROR, frozen=3.31, retuned=4.0, after=4.0, unit="m")
-    told = describe_verdict((), (), {"speed": speed}, {"stopping_distance": stop}, own="the brakes give more")
-    assert "of the speed from 0.4 to 0.27 m/s and of the stopping distance from 3.3 to 4 m" in told
-
-
 def test_a_name_is_not_credited_with_what_the_vehicles_own_numbers_do() -> None:
     """Brakes 21 ms late were said to take a stop's error from 7.3 to 1.1 m, which a gain 10 % off did."""
     effect = next(e for e in load("library of effects") if e.name == "brake_dead_time")
@@ -220,20 +212,6 @@ def test_an_error_that_reads_the_same_before_and_after_is_not_told_as_taken_from
     )
 
 
-def test_no_name_beside_runs_that_the_model_misses_is_no_claim_that_nothing_is_missing() -> None:
-    told = describe_verdict((), (), {}, {}, misses=True)
-    assert (
-        told
-        == "The model misses these runs by more than their noise, and nothing that can be named explains it."
-    )
-
-
-def test_an_error_is_said_without_an_exponent() -> None:
-    error = replace(ERROR, frozen=121.4, retuned=99.7, after=0.056, change_low=-1.0, change_high=0.0)
-    told = describe_verdict((FORM,), (), {"speed": error}, {"stopping_distance": replace(error, unit="m")})
-    assert "of the speed from 121 (re-tuned 100) to 0.056 m/s and of the stopping distance from 121" in told
-
-
 def test_an_instruments_error_is_told_by_its_own_channel_and_not_by_the_speed() -> None:
     speed = replace(ERROR, frozen=0.065, retuned=0.44, after=0.094, change_low=0.0, change_high=1.0)
     error = {
@@ -273,29 +251,3 @@ def test_a_form_of_another_shape_is_not_told_as_the_same_words_again() -> None:
         (FORM,), (), {"speed": speed}, {}, rivals=[replace(FORM, name="other_shape"), drag]
     )
     assert "or the longitudinal force depends on speed" in both and both.count("itch moment depends") == 1
-
-
-def test_a_lower_slip_stiffness_is_told_as_a_softer_tyre_that_reaches_its_peak_at_a_higher_slip() -> None:
-    effect = next(e for e in load("library of effects") if e.name == "retuned_slip_stiffness")
-    curve = (1.2801, 23.99, 0.52)
-    stiff, soft = (scale_burckhardt(curve, 1.0, 1.0 + change) for change in (0.0, -0.33))
-    assert compute_burckhardt_friction(0.01, 4000.0, soft) < compute_burckhardt_friction(0.01, 4000.0, stiff)
-    assert soft.target_slip > stiff.target_slip
-    assert (
-        effect.say({"slip_stiffness": -0.33})
-        == "the tyres' force rises with small slip at a rate 33 % below the vehicle file's"
-    )
-
-
-def test_anti_dive_is_told_as_a_share_of_the_load_transfer_and_not_of_the_brake_force() -> None:
-    # the link carries anti_dive x brake force x h/L, some fifth of the share of the brake force itself
-    said = {
-        e.name: e.say({e.parameters[0].name: 0.46})
-        for e in load("library of effects")
-        if e.name.startswith("anti_")
-    }
-    assert said == {
-        f"anti_{name}": f"the {axle} suspension's links take 46 % of the load transfer of the {axle} brakes off the"
-        " springs"
-        for name, axle in (("dive", "front"), ("lift", "rear"))
-    }

@@ -3,7 +3,7 @@ import math
 import pytest
 import rfc8785
 
-from manifests.canonical import ID_LENGTH, canonical_bytes, content_id, sha256_of
+from manifests.canonical import canonical_bytes, content_id, sha256_of
 
 
 def test_canonical_form_is_that_of_rfc_8785_section_3_2_2():
@@ -22,12 +22,6 @@ def test_canonical_form_is_that_of_rfc_8785_section_3_2_2():
 
 def test_key_order_does_not_change_an_id():
     assert content_id({"a": 1, "b": [1.5, None]}) == content_id({"b": [1.5, None], "a": 1})
-
-
-def test_any_changed_value_changes_the_id():
-    ids = {content_id({"a": value}) for value in (0, 1, -1, 0.5, "0", None, [], {})}
-    assert len(ids) == 8
-    assert all(len(i) == ID_LENGTH for i in ids)
 
 
 def test_nan_has_no_canonical_form():

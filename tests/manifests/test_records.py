@@ -47,6 +47,8 @@ def test_every_frozen_run_that_ships_passes(path: Path):
         "/etc/passwd", "../../.bashrc", "inputs/../../x", "telemetry//x", "telemetry/", "", ".", ".staging/lock",
         "manifest.json", "telemetry/.hidden", "telemetry/a\\..\\b", "telemetry/a\x00b", "telemetry/a\nb", "C:/x",
         "frames.zarr/" + "a" * 101, "/".join(["telemetry", *"abcdefghij"]), "ｉnputs/x", "Telemetry/x", "home/x",
+        "./telemetry/clips.parquet", "file:///etc/passwd", "telemetry/ticks/family=*/part-0000.parquet",
+        "telemetry/clips․parquet",
     ],
 )  # fmt: skip
 def test_a_recorded_path_is_one_that_muSync_writes(manifest, path):
@@ -79,13 +81,14 @@ def test_a_clips_id_has_sixteen_hex_digits(manifest, clip_id):
 @pytest.mark.parametrize(
     ("place", "value"),
     [
-        (("clips", 0, "scenario", "weather"), "../../x"),
+        (("clips", 0, "scenario", "weather"), "lava"),
         (("clips", 0, "scenario", "initial_speed_km_h"), "60"),
         (("clips", 0, "scenario", "initial_speed_km_h"), True),
         (("clips", 0, "label"), "a\x1b[31mb"),
         (("clips", 0, "label"), "x" * 1001),
         (("clips", 0, "index"), 2**31),
         (("clips", 0, "index"), -1),
+        (("clips", 0, "index"), True),
         (("clips", 0, "figures", "peak_pitch"), "high"),
         (("clips", 0, "verdict", "passed"), "yes"),
         (("clips", 0, "seed"), "1e3"),
@@ -96,7 +99,10 @@ def test_a_clips_id_has_sixteen_hex_digits(manifest, clip_id):
         (("git",), {"commit": "HEAD", "changed": False}),
         (("run_id",), "../../x"),
         (("clips",), []),
-        (("clips",), None),
+        (("clips",), [None]),
+        (("clips",), "abc"),
+        (("artifacts",), ["telemetry/clips.parquet"]),
+        (("artifacts",), {"telemetry/clips.parquet": "not a hash"}),
     ],
 )
 def test_a_value_of_another_kind_is_refused_and_its_place_named(manifest, place, value):

@@ -153,22 +153,6 @@ def test_poses_that_jitter_are_put_right_by_the_pictures(built: Reconstruction, 
         assert after < 0.4 * before
 
 
-def test_figures_are_plain_numbers_with_a_row_per_frame(built: Reconstruction) -> None:
-    figures = built.summarise()
-    assert figures["held_out_psnr_db"] == built.held_out[0].psnr_db
-    assert [row["frame"] for row in figures["held_out_frames"]] == [HELD_OUT]
-    assert all(isinstance(value, int | float) for value in figures["held_out_frames"][0].values())
-
-
-def test_settings_name_every_bad_value() -> None:
-    with pytest.raises(InputError) as caught:
-        StereoSettings(disparities=100, held_out_every=1, spacing=0)
-    text = "\n".join(caught.value.problems)
-    assert "disparities must be a positive multiple of 16; it is 100" in text
-    assert "held_out_every" in text
-    assert "spacing" in text
-
-
 def test_too_few_pictures_and_too_short_a_drive_are_refused(truth: StereoSet) -> None:
     first = {name: getattr(truth.sequence, name)[:3] for name in ("left", "right", "T_origin_camera")}
     with pytest.raises(InputError, match="at least 3 pictures must remain"):

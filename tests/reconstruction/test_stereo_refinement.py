@@ -18,7 +18,7 @@ from tasks.reconstruction.adjoint import (
 )
 from tasks.reconstruction.refinement import TrainingView, bit_reversed_order, refine_gaussians
 from tasks.render.rasterise.preparation import prepare_gaussians
-from tasks.render.rasterise.projection import DEPTH, LOG_ALPHA, RECORD, RED, X, Y, project_gaussians
+from tasks.render.rasterise.projection import LOG_ALPHA, RED, X, Y, project_gaussians
 from tasks.render.rasterise.rasteriser import rasterise_view
 from tasks.render.rasterise.view import view_of
 from tasks.scene.gaussians import Gaussians
@@ -118,13 +118,6 @@ def test_a_pixel_at_the_ceiling_is_matched_by_anything_brighter() -> None:
     np.testing.assert_allclose(brighter[:, COLOUR], 0.05 * brighter[:, WEIGHT], rtol=1e-3, atol=1e-5)
 
 
-def test_nothing_to_blend_shows_the_sky() -> None:
-    sky = make_backdrop(2)
-    picture, sums = blend_and_derive(np.empty((0, RECORD), np.float32), sky, ONES, sky)
-    np.testing.assert_array_equal(picture[..., :3], sky)
-    assert sums.shape[0] == 0
-
-
 def views_of(gaussians: Gaussians) -> list[TrainingView]:
     """Pictures of the cloud from three places."""
     views = []
@@ -216,10 +209,3 @@ def test_the_order_of_pictures_visits_each_once_and_jumps() -> None:
     for count in (1, 2, 5, 44):
         assert sorted(bit_reversed_order(count)) == list(range(count))
     assert bit_reversed_order(8) == [0, 4, 2, 6, 1, 5, 3, 7]
-
-
-def test_records_hold_what_the_derivative_reads() -> None:
-    """The columns that the kernel addresses are the projection's own."""
-    records = records_of(make_cloud(1))
-    assert records.shape == (1, RECORD)
-    assert 4 < records[0, DEPTH] < 7

@@ -8,9 +8,8 @@ from catalogs.entries import find_entry
 from catalogs.grids import GridFile
 from catalogs.scenario import OPTIONAL_FIELDS, SCENARIO_FIELDS, Scenario, find_range_problems, list_ranges
 from flows.registry import COMMANDS
-from reference_pages import commands, effects, fmu, grids
+from reference_pages import commands, effects, grids
 from tasks.vehicle.effects.table import PARAMETERS
-from tasks.vehicle.model.embedded_variables import INPUTS
 
 
 def rows_of(table: str) -> dict[str, list[str]]:
@@ -58,7 +57,3 @@ def test_a_number_of_a_scenario_may_reach_the_ends_of_its_range_and_go_no_furthe
         beyond = {most: most * 1.001} | ({} if least is None else {least: least - 0.001})
         assert [find_range_problems(Scenario(**{name: end})) for end in beyond] == [[]] * len(beyond), name
         assert all(find_range_problems(Scenario(**{name: value})) for value in beyond.values()), name
-
-
-def test_every_input_of_an_fmu_has_its_row() -> None:
-    assert list(rows_of(fmu.write_input_table())) == [row.name for row in INPUTS]

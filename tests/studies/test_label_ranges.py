@@ -9,6 +9,7 @@ from catalogs.entries import load
 from catalogs.scenario import Scenario
 from flows.making.driving import controls_of, hazard_of, ranges_of, weather_of
 from tasks.studies.label_ranges import DRIVEN_PERCENTILES, label_ranges, sampled_friction
+from tasks.studies.sensitivity import latin_hypercube
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.rollout import simulate_scenario
 
@@ -89,3 +90,10 @@ def test_percentiles_ascend_around_the_nominal_label(entries):
     found = ranges(Scenario(**RAIN, **STOP), entries)
     for name in ("surface_friction", "stopping_distance", "peak_pitch"):
         assert found[f"{name}_p05"] < found[f"{name}_p50"] < found[f"{name}_p95"]
+
+
+def test_each_stratum_of_the_hypercube_is_drawn_once():
+    samples = latin_hypercube({"a": (1.0, 3.0), "b": (-1.0, 0.0)}, ("a", "b"), 64, 7)
+    assert np.array_equal(np.sort(np.floor((samples["a"] - 1) / 2 * 64)), np.arange(64))
+    assert np.array_equal(np.sort(np.floor((samples["b"] + 1) * 64)), np.arange(64))
+    assert abs(np.corrcoef(samples["a"], samples["b"])[0, 1]) < 0.5

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tasks.conventions import CLIP_CHANNELS
-from tasks.vehicle.peaks import compute_peaks
+from tasks.vehicle.rollout import compute_peaks
 
 TICKS = {
     "longitudinal_acceleration": np.array([0.5, -1.0, -7.5, 0.0]),

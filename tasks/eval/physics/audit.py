@@ -8,16 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.eval.physics.body import body_laws, outcome_laws, surface_laws
-from tasks.eval.physics.commands import command_laws, road_height_laws
+from tasks.eval.physics.body import body_laws
+from tasks.eval.physics.clip_row import command_laws, outcome_laws, road_height_laws, surface_laws
 from tasks.eval.physics.constants import Constants
 from tasks.eval.physics.coupled_laws import coupled_laws
 from tasks.eval.physics.effects import find_unjudged
 from tasks.eval.physics.frames import frame_laws, pose_check_laws, pose_laws
-from tasks.eval.physics.grade import grade_laws
 from tasks.eval.physics.half_step import follow_half_step
 from tasks.eval.physics.laws import Law, motion_laws, wheel_laws
-from tasks.eval.physics.route import RouteLine, route_laws
+from tasks.eval.physics.route import RouteLine, grade_laws, route_laws
 
 COPIED = "frame rows are ticks: "
 """Prefix of the names of the laws that relate the two tables."""

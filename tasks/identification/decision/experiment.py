@@ -6,8 +6,8 @@ import numpy as np
 
 from tasks.campaign.channels import describe_brake
 from tasks.campaign.planned_runs import make_planned_run, plan_experiments
-from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.derivatives import differentiate_run
+from tasks.identification.inference.evidence import Evidence
 from tasks.identification.inference.fit import Fit
 from tasks.identification.inference.forward import predict_channels, prepare_run
 from tasks.identification.inference.noise import whiten_channels

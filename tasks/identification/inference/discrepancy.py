@@ -11,8 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.identification.inference.campaign_evidence import Evidence
-from tasks.identification.inference.evidence import RunEvidence, set_disturbance_prior
+from tasks.identification.inference.evidence import Evidence, RunEvidence, set_disturbance_prior
 from tasks.identification.inference.fit import Fit
 from tasks.identification.inference.linearisation_points import LinearisedRun, linearise_at
 from tasks.identification.inference.noise import (

@@ -1,4 +1,4 @@
-"""One run as evidence: derivatives by effects and nuisances, with offsets and disturbances marginalised linearly.
+"""Runs as evidence: derivatives by effects and nuisances, with offsets and disturbances marginalised linearly.
 
 residual = A theta + S session + J d + noise, with d the run's own offsets and disturbances under a Gaussian
 prior. Integrating d out leaves inner products x' L y with L = I - J (J'J + P)^-1 J' (Woodbury), which are one small
@@ -31,6 +31,8 @@ from tasks.identification.inference.forward import (
     simulate_run,
 )
 from tasks.identification.inference.noise import whiten_channels
+from tasks.identification.rules import DecisionRules
+from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.slots import Slot
 from tasks.vehicle.effects.table import PARAMETER_INDEX
 
@@ -106,7 +108,7 @@ class RunEvidence:
         y[:, CHANNELS.index("pitch")] += offsets[PITCH_OFFSET]
         return whiten_channels(self.model.measured - y, self.rho, self.sigma, self.model.sampled)
 
-    def place(
+    def apply_offsets(
         self, theta: NDArray[np.float64], slots: tuple[Slot, ...], offsets: NDArray[np.float64]
     ) -> tuple[RunModel, NDArray[np.float64], tuple[Slot, ...]]:
         """Return the run, the parameters and the forms that have its own offsets in them.
@@ -198,3 +200,33 @@ def set_disturbance_prior(
         changed,
         session_q=changed.project_on_nuisances(changed.session),
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evidence:
+    """Training runs with the library by which they were differentiated, and held-out runs.
+
+    Parameters
+    ----------
+    train : training runs
+    held_out : held-out runs, which no fit and no choice reads
+    effects : library of effects
+    tolerances, disturbance : priors of session, offsets and disturbances
+    sensors : AR(1) coefficient and standard deviation of every channel's sensor, float64 [7] each
+    rules : decision rules
+    step_sensitive : names of runs left out because halving the integration step changes their prediction
+    """
+
+    train: tuple[RunEvidence, ...]
+    held_out: tuple[RunModel, ...]
+    effects: tuple[Effect, ...]
+    tolerances: Tolerances
+    disturbance: Disturbance
+    sensors: tuple[NDArray[np.float64], NDArray[np.float64]]
+    rules: DecisionRules
+    step_sensitive: tuple[str, ...] = ()
+
+    @property
+    def session_sigma(self) -> NDArray[np.float64]:
+        """Return the prior sigmas of the session, float64 [8]."""
+        return np.array(self.tolerances.file_numbers)

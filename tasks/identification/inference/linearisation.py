@@ -8,13 +8,12 @@ from scipy.linalg import cholesky, solve_triangular
 
 from tasks.campaign.campaign import SESSION, Campaign, Tolerances
 from tasks.campaign.gauge import denoise_pressure
-from tasks.identification.inference.campaign_evidence import Evidence
 from tasks.identification.inference.derivatives import (
     differentiate_by_library,
     differentiate_run,
 )
 from tasks.identification.inference.disturbance import Disturbance, compute_prior_precision
-from tasks.identification.inference.evidence import RunEvidence, set_disturbance_prior
+from tasks.identification.inference.evidence import Evidence, RunEvidence, set_disturbance_prior
 from tasks.identification.inference.fit import Fit, fit_hypotheses
 from tasks.identification.inference.forward import RunModel, predict_channels, prepare_run
 from tasks.identification.inference.hypothesis import compose_parameters
@@ -153,7 +152,7 @@ def differentiate_about_offsets(evidence: Evidence, at: Fit) -> tuple[RunEvidenc
     theta, slots = at.compose()
     runs = []
     for run, offsets in zip(evidence.train, at.offsets, strict=True):
-        model, moved, forms = run.place(theta, slots, offsets)
+        model, moved, forms = run.apply_offsets(theta, slots, offsets)
         fresh = differentiate_run(
             model, run.rho, run.sigma, moved, (), evidence.tolerances, evidence.disturbance, forms
         )

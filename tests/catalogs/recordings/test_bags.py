@@ -97,20 +97,6 @@ def test_the_list_has_a_row_for_each_number_and_none_for_text_header_and_picture
     assert rows["/car.counts[0]"].samples == 4
 
 
-def test_a_missing_signal_is_named_with_those_that_come_near(tmp_path):
-    path = write_bag(tmp_path, "mcap", write_drive(make_store()))
-    assert "signal /car.sped is missing; there are: /car.speed" in read_refusal(path, "/car.sped")
-    for name in (
-        "/car.wheels[4]",
-        "/car.speed.__class__",
-        "/car.wheels.size",
-        "/bus.speed",
-        "/car",
-        "/car.note",
-    ):
-        assert f"signal {name} is missing" in read_refusal(path, name)
-
-
 def test_a_bag_folder_is_one_recording_and_its_files_are_those_that_are_hashed(tmp_path):
     folder = write_bag(tmp_path, "folder", write_drive(make_store()))
     assert recording_files(folder) == (folder,) == recording_files(tmp_path)
@@ -191,21 +177,6 @@ def test_a_piece_that_claims_all_memory_is_refused(form, monkeypatch):
     assert unpack(pack(bytes(1000)), 1000) == bytes(1000)
     with pytest.raises(InputError, match="one is larger or cut off"):
         unpack(pack(bytes(2**24)), 2**24)
-
-
-@pytest.mark.parametrize("name", ["log.bag", "log.db3", "log.mcap"])
-def test_a_damaged_bag_is_one_sentence(tmp_path, name):
-    (tmp_path / name).write_bytes(b"not what it says")
-    assert "must be a readable bag of ROS messages" in read_refusal(tmp_path / name, "/car.speed")
-
-
-def test_without_rosbags_the_reader_says_what_to_install(tmp_path, monkeypatch):
-    (tmp_path / "log.mcap").write_bytes(b"")
-    monkeypatch.setitem(sys.modules, "rosbags", None)
-    assert (
-        'reading ROS bags and MCAP needs the package rosbags: install it with pip install "musync-gs[ros]"'
-        in read_refusal(tmp_path / "log.mcap", "/car.speed")
-    )
 
 
 def test_a_topic_of_two_publishers_in_turns_is_given_by_the_publisher(tmp_path: Path) -> None:

@@ -205,19 +205,6 @@ def test_packed_bytes_that_claim_all_memory_are_refused(tmp_path, monkeypatch):
     )
 
 
-@pytest.mark.parametrize("content", [b"", b"not what it says", b"MATLAB 5.0".ljust(126) + b"IM" + bytes(99)])
-def test_a_damaged_file_is_one_sentence(tmp_path, content):
-    (tmp_path / "log.mat").write_bytes(content)
-    told = read_refusal(tmp_path / "log.mat", "v")
-    assert told.startswith("log.mat: must be a whole") or "must be a readable MATLAB file" in told
-
-
-def test_without_h5py_the_reader_says_what_to_install(tmp_path, monkeypatch):
-    write_hdf(tmp_path / "log.mat", {"t": TIME})
-    monkeypatch.setitem(__import__("sys").modules, "h5py", None)
-    assert 'pip install "musync-gs[mat]"' in read_refusal(tmp_path / "log.mat", "v")
-
-
 @either
 def test_the_list_has_a_row_for_each_signal_with_its_figures(tmp_path, write):
     path = saved(tmp_path, write, {"t": TIME, "log": {"v": SPEED, "m": np.ones((4, 2)), "unit": "m/s"}})

@@ -7,7 +7,6 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from scipy.io import savemat
 
 from catalogs.campaign_files import LONGEST_COLUMN, MOST_COLUMNS, MOST_SAMPLES
 from catalogs.channel_maps import ChannelMap
@@ -48,20 +47,6 @@ def test_a_name_that_stands_twice_is_refused_with_a_name_for_each(tmp_path: Path
         read_signals(path, take())
     assert read_values(path, take("v#2")) == [7.0, 8.0]
     assert [row.signal for row in summarise_signals(path, None)] == ["t", "v#1", "v#2"]
-
-
-def test_a_clock_that_stands_twice_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="t stands 2 times"):
-        read_signals(write(tmp_path, "t,t,v\n0,5,1\n1,6,2\n"), take())
-
-
-def test_a_matlab_variable_that_stands_twice_is_refused(tmp_path: Path) -> None:
-    savemat(tmp_path / "a.mat", {"t": np.arange(3.0), "v": np.arange(3.0)})
-    savemat(tmp_path / "b.mat", {"v": np.arange(3.0) + 5.0})
-    both = (tmp_path / "a.mat").read_bytes() + (tmp_path / "b.mat").read_bytes()[128:]
-    (tmp_path / "log.mat").write_bytes(both)
-    with pytest.raises(InputError, match=r"distinct variables.* v"):
-        read_signals(tmp_path / "log.mat", take())
 
 
 RACE = 'Format,3\nNote,"one line\nand another"\n\nt,v\ns,m/s\n100: gps,calc\n0,1\n1,2\n'

@@ -140,12 +140,3 @@ def test_a_list_of_signals_of_parquet_shows_the_type_that_is_none_of_numbers(
         assert rows["v"]["rate_hz"] == 1.0 and not rows["t"]["note"]
     else:
         assert rows["v"]["samples"] == 0 and "it is of dates or times" in rows["v"]["note"]
-
-
-def test_a_map_that_says_only_how_the_text_is_written_lists_the_signals(tmp_path: Path) -> None:
-    (tmp_path / "logs").mkdir()
-    (tmp_path / "logs" / "log.csv").write_text("t;v\n0;10,5\n1;11,5\n")
-    (tmp_path / "map.yaml").write_text("csv: {separator: ';', decimal: ','}\ntime: {source: t}\n")
-    listed = import_measurements(str(tmp_path / "logs"), map=str(tmp_path / "map.yaml"), list_signals=True)
-    speed = listed["signals"]["log.csv"][1]
-    assert (speed["lowest"], speed["rate_hz"]) == (10.5, 1.0)

@@ -2,6 +2,8 @@
 
 import json
 import shutil
+from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,12 +12,13 @@ import flows.auditing.audit
 import manifests.explain
 from catalogs.scenes import load_scene, write_scene
 from flows.auditing.audit import audit_dataset, draw_clips, format_text
-from flows.judging.evaluation import evaluate_dataset
 from flows.making.generate import generate_dataset
 from flows.running.processors import count_processors
 from flows.store.layout import Layout
+from studies.evaluation.evaluation import evaluate_dataset
 from studies.negative_controls.study import run_controls
 from tasks.errors import InputError
+from tests.conftest import own_notes
 from tests.toy_street import TOY_CAMERA, toy_street, write_toy_grid
 
 
@@ -25,12 +28,23 @@ def copy(toy_dataset, tmp_path) -> Layout:
     return Layout(tmp_path / "copy")
 
 
+@pytest.fixture(scope="module")
+def own_folder(tmp_path_factory) -> Path:
+    """A dataset in ``data``, whose scene and camera are these tests' own, with its own note of where they lie."""
+    folder = tmp_path_factory.mktemp("own")
+    with own_notes(folder / "notes"):
+        generate_dataset(write_toy_grid(folder, frames=2), str(folder / "data"), runner="threads", workers=1)
+    return folder
+
+
 @pytest.fixture
-def own_dataset(tmp_path, monkeypatch) -> Layout:
-    """A dataset whose scene and camera are this test's own, with its own note of where they lie: others are equal."""
-    monkeypatch.setattr("flows.making.places.cache_root", lambda: tmp_path / "notes")
-    grid = write_toy_grid(tmp_path, frames=2)
-    return generate_dataset(grid, str(tmp_path / "data"), runner="threads", workers=1).layout
+def own_dataset(own_folder) -> Iterator[Layout]:
+    """That dataset; after a test that changes its scene or camera both are as they were."""
+    with own_notes(own_folder / "notes"):
+        yield Layout(own_folder / "data")
+    shutil.rmtree(own_folder / "scene", ignore_errors=True)
+    write_toy_grid(own_folder, frames=2)
+    load_scene.cache_clear()
 
 
 def audited(layout: Layout, **options) -> dict:
@@ -85,25 +99,25 @@ def test_inputs_from_which_nothing_can_be_made_are_damage_and_no_crash(copy):
     assert result["differences"][0].startswith("surface.yaml")
 
 
-def test_a_scene_that_has_changed_since_is_named_as_the_reason(own_dataset, tmp_path):
-    shutil.rmtree(tmp_path / "scene")
-    write_scene(toy_street(seed=2), tmp_path / "scene", {})
+def test_a_scene_that_has_changed_since_is_named_as_the_reason(own_dataset, own_folder):
+    shutil.rmtree(own_folder / "scene")
+    write_scene(toy_street(seed=2), own_folder / "scene", {})
     load_scene.cache_clear()  # as if in another process
     result = audited(own_dataset)
     assert result["mismatches"][0]["why"] == ["scene"] and result["differences"][0].startswith("scene")
 
 
 @pytest.mark.parametrize("judge", [evaluate_dataset, run_controls])
-def test_a_dataset_is_not_judged_beside_another_scene_than_its_own(own_dataset, tmp_path, judge):
-    shutil.rmtree(tmp_path / "scene")
-    write_scene(toy_street(seed=2), tmp_path / "scene", {})
+def test_a_dataset_is_not_judged_beside_another_scene_than_its_own(own_dataset, own_folder, tmp_path, judge):
+    shutil.rmtree(own_folder / "scene")
+    write_scene(toy_street(seed=2), own_folder / "scene", {})
     load_scene.cache_clear()
     with pytest.raises(InputError, match=r"scene .*: must be the recorded one .* holds another now"):
         judge(str(own_dataset.root), out=str(tmp_path / "out"))
 
 
-def test_a_broken_scene_lets_no_clip_be_made_and_the_report_says_so_once(own_dataset, tmp_path):
-    file = tmp_path / "scene" / "means.npy"
+def test_a_broken_scene_lets_no_clip_be_made_and_the_report_says_so_once(own_dataset, own_folder, tmp_path):
+    file = own_folder / "scene" / "means.npy"
     np.save(file, np.load(file) + 1)
     load_scene.cache_clear()
     result = audited(own_dataset, share=1.0, out=str(tmp_path / "told"))
@@ -113,9 +127,9 @@ def test_a_broken_scene_lets_no_clip_be_made_and_the_report_says_so_once(own_dat
 
 
 def test_without_its_scene_a_sound_dataset_is_verified_by_its_files_and_no_clip_is_made(
-    own_dataset, tmp_path
+    own_dataset, own_folder
 ):
-    shutil.rmtree(tmp_path / "scene")
+    shutil.rmtree(own_folder / "scene")
     load_scene.cache_clear()
     assert audited(own_dataset, share=0.0)["verified"]
     result = audited(own_dataset)
@@ -154,12 +168,12 @@ def test_a_seed_draws_the_same_clips_again_and_without_one_nobody_knows_which(to
 
 
 def test_another_catalogue_or_code_does_not_go_into_the_same_folder_and_both_values_are_told(
-    own_dataset, tmp_path, monkeypatch
+    own_dataset, own_folder, monkeypatch
 ):
-    (tmp_path / "camera.yaml").write_text(TOY_CAMERA.replace("{value: 80", "{value: 81"))
+    (own_folder / "camera.yaml").write_text(TOY_CAMERA.replace("{value: 80", "{value: 81"))
     monkeypatch.setattr("flows.making.plan.code_version", lambda: {"version": "9", "source_sha256": "0" * 64})
     with pytest.raises(InputError) as told:
-        generate_dataset(str(tmp_path / "grid.yaml"), str(own_dataset.root), runner="threads")
+        generate_dataset(str(own_folder / "grid.yaml"), str(own_dataset.root), runner="threads")
     text = str(told.value)
     assert "camera.yaml focal_length.value is 80 there and 81 here" in text
     assert "code version is" in text and "and 9 here" in text and "clips" not in text

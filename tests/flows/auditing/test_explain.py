@@ -37,8 +37,9 @@ def coupled(toy_dataset, tmp_path_factory) -> Layout:
 
 
 @pytest.mark.parametrize("mode", ["paper", "coupled"])
-@pytest.mark.parametrize("clip", ["dry/flat", "dry/hump", "snow-3/flat", "snow-3/hump"])
-@pytest.mark.parametrize("frame", [0, 4, 10])
+@pytest.mark.parametrize(
+    ("clip", "frame"), [("dry/flat", 0), ("dry/hump", 4), ("snow-3/flat", 10), ("snow-3/hump", 4)]
+)
 def test_all_stored_numbers_follow(toy_dataset, coupled, mode, clip, frame):
     layout = toy_dataset if mode == "paper" else coupled
     result = explain_frame(str(layout.root), clip, frame)

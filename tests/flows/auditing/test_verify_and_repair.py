@@ -17,8 +17,6 @@ from manifests.manifest import recorded_files
 from tasks.errors import InputError
 from tests.flows.reseal import reseal
 
-FLIPS = 50
-
 
 @pytest.fixture
 def copy(toy_dataset, tmp_path) -> Layout:
@@ -42,21 +40,17 @@ def test_a_sound_dataset_verifies(toy_dataset):
     assert result["files"] == len(files_of(toy_dataset))
 
 
-def test_every_one_of_50_flipped_bits_is_found_and_its_file_named(copy):
-    """Every file has its turn, the manifest among them; the bit within it is drawn by a seed."""
+def test_a_flipped_bit_of_every_file_is_found_and_the_file_named(copy):
+    """The manifest's too; the bit is drawn by a seed."""
     draw = random.Random(6)
-    files = sorted(files_of(copy))
-    named = 0
-    for turn in range(FLIPS):
-        path = files[turn % len(files)]
+    for path in sorted(files_of(copy)):
         original = (copy.root / path).read_bytes()
         flip(copy, path, draw.randrange(8 * len(original)))
         try:
             result = verify_dataset(str(copy.root))
         finally:
             (copy.root / path).write_bytes(original)
-        named += not result["verified"] and [row["path"] for row in result["damaged"]] == [path]
-    assert named == FLIPS
+        assert not result["verified"] and [row["path"] for row in result["damaged"]] == [path]
 
 
 def test_a_dataset_that_was_compressed_otherwise_is_repaired_in_its_own_compression(copy):
@@ -122,8 +116,8 @@ def test_everything_but_the_manifest_is_made_again_with_equal_bytes(toy_dataset,
 @pytest.mark.parametrize(
     "path",
     [
-        "frames.zarr/rgb/c/2/0/0/0/0", "telemetry/frames/family=snow/part-0000.parquet",
-        "telemetry/clips.parquet", "previews/contact_sheet.png", "plan.json", "inputs/vehicle.yaml",
+        "frames.zarr/rgb/c/2/0/0/0/0", "telemetry/frames/family=snow/part-0000.parquet", "telemetry/clips.parquet",
+        "inputs/vehicle.yaml",
     ],
 )  # fmt: skip
 def test_one_broken_file_is_repaired_and_no_other_is_touched(toy_dataset, copy, path):

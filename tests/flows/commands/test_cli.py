@@ -97,13 +97,6 @@ def test_describe_gives_a_row_a_clip_with_units_that_a_terminal_can_hold(musync,
         assert f"{degrees(clip['peak_pitch']):.5g}" in line
 
 
-@pytest.mark.parametrize("command", ["audit", "lab describe"])
-def test_a_folder_that_is_no_dataset_is_refused(musync, tmp_path, command):
-    done = musync(*command.split(), str(tmp_path))
-    assert done.code == 2
-    assert "must be a finished dataset; it has no manifest.json: name another folder" in done.err
-
-
 def test_a_manifest_of_another_version_is_refused(musync, tmp_path):
     (tmp_path / "manifest.json").write_text('{"format": "musync-manifest/9"}')
     done = musync("audit", str(tmp_path))

@@ -1,7 +1,6 @@
 """``musync export``: what it refuses, and that a folder is there whole or not at all."""
 
 import json
-import shutil
 import sys
 import tarfile
 from types import ModuleType
@@ -98,12 +97,6 @@ def test_clips_in_quarantine_are_left_out_and_named_unless_asked_for(toy_dataset
     for name in ("croissant", "ro-crate"):
         told = export_dataset(str(toy_dataset.root), name, out=str(tmp_path / name))
         assert (told["clips"], told["left_out"]) == (4, [])
-
-
-def test_inside_a_dataset_its_own_folder_may_be_called_a_dot(toy_dataset, tmp_path, monkeypatch):
-    shutil.copytree(toy_dataset.root, tmp_path / "data")
-    monkeypatch.chdir(tmp_path / "data")
-    assert export_dataset(".", "tum", clips=[BRAKING])["folder"] == str(tmp_path / "data-tum")
 
 
 def test_a_clip_that_does_not_exist_names_those_that_come_near(toy_dataset):

@@ -12,7 +12,6 @@ import pytest
 from catalogs.entries import entry_names, load
 from flows.exporting.fmu import write_fmu
 from manifests.provenance import SOURCE_ROOT
-from reference_pages.fmu import write_input_table
 from tasks.errors import InputError
 from tasks.surface.road_profile import FLAT_ROAD, RoadHazard, road_elevation, road_slope
 from tasks.surface.state import SurfaceState
@@ -20,9 +19,8 @@ from tasks.surface.weather import Weather, surface_state
 from tasks.vehicle.brake import BrakeCommand, compute_brake_pressure
 from tasks.vehicle.model.brake_input import make_trace_input
 from tasks.vehicle.model.chassis import Conditions
-from tasks.vehicle.model.embedded import STEP
 from tasks.vehicle.model.embedded_variables import INPUTS, OUTPUTS
-from tasks.vehicle.model.simulation import COLUMNS, Recording, simulate
+from tasks.vehicle.model.simulation import COLUMNS, INTERNAL_STEP_S, Recording, simulate
 from tasks.vehicle.parameters import compute_surface_response
 from tasks.vehicle.rollout import Controls, simulate_scenario
 from tests.flows.exporting.fmu_car import Car
@@ -82,6 +80,7 @@ def drive(fmu, tmp_path):
 def test_fmpy_finds_nothing_wrong_and_each_variable_has_its_unit(fmu):
     assert validate_fmu(str(fmu)) == []
     variables = fmpy.read_model_description(str(fmu)).modelVariables
+    assert {v.type for v in variables} == {"Real", "Integer", "Boolean"}, "all that plain importers know"
     units = {v.name: v.unit for v in variables}
     assert [*units] == [row.name for row in (*INPUTS, *OUTPUTS)] and len({*units}) == len(variables)
     assert (units["speed"], units["brake_torque_f"], units["snow_depth"]) == ("m/s", "N.m", "mm")
@@ -115,10 +114,10 @@ def test_a_stop_on_snow_is_the_own_rollout(drive, vehicle, hazard):
     rows = [car.read_row()]
     for n in range(3000):
         car.set_inputs(
-            brake_pressure=compute_brake_pressure((n + 1) * STEP - 0.2, command.profile),
+            brake_pressure=compute_brake_pressure((n + 1) * INTERNAL_STEP_S - 0.2, command.profile),
             hold_speed=int(n < 400),
         )
-        car.take_step(STEP)
+        car.take_step(INTERNAL_STEP_S)
         if n % 2:
             rows.append(car.read_row())
     assert own.columns["speed"][-1] < 7.0
@@ -147,8 +146,8 @@ def test_a_storm_that_grips_by_speed_is_the_own_rollout(drive, vehicle):
     for by_speed in (1, 0):
         car = drive(initial_speed=28.0, wet_friction_by_speed=by_speed, **wet)
         for n in range(2000):
-            car.set_inputs(brake_pressure=compute_brake_pressure((n + 1) * STEP, command.profile))
-            car.take_step(STEP)
+            car.set_inputs(brake_pressure=compute_brake_pressure((n + 1) * INTERNAL_STEP_S, command.profile))
+            car.take_step(INTERNAL_STEP_S)
         ends.append(car.read_row()[COLUMNS.index("speed")])
     assert ends[0] == pytest.approx(own.columns["speed"][-1], abs=1e-6) and ends[1] < ends[0] - 0.3
 
@@ -167,7 +166,7 @@ def test_held_inputs_give_the_same_at_any_step_and_equal_a_trace_that_holds_them
     np.testing.assert_array_equal(runs[0.001], runs[0.01])
     trace = np.concatenate([[0.0], np.repeat(pressures, 20)])
     own = simulate(
-        vehicle, compute_surface_response(vehicle, "snow", 0.3), make_trace_input(trace, STEP),
+        vehicle, compute_surface_response(vehicle, "snow", 0.3), make_trace_input(trace, INTERNAL_STEP_S),
         Conditions(snow_depth_mm=12.0), Recording(samples=len(pressures) + 1, interval=0.01, substeps=20),
         initial_speed=15.0,
     )  # fmt: skip
@@ -230,15 +229,9 @@ def test_a_kept_state_is_gone_back_to_and_a_reset_begins_anew(drive):
             "road_friction must be a number within 0.01 to 2; it is 0",
         ),
         (
-            lambda car: car.set_inputs(brake_pressure=float("nan")),
-            "brake_pressure must be a number within 0 to 50; it is",
-        ),
-        (lambda car: car.set_inputs(engine_torque=float("inf")), "engine_torque must be a number"),
-        (
             lambda car: car.set_inputs(initial_speed=30.0),
             "initial_speed is a parameter: it is set before the start",
         ),
-        (lambda car: car.set_inputs(speed=30.0), "only parameters and inputs are set"),
     ],
 )
 def test_what_is_wrong_is_an_error_with_a_sentence_and_the_drive_goes_on(drive, act, sentence):
@@ -263,13 +256,6 @@ def test_the_example_of_the_page_stops_on_snow(fmu, monkeypatch, capsys):
     exec(compile(example, "page", "exec"), {})  # noqa: S102
     speed, pitch = map(float, re.findall(r"[\d.]+", capsys.readouterr().out))
     assert 2.0 < speed < 8.0 and 0.3 < pitch < 3.0
-
-
-def test_the_weather_of_the_unit_is_the_choice_that_the_page_shows(fmu):
-    (weather,) = [v for v in fmpy.read_model_description(str(fmu)).modelVariables if v.name == "weather"]
-    assert (weather.type, weather.min, weather.max) == ("Integer", "1", "4")
-    codes = weather.description.partition(": ")[2]
-    assert codes == "1 dry, 2 rain, 3 snow, 4 ice" and f"| {codes} |" in write_input_table()
 
 
 def test_all_that_is_wrong_with_the_command_is_told_at_once(tmp_path, monkeypatch, capsys):
@@ -302,8 +288,9 @@ def test_every_vehicle_of_the_catalogue_stops_in_every_weather_as_in_its_own_rol
         for _ in range(300):
             car.take_step(0.01)
         own = simulate(
-            vehicle, compute_surface_response(vehicle, weather, 0.37), make_trace_input(np.array([2.0]), STEP),
-            Conditions(), Recording(samples=2, interval=3.0, substeps=6000), initial_speed=20.0,
+            vehicle, compute_surface_response(vehicle, weather, 0.37),
+            make_trace_input(np.array([2.0]), INTERNAL_STEP_S), Conditions(),
+            Recording(samples=2, interval=3.0, substeps=6000), initial_speed=20.0,
         )  # fmt: skip
         np.testing.assert_allclose(car.read_row(), own.history[1], rtol=1e-9, atol=1e-9)
         car.slave.freeInstance()

@@ -68,11 +68,6 @@ def test_episodes_stand_in_the_order_of_splits_and_each_split_has_its_range():
     assert describe_splits(ordered) == {"val": "0:2", "train": "2:4", "test": "4:5"}
 
 
-def test_episodes_of_a_grid_without_splits_are_all_for_training(export):
-    info = json.loads((export("lerobot") / "meta/info.json").read_text())
-    assert info["splits"] == {"train": "0:2"}
-
-
 @pytest.fixture
 def traced(monkeypatch) -> set[str]:
     """Names of columns that every clip is made not to know, as those of a reference trace."""

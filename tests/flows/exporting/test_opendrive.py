@@ -7,19 +7,12 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from catalogs.scenes import find_recipe
-from catalogs.scenes.street import STREET_FILE, load_street_layout
+from catalogs.scenes.opendrive import find_street, format_opendrive
 from catalogs.street_names import KINDS
-from flows.exporting.opendrive import format_opendrive
 from tasks.errors import InputError
 from tasks.scene.street.bend import integrate_course, lay_route
 
 STREETS = ("street", "hill", *(f"{kind}-3" for kind in KINDS))
-
-
-def layout_of(name: str):
-    changes, seed = find_recipe(name)
-    return load_street_layout(STREET_FILE, *changes, seed=seed)
 
 
 def parse(text: str) -> ET.Element:
@@ -45,7 +38,7 @@ def walk(text: str, step: float = 0.05) -> np.ndarray:
 
 @pytest.mark.parametrize("name", STREETS)
 def test_the_reference_line_is_the_route_in_plan_and_height(name):
-    layout = layout_of(name)
+    layout = find_street(name)
     text = format_opendrive(layout, name)
     route = lay_route(layout, integrate_course(layout)).T_world_rig[:, :3, 3]
     points = walk(text)
@@ -65,7 +58,7 @@ def test_the_reference_line_is_the_route_in_plan_and_height(name):
 
 
 def test_pieces_follow_each_other_without_a_step():
-    text = format_opendrive(layout_of("country-3"), "country-3")
+    text = format_opendrive(find_street("country-3"), "country-3")
     pieces = [
         {key: float(value) for key, value in row.attrib.items()} for row in parse(text).iter("geometry")
     ]
@@ -75,7 +68,7 @@ def test_pieces_follow_each_other_without_a_step():
 
 
 def test_lanes_reach_from_kerb_to_kerb():
-    layout = layout_of("town-3")
+    layout = find_street("town-3")
     road = parse(format_opendrive(layout, "town-3")).find("road")
     offset = float(road.find("lanes/laneOffset").get("a"))
     widths = {
@@ -96,7 +89,7 @@ def test_a_cloud_has_no_lanes_to_export(toy_dataset, tmp_path):
 
 def test_scenariogeneration_reads_the_road(tmp_path):
     xodr = pytest.importorskip("scenariogeneration.xodr", reason="pip install scenariogeneration")
-    layout = layout_of("country-3")
+    layout = find_street("country-3")
     road = parse(format_opendrive(layout, "country-3")).find("road")
     spirals = [piece for piece in road.iter("geometry") if piece[0].tag == "spiral"]
     assert spirals
@@ -114,7 +107,7 @@ def test_asam_s_checker_finds_no_error(tmp_path):
     pytest.importorskip("qc_opendrive", reason="pip install asam-qc-opendrive")
     for name in STREETS:
         file = tmp_path / f"{name}.xodr"
-        file.write_text(format_opendrive(layout_of(name), name))
+        file.write_text(format_opendrive(find_street(name), name))
         settings = tmp_path / "config.xml"
         settings.write_text(
             f'<?xml version="1.0"?><Config><Param name="InputFile" value="{file}"/>'

@@ -11,11 +11,11 @@ import musync
 from catalogs.entries import load
 from flows.auditing.audit import audit_dataset
 from flows.exporting.export import export_dataset
-from flows.judging.judged_clip import View
 from flows.making import gate
 from flows.making.catalogue import catalogue_of
 from flows.making.generate import generate_dataset
 from flows.store.layout import Layout
+from studies.evaluation.judged_clip import View
 from tasks.errors import InputError
 from tests.toy_street import write_toy_grid
 

@@ -1,19 +1,15 @@
 """Telemetry has a length of its own: to the stop, while the frames stay as asked and stay on their ticks."""
 
-import json
-
 import numpy as np
 import pytest
 
 from catalogs.entries import entry_names, load
 from catalogs.grids import GridFile
 from flows.auditing.explain import explain_frame
-from flows.judging.physics import audit_physics, clip_columns, clip_facts
+from flows.auditing.physics import audit_physics, clip_columns, clip_facts
 from flows.making.driving import simulate_drive
 from flows.making.generate import generate_dataset
 from flows.making.plan import make_plan
-from flows.store.sealed import check_manifest
-from tasks.errors import InputError
 from tests.toy_street import write_toy_grid
 
 GRID = """
@@ -72,17 +68,6 @@ def test_the_papers_bump_lifts_wheels_and_every_answer_says_so(dataset):
     told = explain_frame(str(dataset), "bump", 2)
     assert told["wheel_lift_time_r"] == bump["wheel_lift_time_r"]
     assert explain_frame(str(dataset), "stop", 2)["wheel_lift_time_r"] == 0
-
-
-def test_a_dataset_without_the_new_labels_is_read_as_before(dataset, tmp_path):
-    """Older manifests have no lift times; their form is sound, and a wrong key is still refused."""
-    manifest = json.loads((dataset / "manifest.json").read_text())
-    for clip in manifest["clips"]:
-        del clip["figures"]["wheel_lift_time_f"], clip["figures"]["wheel_lift_time_r"]
-    assert len(check_manifest(manifest, "old")["clips"]) == 2
-    del manifest["clips"][0]["figures"]["peak_pitch"]
-    with pytest.raises(InputError, match="peak_pitch"):
-        check_manifest(manifest, "old")
 
 
 @pytest.mark.parametrize("name", entry_names("grid"))

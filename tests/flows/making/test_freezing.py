@@ -7,8 +7,8 @@ from typer.testing import CliRunner
 
 import flows.making.freezing
 from catalogs.entries import find_entry, load
+from flows.auditing.physics import audit_physics
 from flows.cli import app
-from flows.judging.physics import audit_physics
 from flows.making.freezing import (
     freeze_run,
     frozen_run,
@@ -189,11 +189,6 @@ def test_a_steady_run_says_so_and_is_made_again_steady(small, tmp_path):
 def test_generate_takes_a_grid_or_a_manifest(arguments, tmp_path):
     answer = CliRunner().invoke(app, ["generate", *arguments, "--out", str(tmp_path / "data")])
     assert isinstance(answer.exception, InputError)
-
-
-def test_an_unknown_manifest_lists_those_that_ship():
-    with pytest.raises(InputError, match="multibody-held-out"):
-        read_frozen("nowhere")
 
 
 def test_a_users_file_that_is_no_frozen_run_is_not_written_over(tmp_path):

@@ -4,11 +4,11 @@ import json
 
 import numpy as np
 import pytest
+from flows.judging.physics import clip_facts
 
 from catalogs.scenes import write_scene
 from flows.auditing.audit import audit_dataset
 from flows.exporting.export import export_dataset
-from flows.judging.physics import clip_facts
 from flows.making.catalogue import catalogue_of
 from flows.making.generate import generate_dataset
 from flows.making.plan import make_plan, read_plan

@@ -9,15 +9,15 @@ import pytest
 import musync
 from flows.auditing.audit import audit_dataset
 from flows.auditing.explain import explain_frame
+from flows.auditing.physics import audit_physics
 from flows.auditing.repair import repair_dataset
 from flows.auditing.verify import verify_dataset
-from flows.judging.physics import audit_physics
 from flows.making.generate import generate_dataset
-from flows.making.plan import make_plan, read_plan
+from flows.making.plan import make_plan
 from flows.reading.describe import describe_dataset
 from flows.reading.previews import make_films
 from flows.reading.query import query_dataset
-from flows.store.layout import Layout, write_json
+from flows.store.layout import Layout
 from tasks.errors import InputError
 
 
@@ -89,12 +89,6 @@ def test_the_default_runner_freezes_the_manifest_that_threads_do(toy_dataset, ba
     alone = generate_dataset(grid, str(tmp_path / "default"), pictures=False, workers=2).layout
     assert alone.manifest.read_bytes() == bare.manifest.read_bytes()
     assert alone.plan.read_bytes() == bare.plan.read_bytes()
-
-
-def test_a_plan_is_written_as_json_of_the_whole(bare, tmp_path):
-    plan = read_plan(bare.root)
-    write_json(tmp_path / "plan.json", plan.as_json())
-    assert b"".join(plan.file_pieces()) == (tmp_path / "plan.json").read_bytes() == bare.plan.read_bytes()
 
 
 def test_a_clip_that_drives_off_its_route_is_named(toy_dataset, tmp_path):

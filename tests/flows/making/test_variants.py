@@ -13,23 +13,21 @@ from catalogs.grids import FaultyGrid, GridFile
 from catalogs.scenes import write_scene
 from flows.auditing.audit import audit_dataset
 from flows.auditing.explain import explain_frame
+from flows.auditing.physics import audit_physics, clip_columns, clip_facts
 from flows.auditing.repair import repair_dataset
 from flows.exporting.export import export_dataset
-from flows.judging.physics import audit_physics, clip_columns, clip_facts
 from flows.making.catalogue import Catalogue, catalogue_of
 from flows.making.driving import simulate_drive
 from flows.making.freezing import frozen_run, problems_of
 from flows.making.generate import generate_dataset
 from flows.making.plan import freeze_grid, read_plan
-from flows.making.replay import replay_audit
 from flows.making.summaries import SUMMARIES
 from flows.reading.describe import describe_dataset, validate_grid
 from flows.reading.report import summarise_run
 from flows.store.frames import read_clip
 from flows.store.sealed import read_manifest
 from manifests.explain import find_input_differences
-from studies.lineage.driven_lines import Asked, drive_clip, is_driven, move_lines
-from studies.lineage.kept_lines import list_lines
+from studies.paper.replay import replay_audit
 from tasks.errors import InputError
 from tests.toy_street import TOY_CAMERA, toy_street
 
@@ -187,26 +185,6 @@ def test_the_summaries_of_a_cut_dataset_are_repaired_byte_for_byte(made, variant
         (root / path).unlink()
     assert repair_dataset(str(root), runner="threads", workers=1)["repaired"]
     assert {path: (root / path).read_bytes() for path in SUMMARIES} == before
-
-
-def test_lineage_drives_the_variant_and_finds_its_rates(made):
-    layout = made["fixed-mu"]
-    plan, kept = (
-        read_plan(layout.root),
-        {name: (layout.inputs / name).read_bytes() for name in read_manifest(layout)["inputs"]},
-    )
-    asked = Asked(
-        scenario=plan.clips[1].scenario,
-        mode="paper",
-        variant="fixed-mu",
-        duration_s=6.0,
-        route=toy_street().route,
-    )
-    drive = drive_clip(asked, Catalogue(layout.inputs))
-    np.testing.assert_array_equal(drive.numbers["pitch"], ticks_of(layout, 1)["pitch"])
-    lines = [line for line in list_lines("ablation.yaml", kept["ablation.yaml"]) if "rain" in line.place]
-    (moved,) = move_lines(asked, kept, [line for line in lines if is_driven(line)], drive)
-    assert "surface_friction" in moved.columns and "film_depth_mm" not in moved.columns
 
 
 @pytest.mark.parametrize("variant", CUTS)

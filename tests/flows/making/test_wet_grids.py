@@ -4,11 +4,10 @@ import pytest
 
 from catalogs.entries import load
 from flows.auditing.explain import explain_frame
-from flows.judging.physics import audit_physics
+from flows.auditing.physics import audit_physics
 from flows.making.generate import generate_dataset
 from flows.making.plan import make_plan
 from flows.store.sealed import read_manifest, recorded_grid
-from studies.lineage.trace import trace_lineage
 from tests.toy_street import write_toy_grid
 
 GRID = """
@@ -39,14 +38,6 @@ def test_a_coupled_dataset_grips_by_speed_and_every_stored_number_follows(storm)
         told = explain_frame(str(storm.root), "storm", frame)
         assert told["agrees"], [step for step in told["steps"] if not step["agrees"]]
     assert audit_physics(str(storm.root), out=str(storm.root.parent))["verified"]
-
-
-def test_its_numbers_rest_on_the_lines_of_the_law(storm):
-    lines = {line["key"]: line for line in trace_lineage(str(storm.root), "storm")["lines"]
-             if line["file"] == "wet_friction.yaml"}  # fmt: skip
-    assert (
-        "tyre_force_f" in lines["decay_speed"]["moves"] and "surface_friction" in lines["friction"]["moves"]
-    )
 
 
 def test_the_law_decides_the_ids_and_a_record_without_it_means_the_papers(tmp_path):

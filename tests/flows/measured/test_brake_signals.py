@@ -48,33 +48,3 @@ def test_a_campaign_without_any_brake_signal_is_told_which_would_do(tmp_path: Pa
         InputError, match="brake_pressure, brake_command, brake_torque, pedal_force is enough"
     ):
         read_campaign(tmp_path / "campaign")
-
-
-def test_an_import_warns_of_a_brake_switch_that_is_mapped_as_a_command(tmp_path: Path) -> None:
-    columns = log_signal(braking_columns())
-    columns["pressed"] = (columns.pop("p_bar") > 2.0).astype(float)
-    pd.DataFrame(columns).to_csv(tmp_path / "log.csv", index=False)
-    content = yaml.safe_load(MAP)
-    del content["channels"]["brake_pressure"]
-    content["channels"]["brake_command"] = {"source": "pressed", "unit": "1"}
-    (tmp_path / "map.yaml").write_text(yaml.safe_dump(content | {"not_measured": ["brake_pressure"]}))
-    report = import_measurements(
-        str(tmp_path / "log.csv"), map=str(tmp_path / "map.yaml"), out=str(tmp_path / "campaign")
-    )
-    (warning,) = report["warnings"]
-    assert "brake_command has the values 0 and 1 alone" in warning
-
-
-def test_a_dead_pressure_of_a_list_is_named(tmp_path: Path) -> None:
-    content = yaml.safe_load(MAP)
-    content["channels"]["brake_pressure"]["source"] = ["p_bar", "p_rear"]
-    columns = log_signal(braking_columns())
-    columns["p_rear"] = 0.0 * columns["p_bar"]
-    pd.DataFrame(columns).to_csv(tmp_path / "log.csv", index=False)
-    (tmp_path / "map.yaml").write_text(yaml.safe_dump(content))
-    with pytest.raises(
-        InputError, match="channel brake_pressure: its signal p_rear is dead: it stays at 0 MPa"
-    ):
-        import_measurements(
-            str(tmp_path / "log.csv"), map=str(tmp_path / "map.yaml"), out=str(tmp_path / "campaign")
-        )

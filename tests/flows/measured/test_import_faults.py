@@ -56,26 +56,16 @@ def _held(x: np.ndarray) -> np.ndarray:
     ("signal", "damage", "words"),
     [
         ("v_kmh", lambda x: x / 3.6, "wheel_speed_front give a rolling radius"),
-        ("v_kmh", lambda x: x * 10, "channel speed reaches"),
         ("ax_g", lambda x: x * 9.81, "taken as g, it looks like m/s^2"),
         ("ax_g", lambda x: 1.0 + 0.01 * np.sin(np.arange(len(x))), "m/s^2 off on average, which no road"),
-        ("ax_g", lambda x: -x, "the rate of speed: turn its sign over"),
         ("p_bar", lambda x: x * 100, "channel brake_pressure reaches"),
-        ("p_bar", lambda x: x / 10, "brake_pressure gives 15"),
-        ("p_bar", lambda x: -x, "brake_pressure falls to"),
         ("pitch_up", lambda x: -x, "of deceleration, which must lie in 0.02 to 2: turn its sign over"),
-        ("pitch_up", lambda x: np.degrees(x), "channel pitch reaches"),
         ("pitch_rate_up", lambda x: -x, "the slope of pitch: turn its sign over"),
-        ("pitch_rate_up", lambda x: np.degrees(x), "pitch_rate"),
         ("az", lambda x: x - 9.81, "must exclude gravity"),
-        ("w_r", lambda x: -x, "to 0.6: turn the sign of the wheel over"),
-        ("w_r", lambda x: 3.6 * 0.32 * x, "(one looks like km/h)"),
         ("pitch_up", _held, "pitch: is frozen: it holds"),
-        ("v_kmh", _held, "speed: is frozen: it holds"),
         ("p_bar", lambda x: np.where(np.arange(len(x)) < 300, x, np.nan), "brake_pressure: has samples from"),
         ("az", lambda x: np.where(np.arange(len(x)) == 90, np.inf, x), "vertical_acceleration: has 1 samples"),
         ("t_ms", lambda x: x + 700.0 * (np.arange(len(x)) > 100), "gaps or forward jumps of its clock"),
-        ("t_ms", lambda x: x - 300.0 * (np.arange(len(x)) > 100), "clock that does not advance"),
         ("w_fl", lambda x: np.where((np.arange(len(x)) // 80) == 1, np.nan, x), "wheel_speed_front: has gaps"),
     ],
 )  # fmt: skip
@@ -87,21 +77,6 @@ def test_what_is_wrong_is_named_with_run_and_channel(
     text = problems_of(tmp_path, log)
     assert words in text
     assert all(line.startswith("log (log.csv): ") or "braking of log" in line for line in text.splitlines())
-
-
-def test_a_run_in_which_the_car_crawls_is_named(tmp_path: Path) -> None:
-    log = log_signal(braking_columns())
-    log["v_kmh"] = 3.6 + 0.001 * log["v_kmh"]
-    assert "log (log.csv): channel speed must stay at or above 2 m/s for 20 samples" in problems_of(
-        tmp_path, log
-    )
-
-
-def test_a_log_too_slow_for_its_window_is_told_how_long_a_run_must_be(tmp_path: Path) -> None:
-    slow = {name: values[::100] for name, values in log_signal(braking_columns()).items()}
-    assert "a run needs 20, which take 20 s: widen its window, log faster" in problems_of(
-        tmp_path, slow, sample_rate_hz=1
-    )
 
 
 def test_all_problems_come_at_once(tmp_path: Path) -> None:
@@ -132,17 +107,6 @@ def test_no_campaign_has_more_samples_than_were_measured(tmp_path: Path, rate: f
         assert "must not be above the rate of the fastest signal, 100 Hz" in problems_of(
             tmp_path, log, sample_rate_hz=rate
         )
-
-
-def test_a_gauge_that_does_not_rest_at_0_is_told_with_its_offset(tmp_path: Path) -> None:
-    runs = [{"name": name, "file": "log.csv"} for name in ("a", "b")]
-    log = log_signal(braking_columns())
-    write_csv(tmp_path / "log.csv", log | {"p_bar": log["p_bar"] + 0.8})
-    write_csv(tmp_path / "other.csv", log)
-    for second, told in (("log.csv", "rests at 0.079 MPa"), ("other.csv", "set the gauge to zero")):
-        channel_map = write_map(tmp_path, runs=[runs[0], runs[1] | {"file": second}])
-        report = import_measurements(str(tmp_path), map=channel_map, out=str(tmp_path / second[:-4]))
-        assert len(report["warnings"]) == 1 and told in report["warnings"][0]
 
 
 def test_an_acceleration_that_is_the_rate_of_the_speed_is_left_out_and_told(tmp_path: Path) -> None:
@@ -196,12 +160,7 @@ def test_a_standing_car_does_not_freeze_its_sensors(tmp_path: Path) -> None:
             {"tolerances_1sigma": TOLERANCES | {"mass": 5}},
             "mass: must be a share of at most 1, not per cent; it is 5",
         ),
-        ({"tolerances_1sigma": TOLERANCES | {"grade": 1.5}}, "grade: must be a share of at most 1"),
         ({"channels": {"speed": {"source": "v", "unit": "m/s", "scale": 0}}}, "speed.scale: must not be 0"),
-        (
-            {"channels": {"speed": {"source": "v", "unit": "m/s", "delay_s": 50}}},
-            "at most 2 either way; it is 50",
-        ),
         (
             {"channels": {"speed": {"source": "v", "unit": "m/s", "delay_s": -20}}},
             "must be a delay in seconds",
@@ -215,28 +174,11 @@ def test_a_standing_car_does_not_freeze_its_sensors(tmp_path: Path) -> None:
             "signal w must be one measurement; it stands for wheel_speed_front, wheel_speed_rear",
         ),
         (
-            {"channels": {"wheel_speed_front": {"source": ["w", "w"], "unit": "rpm"}}},
-            "signal w must be one measurement; it stands for wheel_speed_front, wheel_speed_front",
-        ),
-        (
             {"channels": {"wheel_speed_rear": {"source": "w", "unit": "km/h"}}},
             "give the source's true unit, or a gain, here of the value 1/(3.6 x radius)",
         ),
-        (
-            {"channels": {"wheel_speed_rear": {"source": "w", "unit": "mph"}}},
-            "or a gain, here of the value 0.447/radius",
-        ),
         ({"conditions": {"weather": "rain"}}, "conditions: weather rain needs precipitation_mm_h above 0"),
-        ({"conditions": {"precipitation_mm_h": 25.0}}, "conditions: weather dry has no precipitation"),
-        (
-            {"conditions": {"weather": "rain", "precipitation_mm_h": -1.0}},
-            "precipitation_mm_h must not be negative",
-        ),
         ({"conditions": {"hazard_height_m": 0.1}}, "needs hazard_length_m above 0"),
-        (
-            {"runs": [{"name": "a", "file": "log.csv", "conditions": {"weather": "snow"}}]},
-            "runs: run a: weather snow needs precipitation_mm_h above 0",
-        ),
         ({"runs": [{"name": "../a", "file": "log.csv"}]}, "runs.0.name"),
     ],
 )
@@ -244,7 +186,7 @@ def test_a_faulty_map_is_named_by_its_key(tmp_path: Path, changes: dict[str, obj
     assert words in problems_of(tmp_path, log_signal(braking_columns()), **changes)
 
 
-@pytest.mark.parametrize("file", ["../log.csv", "/etc/passwd", "..", "a\x00b", ""])
+@pytest.mark.parametrize("file", ["../log.csv", "/etc/passwd", ""])
 def test_a_run_stays_in_the_folder_of_the_measurements(tmp_path: Path, file: str) -> None:
     text = problems_of(tmp_path, log_signal(braking_columns()), runs=[{"name": "a", "file": file}])
     assert "runs.0.file: must be a file in the folder" in text or "runs.0.file: String should have" in text
@@ -279,32 +221,15 @@ def test_a_clock_that_would_fill_the_memory_is_refused(tmp_path: Path) -> None:
     assert "run log must have at most 20000000 samples; at" in problems_of(tmp_path, log)
 
 
-def test_a_folder_with_other_files_is_left_alone(tmp_path: Path) -> None:
-    source = write_csv(tmp_path / "log.csv", log_signal(braking_columns()))
-    with pytest.raises(InputError, match="new or empty folder"):
-        import_measurements(source, map=write_map(tmp_path), out=str(tmp_path))
-
-
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("log.parquet", "must be a Parquet file of numbers"),
-        ("log.mf4", "must be a readable MDF file"),
-        ("log.json", "must be valid JSON"),
-        ("log.xlsx", "measurements must be of .csv"),
-    ],
-)
-def test_a_damaged_or_foreign_file_is_one_sentence(tmp_path: Path, name: str, words: str) -> None:
-    if name.endswith("mf4"):
-        pytest.importorskip("asammdf", reason="reading MDF4 needs asammdf")
-    (tmp_path / name).write_bytes(b"\x00\x01 not what it says")
-    with pytest.raises(InputError, match=words):
-        import_measurements(str(tmp_path / name), map=write_map(tmp_path), out=str(tmp_path / "out"))
-
-
 def test_text_in_a_number_column_is_named(tmp_path: Path) -> None:
     log: dict[str, object] = dict(log_signal(braking_columns()))
     log["v_kmh"] = ["fast"] * len(braking_columns()["time"])
     pd.DataFrame(log).to_csv(tmp_path / "log.csv", index=False)
     with pytest.raises(InputError, match="signal v_kmh must be of numbers"):
         import_measurements(str(tmp_path / "log.csv"), map=write_map(tmp_path), out=str(tmp_path / "out"))
+
+
+def test_a_folder_with_other_files_is_left_alone(tmp_path: Path) -> None:
+    source = write_csv(tmp_path / "log.csv", log_signal(braking_columns()))
+    with pytest.raises(InputError, match="new or empty folder"):
+        import_measurements(source, map=write_map(tmp_path), out=str(tmp_path))

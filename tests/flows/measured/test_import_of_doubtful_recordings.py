@@ -91,10 +91,3 @@ def test_a_log_of_a_time_of_day_is_imported_by_its_unit_and_told_without_it(tmp_
     found = import_columns(tmp_path, source, time={"source": "time", "unit": "HHMMSS"})
     assert len(found["speed"]) > 390
     np.testing.assert_allclose(found["speed"], braking_columns()["speed"][: len(found["speed"])], atol=1e-6)
-
-
-def test_what_is_no_time_of_day_is_refused_as_one(tmp_path: Path) -> None:
-    text = problems_of(tmp_path, log_signal(braking_columns()), time={"source": "t_ms", "unit": "HHMMSS"})
-    assert (
-        "log.csv: clock t_ms must be in HHMMSS, with minutes and seconds below 60; it reads 0 to 4000" in text
-    )

@@ -10,7 +10,7 @@ import yaml
 
 from catalogs.campaigns import read_campaign
 from catalogs.channel_maps.tolerances import RunTolerances, Tolerances
-from catalogs.entries import entry_names, load
+from catalogs.entries import load
 from flows.commands.measured import shorten_import
 from flows.measured.importing import import_measurements
 from tasks.campaign.campaign import CHANNELS
@@ -106,19 +106,6 @@ def test_a_map_says_whether_the_speed_is_that_of_the_wheels(tmp_path: Path, sour
     assert {run.speed_of_wheels for run in read_campaign(tmp_path / "campaign").runs} == {source == "wheels"}
 
 
-def test_files_of_one_name_in_two_folders_are_told_apart(tmp_path: Path) -> None:
-    for day, seconds in (("monday", 3.0), ("tuesday", 4.0)):
-        (tmp_path / "logs" / day).mkdir(parents=True)
-        write_csv(tmp_path / "logs" / day / "log.csv", log_signal(braking_columns(seconds)))
-    runs = [{"name": day, "file": f"{day}/log.csv"} for day in ("monday", "tuesday")]
-    report = import_measurements(
-        str(tmp_path / "logs"), map=write_map(tmp_path, runs=runs), out=str(tmp_path / "campaign")
-    )
-    assert [run["duration_s"] for run in report["runs"]] == pytest.approx([3.0, 4.0], abs=0.1)
-    assert set(report["sources"]) == {"monday/log.csv", "tuesday/log.csv"}
-    assert "monday/log" in (tmp_path / "campaign" / "runs.csv").read_text()
-
-
 @pytest.mark.parametrize("other", ["day1/stop.csv", "Lap [3].csv"])
 def test_a_run_is_of_the_file_that_its_path_names(tmp_path: Path, other: str) -> None:
     """No pattern: `stop.csv` is not the file of that name in a folder, and brackets are letters."""
@@ -132,16 +119,6 @@ def test_a_run_is_of_the_file_that_its_path_names(tmp_path: Path, other: str) ->
     )
     assert [run["file"] for run in report["runs"]] == list(files)
     assert [run["duration_s"] for run in report["runs"]] == pytest.approx([3.0, 4.0], abs=0.1)
-
-
-def test_what_stands_for_the_pressure_has_no_scale_to_be_checked(tmp_path: Path) -> None:
-    content = yaml.safe_load(MAP)["channels"]
-    content["brake_pressure"] |= {"gain": {"value": 100.0, "unit": "MPa", "source": "declared"}}
-    write_csv(tmp_path / "log.csv", log_signal(braking_columns()))
-    channel_map = write_map(tmp_path, runs=[{"name": "r0", "file": "log.csv"}], channels=content)
-    import_measurements(str(tmp_path / "log.csv"), map=channel_map, out=str(tmp_path / "out"))
-    table = pd.read_parquet(tmp_path / "out" / "runs" / "r0.parquet")
-    assert table["brake_pressure"].max() > 1000.0
 
 
 def test_a_window_of_a_late_channel_is_cut_where_it_was_measured(tmp_path: Path) -> None:
@@ -181,11 +158,6 @@ def test_conditions_of_a_run_complete_the_common_ones(tmp_path: Path) -> None:
     assert "rain,25.0" in (tmp_path / "campaign" / "runs.csv").read_text()
 
 
-def test_every_map_that_ships_can_be_read() -> None:
-    names = entry_names("channel map")
-    assert names and all(load("channel map", name)[0].channels for name in names)
-
-
 def test_the_measured_sets_come_in_through_their_maps(tmp_path: Path, outside_data: Path) -> None:
     measured = outside_data / "measured"
     if not (measured / "bmw_m8").is_dir():
@@ -223,13 +195,6 @@ def test_tolerances_that_a_map_leaves_open_are_assumed_and_told(
 def test_a_tolerance_is_assumed_of_every_number_of_a_session() -> None:
     numbers = {*Tolerances.model_fields, *RunTolerances.model_fields} - {"run"}
     assert set(load("set of assumed tolerances")) == numbers
-
-
-def test_the_terminal_tells_what_was_assumed_in_one_line() -> None:
-    told = {"pressure_gain": 0.3, "run.friction": 0.1}
-    brief = shorten_import({"campaign": "a", "assumed_tolerances_1sigma": told})
-    assert brief["assumed_tolerances_1sigma"] == "pressure_gain 0.3, run.friction 0.1"
-    assert shorten_import({"assumed_tolerances_1sigma": {}})["assumed_tolerances_1sigma"] == "none"
 
 
 def test_the_terminal_tells_the_times_of_a_clock_that_counts_from_1970() -> None:

@@ -5,14 +5,14 @@ from pathlib import Path
 import pytest
 
 from flows.measured.importing import import_measurements
-from flows.measured.readable_recordings import PlacedProblem, join_shared_problems
+from flows.measured.readable_recordings import RecordingProblem, join_shared_problems
 from tasks.errors import InputError
 from tests.campaign.recorded import braking_columns, log_signal
 from tests.flows.measured.recordings import map_beside, write_csv
 
 
-def find_place_problem(number: int, sentence: str) -> PlacedProblem:
-    return PlacedProblem(name=f"run-{number:02d}", place=f"run-{number:02d} (log.csv)", sentence=sentence)
+def find_place_problem(number: int, sentence: str) -> RecordingProblem:
+    return RecordingProblem(name=f"run-{number:02d}", origin=f"run-{number:02d} (log.csv)", sentence=sentence)
 
 
 def test_a_shared_fault_is_told_once_with_its_runs_and_the_range_of_its_figures() -> None:
@@ -52,7 +52,6 @@ def test_two_faults_of_one_run_stay_two() -> None:
     ("signal", "factor", "words"),
     [
         ("p_bar", 100.0, "in 4 of 4 runs (run-0, run-1, run-2, run-3): channel brake_pressure reaches 2"),
-        ("v_kmh", 0.001, "in 4 of 4 runs (run-0, run-1, run-2, run-3): channel speed must stay at or above 2 m/s"),
         ("w_r", 0.0, "in 4 of 4 files (run-0.csv, run-1.csv, run-2.csv, run-3.csv): signal w_r is missing"),
     ],
 )  # fmt: skip

@@ -99,17 +99,6 @@ def test_tables_need_no_map_but_have_no_rate_without_one(tmp_path):
     assert {row["signal"] for row in rows} == set(LOG) and {row["rate_hz"] for row in rows} == {None}
 
 
-def test_a_map_that_is_not_finished_is_enough(tmp_path):
-    write_logs(tmp_path)
-    half = {
-        "time": {"source": "t_ms", "unit": "ms"},
-        "channels": {"speed": {"source": "v_kmh", "unit": "km/h"}},
-    }
-    (tmp_path / "half.yaml").write_text(yaml.safe_dump(half))
-    result = import_measurements(str(tmp_path / "a.csv"), map=str(tmp_path / "half.yaml"), list_signals=True)
-    assert result["signals"]["a.csv"][1]["rate_hz"] == pytest.approx(100.0)
-
-
 def test_the_command_prints_a_table_for_each_recording(tmp_path, monkeypatch):
     monkeypatch.setenv("COLUMNS", "140")
     write_logs(tmp_path)
@@ -118,13 +107,6 @@ def test_the_command_prints_a_table_for_each_recording(tmp_path, monkeypatch):
     assert all(file in result.output for file in ("a.csv", "b.parquet", "c.json", "d.mat", "e.mcap"))
     assert "/v_kmh.data" in result.output and "0 to 4" in result.output
     assert list(tmp_path.glob("**/campaign.yaml")) == []
-
-
-def test_without_map_and_folder_the_command_says_what_it_needs(tmp_path):
-    write_logs(tmp_path)
-    for given in ({}, {"map": "bmw-m8"}, {"out": str(tmp_path / "out")}):
-        with pytest.raises(InputError, match="needs --map and --out, or --list-signals"):
-            import_measurements(str(tmp_path), **given)
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)

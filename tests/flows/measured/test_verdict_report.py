@@ -14,9 +14,9 @@ from flows.measured.closing import describe_search, verdict_json
 from flows.measured.residuals import predict_runs
 from flows.measured.verdict_figures import format_plain_unit, make_brake_curve
 from flows.measured.verdict_report import MISSED, find_next_steps, write_verdict_page
+from studies.closing_benchmark.synthetic import make_synthetic_campaign
 from tasks.campaign.campaign import Campaign
 from tasks.campaign.planned_runs import RunPlan
-from tasks.identification.benchmark import make_synthetic_campaign
 from tasks.identification.decision.verdict import Outcome, judge_runs
 from tests.browsers import find_barriers, open_chromium
 
@@ -191,18 +191,6 @@ def test_the_next_step_follows_from_the_verdict(
     steps = find_next_steps(facts(outcome, **more), replace(campaign, vehicle="a car; rm -r x"))
     assert [command.split()[1] for _, command in steps] == commands
     assert all("; rm" not in command or "'a car; rm -r x'" in command for _, command in steps)
-
-
-def test_runs_that_do_not_grip_as_the_mapping_says_ask_for_more_stops_at_the_limit(
-    judged: tuple[Outcome, Campaign],
-) -> None:
-    outcome, campaign = judged
-    nothing = facts(outcome, verdict="NOTHING", rivals=[], vehicle_file=None)
-    first = {
-        pull: find_next_steps(nothing | {"friction_pulls_sigma": {"run-1": pull}}, campaign)[0][0]
-        for pull in (-2.4, -2.6)
-    }
-    assert "runs that reach further" in first[-2.4] and "stops at the limit of friction" in first[-2.6]
 
 
 def test_the_page_fits_a_narrow_screen_fetches_nothing_and_keeps_nobody_out(

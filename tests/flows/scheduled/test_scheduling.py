@@ -14,7 +14,7 @@ from flows.running.failures import ClipsFailed
 from flows.scheduled.failure_report import report_failure
 from flows.scheduled.notification import notify_problem
 from flows.scheduled.prefect_schedule import watch_lateness
-from flows.scheduled.scheduling import checked_parameters, dataset_place, scheduled_run
+from flows.scheduled.scheduling import checked_parameters, choose_dataset, scheduled_run
 from flows.store.layout import Layout
 from tasks.errors import InputError
 
@@ -122,7 +122,7 @@ def test_an_unfinished_dataset_with_a_damaged_plan_is_left_alone(grid, tmp_path,
     damaged = tmp_path / "root" / "toy-20260228T030000Z"
     damaged.mkdir(parents=True)
     (damaged / "plan.json").write_text(plan)
-    assert dataset_place(grid, str(tmp_path / "root"), "auto", AT).endswith("toy-20260301T030000Z")
+    assert choose_dataset(grid, str(tmp_path / "root"), "auto", AT).endswith("toy-20260301T030000Z")
 
 
 def test_a_failure_is_posted_to_a_webhook(tmp_path):

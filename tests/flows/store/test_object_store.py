@@ -22,7 +22,7 @@ from flows.making.plan import make_plan
 from flows.reading.describe import describe_dataset
 from flows.reading.query import query_dataset
 from flows.scheduled.failure_report import report_failure
-from flows.scheduled.scheduling import checked_parameters, dataset_place, scheduled_run
+from flows.scheduled.scheduling import checked_parameters, choose_dataset, scheduled_run
 from flows.store.address import open_for_reading, open_for_writing, want_everything, want_progress
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
@@ -225,7 +225,7 @@ def test_a_schedule_writes_dated_datasets_to_a_store_resumes_there_and_reports_t
         prepare_dataset(layout, *make_plan(grid, "cpu"))
     run = scheduled_run(grid, root, at=at + timedelta(days=1), runner="threads", workers=1)
     assert (run["dataset"], run["made"]) == (f"{root}/toy-20260301T030000Z", 4)
-    assert dataset_place(grid, root, "cpu", at + timedelta(days=2)) == f"{root}/toy-20260303T030000Z"
+    assert choose_dataset(grid, root, "cpu", at + timedelta(days=2)) == f"{root}/toy-20260303T030000Z"
     report = report_failure("toy", root, at, RuntimeError("no luck"), None)
     assert report.is_relative_to(tmp_path)
     assert Objects(root).read("reports/20260301T030000Z.txt") == report.read_bytes()

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -36,24 +37,26 @@ def vehicle() -> Vehicle:
     return load("vehicle", "paper-reference")
 
 
+def write_traces(
+    folder: Path, car: Vehicle, mode: Mode, names: tuple[str, ...] = ("wet", "snowy"), noise: float = 1.0
+) -> Path:
+    """Write a folder of traces of a vehicle, with noise keyed by the case."""
+    (folder / "development").mkdir(parents=True)
+    rows = []
+    for number, name in enumerate(names):
+        row = {"case": name, "split": "development", "peak_pressure_mpa": 2.3, "brake_onset_s": 0.3}
+        row |= CONDITIONS[name]
+        rows.append(row)
+        pq.write_table(_trace(car, ReferenceCase.model_validate(row), mode, number, noise),
+                       folder / "development" / f"{name}.parquet")  # fmt: skip
+    (folder / "cases.json").write_text(json.dumps(rows))
+    return folder
+
+
 @pytest.fixture
 def make_traces(tmp_path: Path) -> Make:
-    """Write a folder of traces of a vehicle, with noise keyed by the case."""
-
-    def make(car: Vehicle, mode: Mode, names: tuple[str, ...] = ("wet", "snowy"), noise: float = 1.0) -> Path:
-        folder = tmp_path / "traces"
-        (folder / "development").mkdir(parents=True)
-        rows = []
-        for number, name in enumerate(names):
-            row = {"case": name, "split": "development", "peak_pressure_mpa": 2.3, "brake_onset_s": 0.3}
-            row |= CONDITIONS[name]
-            rows.append(row)
-            pq.write_table(_trace(car, ReferenceCase.model_validate(row), mode, number, noise),
-                           folder / "development" / f"{name}.parquet")  # fmt: skip
-        (folder / "cases.json").write_text(json.dumps(rows))
-        return folder
-
-    return make
+    """Return `write_traces` for a folder of the test."""
+    return partial(write_traces, tmp_path / "traces")
 
 
 def _trace(car: Vehicle, case: ReferenceCase, mode: Mode, number: int, noise: float) -> pa.Table:

@@ -14,7 +14,7 @@ from tasks.identification.calibration.identifiability import (
     summarise_information,
 )
 from tasks.identification.calibration.jacobian import build_smoothness_rows, compute_stage_jacobian
-from tasks.identification.calibration.scalars import list_calibration_scalars, read_scalar, set_scalars
+from tasks.identification.calibration.scalars import list_calibration_scalars, read_scalar
 from tasks.identification.calibration.staged import StageRecord, accept_jointly, compute_joint_loss, run_stage
 from tasks.identification.calibration.staged import calibrate_vehicle as run_stages
 
@@ -232,7 +232,3 @@ def test_the_same_traces_give_the_same_bytes(vehicle, make_traces, tmp_path):
 def _any_vehicle():
 
     return load("vehicle", "paper-reference")
-
-
-def test_with_scalars_of_nothing_is_the_vehicle(vehicle):
-    assert set_scalars(vehicle, {}) == vehicle

@@ -1,12 +1,11 @@
 """The double-track car obeys momentum, energy and statics; its tyre and controller do what they should."""
 
-from math import atan, pi, sin
+from math import pi
 
 import numpy as np
 import pytest
 
 from catalogs.entries import load
-from studies.double_track.brakes import BUILD, DUMP, HOLD, OFF, control_wheel
 from studies.double_track.car import Surroundings, build_car
 from studies.double_track.declared import find_surface, read_declared, read_vehicle, values_of
 from studies.double_track.drive import drive_run, start_state, wheel_slips
@@ -109,21 +108,6 @@ def test_braking_pitches_the_body_as_load_transfer_over_the_springs():
     assert y[-1, PITCH] == pytest.approx(pitch, rel=0.01)
 
 
-def test_locked_wheels_stop_in_v_squared_over_two_mu_g():
-    changes = {"load_exponent": 0.0, "coast": 0.0}
-    y, _, car = drive((20.0, 12.0, 6.0), abs_on=False, changes=changes)
-    surface = SURFACES[0]
-    locked = int(np.argmax((np.abs(y[:, TURN : TURN + 4]) < 0.5).all(axis=1)))
-    mu = magic_formula(
-        1.0, surface["peak"], surface["slip_stiffness"], surface["shape"], surface["curvature"]
-    )
-    distance = y[-1, STATION] - y[locked, STATION]
-    assert distance == pytest.approx(
-        (y[locked, SPEED] ** 2 - y[-1, SPEED] ** 2) / (2 * mu * car["gravity"]), rel=0.005
-    )
-    assert distance > 10.0
-
-
 def test_the_controller_cycles_about_the_target_and_uses_nearly_all_grip():
     y, _, car = drive((21.0, 2.4, 3.0), weather="rain", rate=10)
     surface = find_surface("rain", 10)
@@ -134,35 +118,6 @@ def test_the_controller_cycles_about_the_target_and_uses_nearly_all_grip():
     crossings = (np.diff(np.sign(slips - 1.0), axis=0) != 0).sum(axis=0)
     assert (crossings >= 8).all() and (crossings <= 60).all()
     assert 0.97 < used <= 1.0
-
-
-@pytest.mark.parametrize(
-    ("phase", "slip", "deceleration", "after"),
-    [
-        (OFF, 0.05, 5.0, OFF), (OFF, 0.14, 5.0, DUMP), (OFF, 0.11, 30.0, DUMP), (DUMP, 0.15, 5.0, DUMP),
-        (DUMP, 0.15, -5.0, HOLD), (HOLD, 0.12, -5.0, HOLD), (HOLD, 0.09, -5.0, BUILD), (BUILD, 0.09, 2.0, BUILD),
-        (BUILD, 0.14, 2.0, DUMP), (HOLD, 0.15, -1.0, HOLD),
-    ],
-)  # fmt: skip
-def test_valves_build_hold_and_dump(phase, slip, deceleration, after):
-    thresholds = values_of(read_declared("car")["abs"]) | {"target_slip": 0.1}
-    assert control_wheel(phase, slip, deceleration, thresholds) == after
-
-
-def test_the_tyre_is_pacejkas_curve():
-    """Slope B C D at zero, peak D, asymptote D sin(C pi / 2), odd (Pacejka 2012, ch. 4)."""
-    peak, shape, curvature, stiffness = 1.1, 1.65, -0.5, 20.0
-    friction = [magic_formula(x, peak, stiffness, shape, curvature) for x in np.linspace(0.0, 1.0, 20001)]
-    assert friction[1] / 5e-5 == pytest.approx(stiffness, rel=1e-4)
-    assert max(friction) == pytest.approx(peak, rel=1e-6)
-    assert magic_formula(1e9, peak, stiffness, shape, curvature) == pytest.approx(
-        peak * sin(shape * pi / 2), abs=1e-6
-    )
-    assert magic_formula(-0.07, peak, stiffness, shape, curvature) == -magic_formula(
-        0.07, peak, stiffness, shape, curvature
-    )
-    x = stiffness / (shape * peak) * 0.05
-    assert friction[1000] == pytest.approx(peak * sin(shape * atan(x - curvature * (x - atan(x)))), rel=1e-12)
 
 
 @pytest.mark.parametrize("slip", [0.01, 0.05, 0.12, 0.6])

@@ -3,7 +3,7 @@
 import pytest
 
 from studies.double_track.outcomes import estimate_of, judge_verdict
-from studies.double_track.scores import find_f1, format_tables, share, summarise
+from studies.double_track.scores import find_f1, summarise
 
 NULL = {
     "group": "null",
@@ -106,17 +106,3 @@ def test_bias_and_coverage_are_of_first_parameters_whose_form_is_the_librarys():
         1,
         2,
     )
-
-
-def test_shares_have_the_exact_interval_of_clopper_and_pearson():
-    assert (share(0, 60)["low"], share(0, 60)["high"]) == (0.0, pytest.approx(1 - 0.025 ** (1 / 60)))
-    assert share(0, 0)["share"] is None
-
-
-def test_tables_list_every_miss_and_run_without_estimates():
-    text = format_tables(
-        [row(NULL, verdict("FOUND", RIGHT)), row(DRAG, verdict("NOTHING"), reasons=["too weak"])], "all"
-    )
-    assert "- c (): wrong: FOUND aerodynamic_drag" in text
-    assert "- c (drag_area 0.5): nothing: NOTHING too weak" in text
-    assert "| drag | 1 |" in text

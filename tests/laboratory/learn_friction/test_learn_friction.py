@@ -10,7 +10,6 @@ import musync
 from catalogs.entries import load
 from flows.making.generate import generate_dataset
 from studies.learn_friction.__main__ import GRID, STREETS, open_made, paint_grid
-from studies.learn_friction.baselines import describe_command, fit_ridge, predict_by_ridge
 from studies.learn_friction.comparison import PAINTED, compare_predictors, format_errors
 from studies.learn_friction.network import train_network
 from studies.learn_friction.samples import (
@@ -156,15 +155,6 @@ def test_training_lowers_the_loss_and_a_seed_gives_the_same_network(drawn: Sampl
     again, same, other = (train_network(train, seed=seed, epochs=2) for seed in (1, 1, 2))
     assert again.losses == same.losses == trained.losses[:2] != other.losses
     assert np.array_equal(again.predict(test), same.predict(test))
-
-
-def test_ridge_meets_a_product_that_it_is_given(drawn: Samples) -> None:
-    features = np.random.Generator(np.random.Philox(2)).normal(size=(60, 2))
-    labels = features[:, 0] * features[:, 1] + 3
-    assert fit_ridge(features, labels, 1e-6)(features) == pytest.approx(labels, abs=1e-3)
-    train, test = split_samples(drawn)
-    command = predict_by_ridge(describe_command, train, test)
-    assert np.allclose(command[::2], command[1::2])  # without a picture snow is as the dry road
 
 
 def test_the_comparison_judges_the_painted_world_by_what_the_car_does(drawn: Samples) -> None:

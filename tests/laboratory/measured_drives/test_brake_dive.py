@@ -9,14 +9,13 @@ from catalogs.entries import load
 from studies.measured_drives.brake_dive import (
     DiveModel,
     dive_of_deceleration,
-    fit_pitch,
     pitch_mode,
     predict_event,
     with_model,
 )
 from studies.measured_drives.bus_drive import drive_motion
 from studies.measured_drives.events import Event, RecordedRun
-from studies.measured_drives.leave_one_out import leave_one_drive_out, macro_mean, score_of
+from studies.measured_drives.leave_one_out import leave_one_drive_out, macro_mean
 from studies.measured_drives.plans import load_plan
 from studies.measured_drives.selection import select_events
 
@@ -60,12 +59,6 @@ def test_rough_roads_shake_and_bends_turn_a_braking_car_by_the_stated_amounts() 
 def test_the_pitch_mode_is_that_of_the_rigid_tyre_half_car() -> None:
     # sqrt((27000 * 1.2^2 + 27000 * 1.5^2) / 1800) / 2 pi, and 3920 * 3.69 / (2 * 1800 * 7.4397)
     assert pitch_mode(VEHICLE) == pytest.approx((1.18407, 0.54007), rel=1e-4)
-
-
-def test_springs_and_dampers_follow_the_model() -> None:
-    car = with_model(VEHICLE, DiveModel(brake_gain=1.0, pitch_gain=1.0, stiffness=4.0, damping_ratio=0.3))
-    assert pitch_mode(car) == pytest.approx((2 * 1.18407, 0.3), rel=1e-4)
-    assert car.brake_gain == VEHICLE.brake_gain
 
 
 def test_a_steady_deceleration_gives_the_static_dive() -> None:
@@ -134,14 +127,6 @@ def test_a_prediction_uses_pressure_and_start_speed_alone(events: tuple[Event, .
     np.testing.assert_array_equal(a.predicted_rate, b.predicted_rate)
 
 
-def test_the_pitch_rate_is_the_slope_of_the_predicted_dive(events: tuple[Event, ...]) -> None:
-    model = DiveModel(brake_gain=1600.0, pitch_gain=1.1, stiffness=1.4, damping_ratio=0.35)
-    found = predict_event(events[0], VEHICLE, model, SURFACE)
-    np.testing.assert_allclose(
-        np.gradient(found.predicted_dive, 0.01)[2:-2], found.predicted_rate[2:-2], atol=0.15
-    )
-
-
 def test_without_pitch_rate_only_the_angle_is_calibrated_and_scored(events: tuple[Event, ...]) -> None:
     bare = [
         replace(event, columns={n: v for n, v in event.columns.items() if n != "pitch_rate"})
@@ -150,27 +135,3 @@ def test_without_pitch_rate_only_the_angle_is_calibrated_and_scored(events: tupl
     folds = leave_one_drive_out(bare, VEHICLE, SURFACE)
     assert {fold.variant for fold in folds} == {"pitch_only"}
     assert np.isnan(macro_mean(folds, "pitch_only").rate_rmse)
-
-
-def test_drives_count_equally_whatever_their_number_of_events(events: tuple[Event, ...]) -> None:
-    folds = leave_one_drive_out([*events, *[e for e in events if e.drive == "d1"]], VEHICLE, SURFACE)
-    drives = [fold.mean.pitch_rmse for fold in folds if fold.variant == "joint"]
-    assert macro_mean(folds, "joint").pitch_rmse == pytest.approx(np.mean(drives))
-
-
-def test_one_drive_alone_leaves_nothing_to_learn_from(events: tuple[Event, ...]) -> None:
-    assert leave_one_drive_out([e for e in events if e.drive == "d1"], VEHICLE, SURFACE) == ()
-
-
-def test_a_perfect_prediction_scores_zero_and_one(events: tuple[Event, ...]) -> None:
-    model = DiveModel(brake_gain=1600.0, pitch_gain=1.1, stiffness=1.4, damping_ratio=0.35)
-    found = predict_event(events[0], VEHICLE, model, SURFACE)
-    score = score_of(replace(found, dive=found.predicted_dive, rate=found.predicted_rate))
-    assert (score.pitch_rmse, score.rate_rmse) == (0.0, 0.0)
-    assert (score.pitch_correlation, score.rate_correlation) == pytest.approx((1.0, 1.0))
-
-
-def test_fitting_ignores_the_gain_of_the_brake(events: tuple[Event, ...]) -> None:
-    one = fit_pitch(events[:2], VEHICLE, 500.0, damping_ratio=0.7)
-    other = fit_pitch(events[:2], VEHICLE, 2000.0, damping_ratio=0.7)
-    assert replace(one, brake_gain=0.0) == replace(other, brake_gain=0.0)

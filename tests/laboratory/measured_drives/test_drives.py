@@ -41,39 +41,6 @@ def test_runs_come_with_their_drive_weather_and_known_channels(folder: Path) -> 
     assert set(first.columns) == set(COLUMNS)
 
 
-@pytest.mark.parametrize(
-    ("file", "content", "words"),
-    [
-        ("campaign.yaml", "a: [", "must be valid YAML"),
-        ("campaign.yaml", "- a", "must be a table"),
-        ("campaign.yaml", "{campaign: a, vehicle: b}", "sample_rate_hz is missing"),
-        (
-            "campaign.yaml",
-            "{campaign: a, vehicle: b, sample_rate_hz: 0}",
-            "sample_rate_hz: must be greater than 0; it is 0",
-        ),
-        ("runs.csv", "run,weather\n", "must list at least one run"),
-        ("runs.csv", "run,weather\na,dry\n", "needs the column precipitation_mm_h"),
-        (
-            "runs.csv",
-            "run,weather,precipitation_mm_h,snow_accumulation_h\na,hail,x,0\n",
-            "weather must be dry, rain",
-        ),
-        (
-            "runs.csv",
-            "run,weather,precipitation_mm_h,snow_accumulation_h\na,dry,x,0\n",
-            "must be a finite number; it is 'x'",
-        ),
-        ("runs.csv", "run,weather,precipitation_mm_h,snow_accumulation_h\n../a,dry,0,0\n", "must be no path"),
-        ("campaign.yaml", "{campaign: 3, vehicle: b, sample_rate_hz: 1}", "campaign: must be a valid string"),
-        ("runs/b.parquet", "text", "b: b.parquet must be a Parquet file"),
-    ],
-)
-def test_a_faulty_file_is_one_sentence(folder: Path, file: str, content: str, words: str) -> None:
-    (folder / file).write_text(content)
-    assert words in problems_of(folder)
-
-
 def test_missing_files_and_channels_and_gaps_are_all_listed(folder: Path) -> None:
     (folder / "runs" / "a.parquet").unlink()
     holed = COLUMNS | {"speed": np.where(np.arange(10) == 3, np.nan, 1.0)}

@@ -20,7 +20,6 @@ from tasks.errors import InputError
             lambda c: c["signals"][1].update(unit="bar"),
             "signals.1: unit bar is of pressure, m/s of speed",
         ),
-        ("bus", "a2d2-like", lambda c: c["signals"][1].update(rate_hz=True), "1.rate_hz: must"),
         (
             "stop study",
             "bmw-m8",

@@ -10,7 +10,6 @@ import pytest
 from flows.measured.importing import import_measurements
 from studies.measured_drives.brake_protocol import brake_protocol
 from studies.measured_drives.synthetic_drives import synthetic_drives
-from tasks.errors import InputError
 
 
 @pytest.fixture(scope="module")
@@ -54,33 +53,3 @@ def test_the_whole_protocol_on_three_drives(campaign: Path, tmp_path: Path) -> N
     assert joint["pitch_rmse"] < 0.1 * joint["no_dive_rmse"]
     for fold in result["folds"]:
         assert fold["brake_gain_n_m_per_mpa"] == pytest.approx(1600, rel=0.03)
-
-
-def test_all_events_can_be_used_where_the_rules_leave_too_few(campaign: Path) -> None:
-    result = brake_protocol(str(campaign), all_events=True)
-    assert result["used"] == result["candidates"] > result["retained"]
-
-
-def test_the_result_is_the_same_each_time(campaign: Path, tmp_path: Path) -> None:
-    for name in ("a", "b"):
-        brake_protocol(str(campaign), out=str(tmp_path / name))
-    for file in ("brake_protocol.json", "attrition.csv"):
-        assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
-
-
-def test_a_campaign_without_pitch_is_refused_by_name(campaign: Path, tmp_path: Path) -> None:
-    import pyarrow.parquet as pq
-
-    (tmp_path / "runs").mkdir()
-    for name in ("campaign.yaml", "runs.csv"):
-        (tmp_path / name).write_bytes((campaign / name).read_bytes())
-    for file in (campaign / "runs").iterdir():
-        pq.write_table(pq.read_table(file).drop_columns(["pitch"]), tmp_path / "runs" / file.name)
-    with pytest.raises(InputError, match="drive-1: channel pitch is missing"):
-        brake_protocol(str(tmp_path))
-
-
-@pytest.mark.parametrize("number", ["drives", "events"])
-def test_drives_and_events_must_be_at_least_one(tmp_path: Path, number: str) -> None:
-    with pytest.raises(InputError, match=f"--{number} must be at least 1"):
-        synthetic_drives(str(tmp_path / "bus"), **{number: 0})

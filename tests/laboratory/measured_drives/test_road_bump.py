@@ -5,12 +5,10 @@ import pytest
 
 from catalogs.entries import load
 from studies.measured_drives.brake_dive import pitch_mode
-from studies.measured_drives.plans import load_plan
 from studies.measured_drives.road_bump import (
     Passage,
     fit_feature,
     fit_feature_and_car,
-    passage_of,
     ride_over,
     with_factors,
 )
@@ -32,13 +30,6 @@ def passage(feature: RoadHazard, car: Vehicle = VEHICLE, speed: float = 10.0) ->
     return Passage(interval=INTERVAL, station=station, pitch_rate=rate, vertical_acceleration=vertical)
 
 
-def test_the_front_axle_on_a_hump_lifts_the_nose_first() -> None:
-    rate, vertical, pitch = ride_over(passage(FLAT_ROAD), HUMP, VEHICLE)
-    first = int(np.argmax(np.abs(rate) > 0.5))
-    assert rate[first] < 0 < vertical[first], "nose-down is positive"
-    assert pitch.min() < -0.3 and pitch.max() > 0.3
-
-
 @pytest.mark.parametrize(
     "feature",
     [
@@ -55,11 +46,6 @@ def test_a_feature_comes_back_from_its_pitch_rate_alone(feature: RoadHazard) -> 
     assert found.feature.height_m == pytest.approx(feature.height_m, rel=0.02)
     assert found.rate_rmse < 0.01 * found.rate_rms
     assert found.vertical_correlation > 0.99, "the vertical acceleration was not fitted"
-
-
-def test_the_factors_scale_both_axles() -> None:
-    frequency, damping_ratio = pitch_mode(VEHICLE)
-    assert pitch_mode(with_factors(VEHICLE, 4.0, 3.0)) == pytest.approx((2 * frequency, 1.5 * damping_ratio))
 
 
 def test_another_cars_springs_and_dampers_come_back_with_the_feature() -> None:
@@ -80,15 +66,6 @@ def test_a_road_of_many_features_is_not_called_one() -> None:
     assert found.rate_correlation < 0.7 and found.rate_rmse > 0.6 * found.rate_rms
 
 
-def test_a_passage_is_cut_about_its_median_with_its_own_station() -> None:
-    t = np.arange(500) * INTERVAL
-    columns = {"speed": 10.0 + t, "pitch_rate": 3.0 + 0 * t, "vertical_acceleration": 0 * t - 1.0}
-    cut = passage_of(columns, INTERVAL, 1.0, 3.0)
-    assert len(cut.station) == 201 and cut.station[0] == 0.0
-    assert cut.station[-1] == pytest.approx(10.0 * 2 + 0.5 * (3.0**2 - 1.0**2))
-    assert not cut.pitch_rate.any() and not cut.vertical_acceleration.any()
-
-
 def slope_run(body_share: float) -> dict[str, np.ndarray]:
     t = np.arange(4000) * INTERVAL
     slope = 3.0 * np.sin(2 * np.pi * t / 12)
@@ -103,14 +80,3 @@ def test_gravity_on_a_slope_shows_that_pitch_is_the_roads() -> None:
     road = measure_sensor_agreement(slope_run(0.0), INTERVAL)
     assert road.gravity_on_slope == pytest.approx(9.81, rel=0.02) and road.gravity_correlation > 0.99
     assert abs(measure_sensor_agreement(slope_run(1.0), INTERVAL).gravity_on_slope) < 0.3
-
-
-def test_angle_and_rate_of_one_motion_agree_and_a_scale_is_seen() -> None:
-    columns = slope_run(0.0)
-    assert measure_sensor_agreement(columns, INTERVAL).rate_of_pitch_gain == pytest.approx(1.0, abs=0.01)
-    columns["pitch_rate"] = columns["pitch_rate"] / 1.2
-    assert measure_sensor_agreement(columns, INTERVAL).rate_of_pitch_gain == pytest.approx(1.2, abs=0.01)
-
-
-def test_the_study_that_ships_can_be_read() -> None:
-    assert [window.name for window in load_plan("bump study", "comma2k19").windows][-1] == "rough patch"

@@ -7,9 +7,8 @@ import pytest
 
 from catalogs.entries import load
 from studies.measured_drives.events import RecordedRun
-from studies.measured_drives.plans import load_plan
-from studies.measured_drives.stop import Stop, stop_errors, stop_of, stopping_distance
-from studies.measured_drives.stop_findings import measure_rebound, measure_saturation, slip_cycles
+from studies.measured_drives.stop import Stop, stop_of, stopping_distance
+from studies.measured_drives.stop_findings import slip_cycles
 from studies.measured_drives.stop_ladder import Rung, _model, compute_uncalibrated_errors, fit_ladder
 from studies.measured_drives.stop_swing import Swing, fit_swing, swing_acceleration, with_swing
 from tasks.campaign.campaign import CHANNELS
@@ -83,11 +82,6 @@ def test_calibrating_beats_the_data_sheet(stops: tuple[Stop, Stop]) -> None:
     assert found.held_out.speed_rmse < compute_uncalibrated_errors(held_out, VEHICLE, SURFACE).speed_rmse
 
 
-def test_a_perfect_prediction_has_no_errors(stops: tuple[Stop, Stop]) -> None:
-    errors = stop_errors(stops[0], stops[0].columns)
-    assert all(getattr(errors, name) == 0.0 for name in errors.__dataclass_fields__)
-
-
 def test_the_stopping_distance_is_that_of_uniform_deceleration() -> None:
     t = np.arange(600) * INTERVAL
     speed = np.clip(20.0 - 5.0 * (t - 1.0), 0.0, 20.0)
@@ -132,29 +126,6 @@ def test_a_swing_in_a_measured_stop_is_found() -> None:
     assert (found.frequency, found.damping_ratio) == pytest.approx((3.4, 0.25), abs=1e-3)
 
 
-def test_without_a_stop_there_is_no_swing() -> None:
-    speed, a = np.full(100, 10.0), np.linspace(-1, 1, 100)
-    np.testing.assert_array_equal(with_swing(a, speed, INTERVAL, Swing(frequency=3.0, damping_ratio=0.2)), a)
-
-
-def test_torque_that_rises_past_the_tyres_limit_is_put_in_numbers() -> None:
-    t = np.arange(300) * INTERVAL
-    torque = 10_000.0 * t
-    limit = 8.0
-    lever = VEHICLE.mass * VEHICLE.wheel_radius
-    deceleration = np.minimum(torque / lever, limit)
-    columns = {
-        "speed": np.maximum(22.0 - 7.0 * t, 2.1),
-        "brake_torque": torque,
-        "longitudinal_acceleration": -deceleration,
-    }
-    columns["speed"][-1] = 1.0
-    found = measure_saturation(Stop(name="x", interval=INTERVAL, columns=columns, onset=1), VEHICLE)
-    assert found.share_used_before == pytest.approx(1.0, abs=0.05)
-    assert found.torque_largest == pytest.approx(29_800, rel=0.01)
-    assert found.share_used_then == pytest.approx(limit * lever / 29_800, rel=0.02)
-
-
 def test_slip_cycles_are_counted_and_a_steady_slip_has_none() -> None:
     t = np.arange(200) * INTERVAL
     speed = np.full(200, 10.0)
@@ -168,27 +139,3 @@ def test_slip_cycles_are_counted_and_a_steady_slip_has_none() -> None:
     assert counted(0.08 + 0.05 * np.sin(2 * np.pi * 4.0 * t)) == pytest.approx(4.0, abs=0.6)
     assert counted(np.full(200, 0.1)) == 0.0
     assert counted(0.1 + 0.005 * np.sin(2 * np.pi * 4.0 * t)) == 0.0
-
-
-def test_a_late_wheel_speed_is_put_back_before_slip_is_taken() -> None:
-    t = np.arange(200) * INTERVAL
-    speed = np.maximum(15.0 - 8.0 * t, 0.0)
-    late = np.interp(t - 0.05, t, speed) / VEHICLE.wheel_radius
-    columns = {"speed": speed, "wheel_speed_front": late}
-    stop = Stop(name="x", interval=INTERVAL, columns=columns, onset=10)
-    assert abs(slip_cycles(stop, columns, VEHICLE, {"wheel_speed_delay": 0.05}).median) < 1e-9
-    assert slip_cycles(stop, columns, VEHICLE, {}).median < -0.02
-
-
-def test_the_rebound_is_measured_about_the_pitch_at_rest() -> None:
-    t = np.arange(400) * INTERVAL
-    pitch = np.where(t < 1.0, 1.0, 0.2 + 0.5 * np.exp(-3 * (t - 1)) * np.cos(2 * np.pi * 1.5 * (t - 1)))
-    stop = Stop(name="x", interval=INTERVAL, columns={"speed": np.where(t < 0.95, 5.0, 0.0)}, onset=10)
-    found = measure_rebound(stop, pitch)
-    assert found.back == pytest.approx(-0.5 * np.exp(-3 / 3), abs=0.02)
-    assert 0.03 < found.forth < 0.2
-
-
-def test_every_study_that_ships_can_be_read() -> None:
-    study = load_plan("stop study", "bmw-m8")
-    assert study.train != study.held_out and len(study.ladder) == 6

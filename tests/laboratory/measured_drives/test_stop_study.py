@@ -8,7 +8,6 @@ import pytest
 from flows.measured.importing import import_measurements
 from manifests.provenance import SOURCE_ROOT
 from studies.measured_drives.stop_study import stop_study
-from tasks.errors import InputError
 
 EXCERPT = SOURCE_ROOT / "catalogs" / "measured" / "bmw_m8"
 
@@ -62,14 +61,3 @@ def test_what_the_model_still_lacks_is_in_the_findings(campaign: Path) -> None:
     assert findings["slip"]["measured"]["cycles_per_s"] > 2 > findings["slip"]["predicted"]["cycles_per_s"]
     assert findings["slip"]["measured"]["p95"] > 1.3 * findings["slip"]["predicted"]["p95"]
     assert findings["rebound_deg"]["back"] < -0.2
-
-
-def test_a_campaign_without_the_studys_runs_is_refused(tmp_path: Path, campaign: Path) -> None:
-    table = (campaign / "runs.csv").read_text().replace("abs-stop", "abs-end")
-    (tmp_path / "runs").mkdir()
-    (tmp_path / "campaign.yaml").write_bytes((campaign / "campaign.yaml").read_bytes())
-    (tmp_path / "runs.csv").write_text(table)
-    for file in (campaign / "runs").iterdir():
-        (tmp_path / "runs" / file.name.replace("abs-stop", "abs-end")).write_bytes(file.read_bytes())
-    with pytest.raises(InputError, match=r"the study needs the run abs-stop; there are: .*abs-end"):
-        stop_study(str(tmp_path))

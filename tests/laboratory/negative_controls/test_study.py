@@ -8,20 +8,16 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from flows.auditing.physics import clip_columns, clip_facts
 from flows.cli import app
-from flows.judging.evaluation import evaluate_dataset
-from flows.judging.judged_clip import METHODS, JudgedClip
-from flows.judging.physics import clip_columns, clip_facts
 from flows.making.catalogue import catalogue_of
 from flows.making.generate import generate_dataset
 from flows.making.plan import read_plan
-from flows.pages.static import as_svg
 from flows.reading.previews import make_films
-from flows.reading.sheets import draw_sheets
-from studies.commands import shorten_controls
+from studies.evaluation.evaluation import evaluate_dataset
+from studies.evaluation.judged_clip import METHODS, JudgedClip
 from studies.negative_controls import study as judging_controls
 from studies.negative_controls.claims import Claim
-from studies.negative_controls.figure import draw_roc
 from studies.negative_controls.study import (
     BLIND_BY_DESIGN,
     CONTROLS,
@@ -33,6 +29,7 @@ from studies.negative_controls.study import (
     score_controls,
     summarise_controls,
 )
+from studies.paper.sheets import draw_sheets
 from tasks.errors import InputError
 from tasks.eval.poses.motion import RecoveredMotion
 from tests.toy_street import write_toy_grid
@@ -109,16 +106,6 @@ def test_a_good_pose_check_sees_all_and_the_blind_are_named(
     assert ("sign-flip", "normalised_progress_rmse") in blind and ("amplitude-0.8", "progress_rmse") in blind
 
 
-def test_each_fault_has_a_panel_with_the_curves_of_its_metrics(
-    clips: list[JudgedClip], false: list[dict[str, Claim]]
-) -> None:
-    rows = list(score_controls(clips, false))
-    drawing = as_svg(draw_roc(rows, CONTROLS))
-    tried = {row["control"] for row in rows}
-    assert all(name in drawing for name in tried)
-    assert as_svg(draw_roc(rows, CONTROLS)) == drawing
-
-
 def test_a_clip_whose_track_was_lost_is_not_scored(
     clips: list[JudgedClip], false: list[dict[str, Claim]]
 ) -> None:
@@ -167,33 +154,6 @@ def test_a_control_that_could_not_be_tried_is_not_detected(
     assert not by_name["fixed-mu"]["tried"] and by_name["sign-flip"]["tried"]
 
 
-def test_the_terminal_says_of_each_control_which_metrics_see_it_or_why_it_was_not_tried() -> None:
-    seen = {"seen_by": ["pitch_mae by pnp", "pitch_mae by stereo", "e_weather by pnp"], "reason": ""}
-    untried = {"control": "fixed-mu", "seen_by": [], "reason": "not tried: in none of 3 clips does it change"}
-    controls = [{"control": "sign-flip", **seen}, untried]
-    told = shorten_controls(
-        {"all_detected": False, "undetected": ["fixed-mu"], "controls": controls, "rows": []}
-    )
-    assert [tuple(row.values()) for row in told["controls"]] == [
-        ("sign-flip", "pitch_mae (2), e_weather (1)"),
-        ("fixed-mu", "not tried: in none of 3 clips does it change"),
-    ]
-
-
-def test_a_dataset_without_a_single_track_says_so_of_every_control(
-    clips: list[JudgedClip], false: list[dict[str, Claim]]
-) -> None:
-    lost = [
-        replace(
-            c, motions={name: replace(motion, failed=np.ones(41, bool)) for name, motion in c.motions.items()}
-        )
-        for c in clips
-    ]
-    told = summarise_controls(list(score_controls(lost, false)), list_untried(lost, false))
-    assert not told["all_detected"] and len(told["undetected"]) == len(CONTROLS)
-    assert all("every method misses the pose" in line for line in told["undetected"])
-
-
 def test_the_command_fails_and_names_what_could_not_be_tried(
     dataset: Path, clips: list[JudgedClip], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -225,8 +185,3 @@ def test_what_needs_pictures_says_that_the_dataset_was_made_without_and_advises_
         with pytest.raises(InputError, match=r"made: the dataset was made without frames \(--no-frames\)"):
             run()
     assert not any(tmp_path.iterdir())
-
-
-def test_a_folder_that_is_no_dataset_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="it has no manifest"):
-        run_controls(str(tmp_path))

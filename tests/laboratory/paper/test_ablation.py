@@ -4,27 +4,18 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import pyarrow.parquet as pq
 import pytest
 
 from catalogs.scenario import Scenario
 from catalogs.studies.ablation import cut_coupling
 from catalogs.variants import COUPLINGS
 from studies.paper.ablation import run_ablation
-from tasks.errors import InputError
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], Path]:
     out = tmp_path_factory.mktemp("ablation")
     return run_ablation(out=str(out)), out
-
-
-def test_the_page_has_the_figure_and_the_pitch_of_every_variant(made):
-    result, out = made
-    page = (out / "ablation.html").read_text()
-    assert page.count('class="plot"') == 1 and "vertical-only" in (out / "ablation.svg").read_text()
-    assert all(f"{row['peak_pitch_deg']:.4g}" in page for row in result["pitch"])
 
 
 def stops(result: dict[str, Any], variant: str, weather: str) -> dict[float, float]:
@@ -80,17 +71,6 @@ def test_only_the_coupled_car_dives_before_the_hump_and_reaches_it_late(
     assert dives == sorted(dives)
 
 
-def test_without_traces_the_oracle_is_said_not_to_have_run(made: tuple[dict[str, Any], Path]) -> None:
-    result, out = made
-    assert (result["vehicle"], result["mode"]) == ("paper-reference", "paper")
-    assert result["reference"]["note"] == "not run: no reference traces given"
-    assert pq.read_table(out / "ablation.parquet").column_names == [
-        "time",
-        *(f"pitch_deg_{name.replace('-', '_')}" for name in COUPLINGS),
-    ]
-    assert (out / "ablation.svg").read_text().startswith("<svg")
-
-
 def test_the_full_model_follows_the_reference_and_no_cut_one_does(outside_data: Path, tmp_path: Path) -> None:
     traces = outside_data / "reference" / "multibody"
     if not traces.is_dir():
@@ -98,19 +78,6 @@ def test_the_full_model_follows_the_reference_and_no_cut_one_does(outside_data: 
     figures = run_ablation(out=str(tmp_path), vehicle="multibody-grown", traces=str(traces))["reference"]
     assert figures["full_pitch_rmse_deg"] < 0.05
     assert all(figures[f"{name}_pitch_rmse_deg"] > 0.4 for name in COUPLINGS if name != "full")
-
-
-def test_traces_without_the_condition_are_refused(outside_data: Path, tmp_path: Path) -> None:
-    source = outside_data / "reference" / "multibody"
-    if not source.is_dir():
-        pytest.skip(f"no reference traces at {source}")
-    (trace,) = source.glob("*/flat-dry.parquet")
-    (tmp_path / "flat-dry.parquet").write_bytes(trace.read_bytes())
-    (tmp_path / "cases.json").write_text(
-        '[{"case": "flat-dry", "weather": "dry", "surface_coefficient": 0.82, "initial_speed_km_h": 60}]'
-    )
-    with pytest.raises(InputError, match="compares the pitch of hump-rain50"):
-        run_ablation(out=str(tmp_path / "out"), traces=str(tmp_path))
 
 
 def test_a_cut_changes_weather_or_brake_and_nothing_else() -> None:

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from catalogs.entries import load
-from studies.paper.vehicle_modes import HEADER, compute_differences, format_table, mode_difference
-from tests.vehicle.conftest import command
+from studies.paper.vehicle_modes import HEADER, compute_differences, format_table
 
 DOCUMENT = Path(__file__).resolve().parents[3] / "docs" / "explanation" / "vehicle-modes.md"
 
@@ -76,17 +75,3 @@ def test_the_modes_pitch_alike_until_the_stop_without_a_calibrated_moment(drive)
         braking = slice(1000, int(1000 * paper.stop_time) - 300)
         apart = np.degrees(paper.columns["pitch"] - coupled.columns["pitch"])[braking]
         assert np.sqrt(np.mean(apart**2)) < 0.04
-
-
-def test_a_rollout_does_not_differ_from_itself(drive):
-    ride = drive("rain", 0.4)
-    difference = mode_difference(ride, ride)
-    assert difference.speed_rmse == difference.pitch_rmse_deg == difference.slip_rmse == 0
-    assert difference.stop_paper == difference.stop_coupled == ride.stopping_distance
-
-
-def test_a_comparison_without_brake_covers_the_clip(drive):
-    coast = command(0.0, onset=None)
-    paper, coupled = (drive(brake=coast, mode=mode, duration=2.0) for mode in ("paper", "coupled"))
-    difference = mode_difference(paper, coupled)
-    assert isnan(difference.stop_paper) and 0 < difference.speed_rmse < 1e-3

@@ -16,7 +16,7 @@ from studies.real_photos.comparison import (
     compare_trainings,
     measure_confusion,
 )
-from studies.real_photos.network import SEEN, train_network, vary_pictures
+from studies.real_photos.network import train_network
 from studies.real_photos.pictures import (
     CLASSES,
     SIDE,
@@ -114,18 +114,6 @@ def test_every_source_weighs_the_same_however_many_pictures_it_has(monkeypatch) 
 
     train_network([paint(0, [0, 1, 2]), paint(255, [0] * 100 + [1] * 10 + [2] * 10)], seed=1, steps=20)
     assert float(torch.cat(seen).float().mean() / 255) == pytest.approx(0.5, abs=0.05)
-
-
-def test_variation_keeps_form_and_range_and_moves_every_picture() -> None:
-    pictures = torch.randint(
-        0, 256, (8, 3, SIDE, SIDE), dtype=torch.uint8, generator=torch.Generator().manual_seed(1)
-    )
-    seen = vary_pictures(pictures, torch.Generator().manual_seed(2))
-    assert seen.shape == (8, 3, SEEN, SEEN) and float(seen.min()) >= 0 and float(seen.max()) <= 1
-    same = vary_pictures(pictures, torch.Generator().manual_seed(2))
-    other = vary_pictures(pictures, torch.Generator().manual_seed(3))
-    assert torch.equal(seen, same)
-    assert ((seen - other).abs().mean(dim=(1, 2, 3)) > 0.01).all()
 
 
 def test_a_confusion_counts_true_classes_in_rows_and_the_score_is_their_mean() -> None:
