@@ -157,6 +157,7 @@ def wet_layer(
     p, sky = film.parameters, light.sky
     focal_px = float(shutter.K[1, 1])
     road, share = soften_mask(np.isin(gbuffer.class_id, ROAD_CLASSES) & (gbuffer.alpha > 0.5))
+    road &= np.isfinite(gbuffer.depth)  # a single pixel of sky between those of a road mirrors nothing
     window = 2 * round(p.normal_window * shutter.height / 2) + 1
     # a slope s along the line of sight turns the mirrored ray by 2 s: a lobe is as high as its slopes, and
     # narrow across at grazing angles
