@@ -243,7 +243,7 @@ def _make_clip_files(
     clip_id, names = row["clip_id"], [channel.name for channel in TICK_CHANNELS]
     folder = frames.layout.telemetry / "ticks" / f"family={row['scenario']['weather']}"
     ticks = read_columns(folder, clip_id, names, most=rows)
-    content = pack_columns(ticks, names) | {"boxes": list_boxes(layout, row, rows)}
+    content = pack_columns(ticks, names) | {"boxes": list_boxes(frames.layout, row, rows)}
     files: dict[str, str | bytes | memoryview] = {
         _traces_name(row): f"clipArrived({_format_script(clip_id)}, {_format_script(content)});\n"
     }
