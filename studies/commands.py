@@ -285,6 +285,12 @@ COMMANDS = (
                 None,
                 known=("blind", "friction", "driver"),
             ),
+            define_option(
+                "policy",
+                str | None,
+                "module:function of a brake of your own, as of musync drive, beside these.",
+                None,
+            ),
             define_option("bounds", bool, "Drive each approach under the bounds of the surface too.", True),
             OUT,
         ),

@@ -74,7 +74,9 @@ def load_policy(name: str) -> Policy:
     )
 
 
-def drive_with(policy: Policy, simulator: Simulator, place: str) -> list[float]:
+def drive_with(
+    policy: Policy, simulator: Simulator, place: str, is_over: Callable[[Observation], bool] | None = None
+) -> list[float]:
     """Drive to the end and return the pressures that the policy asked for [MPa].
 
     Parameters
@@ -82,6 +84,7 @@ def drive_with(policy: Policy, simulator: Simulator, place: str) -> list[float]:
     policy : that is asked when each step begins
     simulator : the drive
     place : what messages call the drive
+    is_over : whether nothing more can happen; None drives to the end
 
     Raises
     ------
@@ -92,7 +95,7 @@ def drive_with(policy: Policy, simulator: Simulator, place: str) -> list[float]:
     with _told_of(policy, place, 0.0):
         act = policy.begin()
     seen = simulator.reset()
-    while not seen.ends:
+    while not (seen.ends or (is_over is not None and is_over(seen))):
         with _told_of(policy, place, seen.time):
             pressure = float(act(seen))
         try:

@@ -6,6 +6,7 @@ import re
 import zlib
 from collections.abc import Mapping, Sequence
 from io import BytesIO
+from math import isnan
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,7 @@ from flows.running.progress import progress_bar
 from flows.running.runner import open_executor, run_unordered
 from flows.store.address import open_for_reading
 from flows.store.layout import Layout, list_abandoned
+from flows.store.object_tables import read_objects
 from flows.store.outputs import MARKER, Outputs, read_marker
 from flows.store.sealed import read_manifest, recorded_grid, refuse_changed_clips
 from flows.store.telemetry import read_columns
@@ -37,6 +39,7 @@ from tasks.errors import InputError
 from tasks.render.traces import TRACES
 
 COMMAND = "report"
+BOX = ("frame", "kind", "box_left", "box_top", "box_right", "box_bottom")
 PAGE = Path(__file__).parent / "report_page"
 SCRIPTS = {"page.js": FILES, "traces.js": PAGE, "report.js": PAGE}
 FILTERS = {
@@ -189,6 +192,28 @@ def pack_columns(columns: Mapping[str, NDArray[Any]], names: Sequence[str]) -> d
     return {"rows": rows, "columns": list(names), "packed": base64.b64encode(squeezed).decode()}
 
 
+def list_boxes(
+    layout: Layout, row: Mapping[str, Any], most_frames: int
+) -> dict[str, list[list[float | str]]]:
+    """Return by frame the kind, left, top, right and bottom [px] of each road user that the picture shows.
+
+    Parameters
+    ----------
+    layout : of the dataset
+    row : of the clip
+    most_frames : that a clip has [1]
+    """
+    table = layout.object_table(row["index"])
+    if layout.relative(table) not in row["artifacts"]:
+        return {}
+    found: dict[str, list[list[float | str]]] = {}
+    columns = read_objects(layout, row["index"], most_frames)
+    for frame, kind, *edges in zip(*(columns[name].tolist() for name in BOX), strict=True):
+        if not isnan(edges[0]):
+            found.setdefault(str(frame), []).append([kind, *edges])
+    return found
+
+
 def _write_clips(
     frames: Frames,
     manifest: Mapping[str, Any],
@@ -218,9 +243,9 @@ def _make_clip_files(
     clip_id, names = row["clip_id"], [channel.name for channel in TICK_CHANNELS]
     folder = frames.layout.telemetry / "ticks" / f"family={row['scenario']['weather']}"
     ticks = read_columns(folder, clip_id, names, most=rows)
-    packed = _format_script(pack_columns(ticks, names))
+    content = pack_columns(ticks, names) | {"boxes": list_boxes(frames.layout, row, rows)}
     files: dict[str, str | bytes | memoryview] = {
-        _traces_name(row): f"clipArrived({_format_script(clip_id)}, {packed});\n"
+        _traces_name(row): f"clipArrived({_format_script(clip_id)}, {_format_script(content)});\n"
     }
     if frame_rate_hz is not None:
         film = BytesIO()

@@ -114,7 +114,7 @@ def refuse_changed_files(layout: Layout, recorded: Mapping[str, str]) -> None:
 def refuse_changed_clips(
     layout: Layout, manifest: Mapping[str, Any], clips: Sequence[Mapping[str, Any]], table: str
 ) -> None:
-    """Hold the pictures of clips, and the files of one table that may have their rows, against the recorded hashes.
+    """Hold pictures and road users of clips, and the files of a table with their rows, against the recorded hashes.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def refuse_changed_clips(
         name: digest
         for clip in clips
         for name, digest in clip["artifacts"].items()
-        if name.startswith("frames.zarr/rgb/")
+        if name.startswith(("frames.zarr/rgb/", "telemetry/objects/"))
     }
     refuse_changed_files(layout, tables | pictures)
 

@@ -13,6 +13,8 @@ from catalogs.entries import load
 from catalogs.road_users import EGO
 from catalogs.scenario import Scenario
 from catalogs.scenes.opendrive import find_street, format_opendrive
+from flows.driving.policy import Policy, drive_with, load_policy
+from flows.driving.simulator import Observation, Simulator
 from flows.making.driving import surface_of, weather_of
 from flows.running.progress import progress_bar
 from flows.store.outputs import Outputs
@@ -38,7 +40,7 @@ from tasks.driving.outcome import (
 from tasks.driving.stepped import DriveSettings, SteppedDrive
 from tasks.errors import InputError
 from tasks.studies.label_ranges import sampled_friction
-from tasks.surface.state import SurfaceState
+from tasks.surface.state import SurfaceParameters, SurfaceState
 from tasks.surface.wet_friction import ANY_SPEED, compute_wet_share
 from tasks.vehicle.parameters import Vehicle, compute_surface_response
 
@@ -50,16 +52,17 @@ ROAD = "street"
 
 def compare_brakes(
     *, vehicle: str = "bmw-320i", protocol: list[str] | None = None, weather: list[str] | None = None,
-    brake: list[str] | None = None, bounds: bool = True, out: str | None = None,
+    brake: list[str] | None = None, policy: str | None = None, bounds: bool = True, out: str | None = None,
 ) -> dict[str, Any]:  # fmt: skip
     """Drive every approach of the protocols in every weather with every brake, without pictures.
 
     Parameters
     ----------
     vehicle : catalogue name or file of the car
-    protocol, weather, brake : names of `emergency_braking.yaml`; None takes all. A protocol may also be an OpenSCENARIO
-        file with one road user
-    bounds : drive each at the 5th, 50th and 95th percentile of friction under the surface bounds too
+    protocol, weather, brake : names of `emergency_braking.yaml`; None takes all. A protocol may also be an
+        OpenSCENARIO file with one road user
+    policy : ``module:function`` of a brake of the user's, as of `flows.driving.policy`, driven beside the others
+    bounds : drive each of the catalogue's at the 5th, 50th and 95th percentile of friction under the surface bounds too
     out : folder for aeb.json, the page, and each approach as an OpenSCENARIO file
 
     Returns
@@ -72,10 +75,11 @@ def compare_brakes(
     Raises
     ------
     InputError
-        For names that do not exist.
+        For names that do not exist, or a policy that fails.
     """
     table = load_table()
     chosen = _choose(table, protocol, weather, brake)
+    own = {} if policy is None else {policy: load_policy(policy)}
     cases = [case for name in chosen["protocol"] for case in _open_protocol(table, name)]
     scenarios = {f"openscenario/{_name_file(case)}": case for case in cases}
     results = Outputs(out, "lab aeb", "aeb.json", "aeb.html", *scenarios, f"openscenario/{ROAD}.xodr")
@@ -87,7 +91,12 @@ def compare_brakes(
             scenario = Scenario(**table.list_weathers()[name])
             state = surface_of(scenario, pavement)
             frictions = np.percentile(sampled_friction(weather_of(scenario), pavement, study), PERCENTILES)
-            for case, kind in product(cases, chosen["brake"]):
+            for case, kind in product(cases, (*chosen["brake"], *own)):
+                if kind in own:
+                    outcome = _drive_policy(own[kind], case, scenario, car, pavement)
+                    found = {"friction": round(state.friction, 4), **describe_outcome(outcome)}
+                else:
+                    found = _drive_case(car, state, case, kind, table, frictions.tolist() if bounds else [])
                 rows.append(
                     {
                         "protocol": case.protocol,
@@ -96,7 +105,8 @@ def compare_brakes(
                         "weather": name,
                         "brake": kind,
                     }
-                    | _drive_case(car, state, case, kind, table, frictions.tolist() if bounds else [])
+                    | found
+                    | {"allowed_km_h": case.allowed_km_h}
                 )
             advance(name)
     result = {
@@ -243,7 +253,6 @@ def _drive_case(
         "friction": round(state.friction, 4),
         **describe_outcome(outcome),
         **{f"p{p:02d}": round(v, 2) for p, v in zip(PERCENTILES, ends, strict=False)},
-        "allowed_km_h": case.allowed_km_h,
     }
 
 
@@ -271,6 +280,27 @@ def _write_scenarios(results: Outputs, scenarios: Mapping[str, Case], car: Vehic
                 wheelbase=car.wheelbase,
             ),
         )  # fmt: skip
+
+
+def _drive_policy(
+    policy: Policy, case: Case, weather: Scenario, car: Vehicle, pavement: SurfaceParameters
+) -> Outcome:
+    """Drive an approach with a user's brake until it has an outcome."""
+    asked = replace(
+        weather, initial_speed_km_h=case.scenario.initial_speed_km_h, hold_speed=True, objects=case.scenario.objects
+    )  # fmt: skip
+    simulator = Simulator(asked, vehicle=car, surface=pavement, duration_s=LONGEST_S)
+    overhang, _ = load("road user sizes")[EGO]
+    settles_at = case.follow(simulator.state.friction).settles_at
+
+    def is_over(seen: Observation) -> bool:
+        (target,) = seen.targets
+        met = seen.station + overhang >= target.station
+        return met or seen.stands or (seen.speed <= target.speed and seen.time >= settles_at)
+
+    drive_with(policy, simulator, f"{case.protocol}, {case.name}, {weather.weather}", is_over)
+    (outcome,) = simulator.judge()
+    return outcome
 
 
 def _choose(

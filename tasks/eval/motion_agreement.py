@@ -37,6 +37,7 @@ class PoseThresholds:
     lateral_rmse_m, rise_rmse_m : largest RMSE of the rig's place to the side and upward [m]
     heave_gain_error : largest difference of the heave gain from 1 [1]
     heave_gain_std : standard uncertainty of that gain above which there is too little heave to judge it by [1]
+    halved_from_px : height of pictures from which on a clip is judged by pictures of half the size [px]
     """
 
     pitch_rmse_deg: float
@@ -52,6 +53,7 @@ class PoseThresholds:
     rise_rmse_m: float | None = None
     heave_gain_error: float | None = None
     heave_gain_std: float | None = None
+    halved_from_px: float = float("inf")
 
 
 @dataclass(frozen=True, kw_only=True)

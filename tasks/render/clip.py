@@ -1,7 +1,7 @@
 """A clip's frames, one after the other, from rig poses to finished pictures in their weather."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -100,6 +100,8 @@ def render_clip(
     T_world_rows = pose_rows(camera, T_world_camera, motion.rig_at)
     moving = BodiesInClip(motion.bodies, scene, weathered, weather, backend, T_world_camera)
     velocity = np.gradient(T_world_camera[:, :3, 3], 1 / motion.frame_rate_hz, axis=0)
+    shows_sky = scene.gaussians.display_encoded or not weather.replaces_sky
+    black = np.zeros((field.height, field.width, 3), np.float32)
     clip: dict[str, NDArray[Any]] = {}
     chosen = range(len(T_world_camera)) if motion.shown is None else motion.shown
     for place, frame in enumerate(chosen):
@@ -112,7 +114,6 @@ def render_clip(
         )  # fmt: skip
         if scene.daylight is not None:
             gbuffer = add_grain(gbuffer, pose, field.K)
-        sky = environment_view(scene.environment, view, field.K, field.width, field.height)
         shutter = Shutter(
             T_world_camera=pose,
             K=field.K,
@@ -122,8 +123,14 @@ def render_clip(
             time_s=(motion.first_frame + frame) / motion.frame_rate_hz,
             exposure_s=camera.exposure_s,
         )
-        clear = compose_over_sky(gbuffer, sky, scene.gaussians.display_encoded)
-        finished = apply_weather(weather, clear, sky, gbuffer, shutter, particles=camera.plain)
+        clear = gbuffer.rgb
+        if labels or shows_sky:
+            sky = environment_view(scene.environment, view, field.K, field.width, field.height)
+            clear = compose_over_sky(gbuffer, sky, scene.gaussians.display_encoded)
+        before = (clear, sky) if shows_sky else (gbuffer.rgb, black)
+        finished = replace(
+            apply_weather(weather, *before, gbuffer, shutter, particles=camera.plain), base=clear
+        )
         drawn = (weather, finished, gbuffer, shutter)
         if T_world_rows is None:
             seen = take_drawn_frame(*drawn, labels)

@@ -191,7 +191,7 @@ def test_what_speed_alone_cannot_tell_apart_is_a_set_with_its_odds_and_the_run_t
 
 def test_a_set_holds_the_run_that_tells_its_explanations_apart() -> None:
     library = ("pad_drag", "rolling_resistance", "brake_lag")
-    verdict = judged({"pad_drag": 45.0}, library=library, experiments=("coast", "gentle"))
+    verdict = judged({"pad_drag": 45.0}, library=library, experiments=("coast down from 36", "gentle"))
     assert verdict.verdict == "SET"
     assert [o.names for o in verdict.odds] == [("pad_drag",), ("rolling_resistance",)]
     planned = verdict.experiment

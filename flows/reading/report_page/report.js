@@ -197,9 +197,11 @@ async function beside(clip, sibling) {
   await traces.show(traced.map((c, k) => ({ label: c.label, columns: columns[k] })));
   traces.point(player.time);
   drawHorizons(player.time);
+  $("boxes").hidden = !traces.shown.some(({ columns }) => Object.keys(columns.boxes).length);
+  drawBoxes(player.time);
 }
 
-const LABELS = [["friction", "surface_friction", 3, "", 1], ["stop", "stopping_distance", 1, " m", 1], ["peak pitch", "peak_pitch", 2, "°", 180 / Math.PI]];
+const LABELS = [["impact", "impact_speed", 1, " km/h", 3.6], ["friction", "surface_friction", 3, "", 1], ["stop", "stopping_distance", 1, " m", 1], ["peak pitch", "peak_pitch", 2, "°", 180 / Math.PI]];
 
 /** A label with its p05 and p95 under the surface's bounds; empty if the clip has no such figure. */
 function ranged({ figures }, name, key, digits, unit, factor) {
@@ -261,6 +263,32 @@ function drawHorizons(time) {
   });
 }
 
+// ---- road users
+
+const SVG = "http://www.w3.org/2000/svg";
+
+function svg(name, attributes, text = "") {
+  const node = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+  node.textContent = text;
+  return node;
+}
+
+/** Over each film: the box and kind of each road user in the frame that it shows. */
+function drawBoxes(time) {
+  document.querySelectorAll("svg.boxes").forEach((overlay, k) => {
+    const film = overlay.parentElement.querySelector("video");
+    const frames = traces.shown[k]?.columns.boxes ?? {};
+    const last = Math.round(film.duration * REPORT.frame_rate_hz) - 1;
+    const now = frames[Math.min(Math.floor(time * REPORT.frame_rate_hz + 1e-6), last)] ?? [];
+    overlay.setAttribute("viewBox", `0 0 ${film.videoWidth || 1} ${film.videoHeight || 1}`);
+    overlay.replaceChildren(...($("boxes").firstElementChild.checked ? now : []).flatMap(([kind, left, top, right, bottom]) => [
+      svg("rect", { x: left, y: top, width: right - left, height: bottom - top }),
+      svg("text", { x: left, y: top - 3 }, kind),
+    ]));
+  });
+}
+
 // ---- one time for all
 
 const player = new Player([$("film-a"), $("film-b")], (time) => {
@@ -270,6 +298,7 @@ const player = new Player([$("film-a"), $("film-b")], (time) => {
   $("play").ariaLabel = $("play").textContent;
   traces.point(time);
   drawHorizons(time);
+  drawBoxes(time);
 });
 const traces = new Traces($("traces"), (time) => scrub(time));
 
@@ -303,6 +332,7 @@ $("csv").title = "Every telemetry column of this clip, a row a millisecond";
 $("csv").onclick = saveCsv;
 $("horizon").title = "Dashed: the horizon of a level car. Solid: with five times the body's pitch; it rises as the nose goes down.";
 $("horizon").onchange = () => drawHorizons(player.time);
+$("boxes").onchange = () => drawBoxes(player.time);
 addEventListener("keydown", (event) => {
   if (event.target.closest("input, select, button, table, summary")) return;
   const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];

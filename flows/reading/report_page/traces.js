@@ -27,11 +27,11 @@ const telemetryOf = (() => {
 })();
 
 /** Undo deflate and the byte planes: a column is eight planes of one byte of every number, lowest first. */
-async function unpack({ rows, columns, packed }) {
+async function unpack({ rows, columns, packed, boxes }) {
   const squeezed = Uint8Array.from(atob(packed), (c) => c.charCodeAt(0));
   const stream = new Blob([squeezed]).stream().pipeThrough(new DecompressionStream("deflate"));
   const planes = new Uint8Array(await new Response(stream).arrayBuffer());
-  return new Map(columns.map((name, k) => {
+  const read = new Map(columns.map((name, k) => {
     const bytes = new Uint8Array(8 * rows);
     for (let b = 0; b < 8; b++) {
       const start = (8 * k + b) * rows;
@@ -39,6 +39,7 @@ async function unpack({ rows, columns, packed }) {
     }
     return [name, new Float64Array(bytes.buffer)];
   }));
+  return Object.assign(read, { boxes });
 }
 
 /** A row a tick, as in the view ticks; numbers in the shortest form that reads back to the same double. */

@@ -117,6 +117,11 @@ class ClipWeather:
     refracts: bool = False
 
     @property
+    def replaces_sky(self) -> bool:
+        """Whether `apply_weather` puts a sky of its own in place of that of the scene."""
+        return self.outside is not None
+
+    @property
     def reads_normals(self) -> bool:
         """Whether `apply_weather` reads the normals of a rasterisation: only a film on the road mirrors."""
         return self.outside is not None and self.outside.look.film is not None
@@ -274,8 +279,9 @@ def apply_weather(
     Parameters
     ----------
     weather : from `weather_scene`
-    picture : float32 [H, W, 3] linear picture of its scene before the clear environment [1]
-    clear_sky : float32 [H, W, 3] the clear environment in the same view, see `environment_view` [1]
+    picture : float32 [H, W, 3] linear picture of its scene before the clear environment, or before black if this
+        weather replaces it, see `ClipWeather.replaces_sky` [1]
+    clear_sky : float32 [H, W, 3] the clear environment in the same view, see `environment_view`, or black [1]
     gbuffer : the rasterisation it was made from
     shutter : pose, motion, time and exposure of the frame
     particles : False if `particle_layer` draws them afterwards, for a sensor with a lens or a rolling shutter, whose
@@ -293,6 +299,7 @@ def apply_weather(
     view = world_to_camera(shutter.T_world_camera)
     cloudy = environment_view(outside.environment, view, shutter.K, shutter.width, shutter.height)
     layers = [light_layer(picture, gbuffer, clear_sky, cloudy, sky)]
+    dry = recompose_layers(picture, layers)
     if film is not None:
         state = weather.state
         on_road = RoadFilm(
@@ -304,7 +311,6 @@ def apply_weather(
             refracts=weather.refracts,
         )
         light = LightOnRoad(environment=outside.environment, sky=sky, extinction=air.extinction)
-        dry = recompose_layers(picture, layers)
         layers.append(wet_layer(dry, gbuffer, shutter, rays, on_road, light))
     layers.append(air_layer(gbuffer, cloudy, air, sky, rays))
     if particles and outside.population is not None:
@@ -312,7 +318,7 @@ def apply_weather(
     return WeatherFrame(
         base=picture,
         layers=tuple(layers),
-        picture=recompose_layers(picture, layers),
+        picture=recompose_layers(dry, layers[1:]),
         blend=_blend_anchors(weather, outside, (picture, clear_sky, gbuffer, shutter)),
     )
 

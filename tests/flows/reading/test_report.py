@@ -15,6 +15,7 @@ from flows.store.telemetry import read_columns
 from tasks.conventions import TICK_CHANNELS
 from tests.browsers import find_barriers, open_chromium
 from tests.flows.reseal import reseal
+from tests.toy_street import write_toy_grid
 
 
 @pytest.fixture(scope="module")
@@ -263,3 +264,35 @@ def test_labels_are_text_in_the_page_whatever_they_hold(browser, toy_dataset, tm
             page.click("#csv")
         first = next(csv.reader(download.value.path().read_text().splitlines()[1:2]))
         assert first[1].startswith("'=HYPERLINK")
+
+
+ROAD_USERS = """\
+name: users
+scene: {folder}/scene
+camera: {folder}/camera.yaml
+frames: 6
+frame_rate_hz: 10
+axes:
+  road:
+    lead: {{initial_speed_km_h: 20, objects: [{{kind: car, track: {{gap_m: 9, speed_km_h: 10}}}}]}}
+    alone: {{initial_speed_km_h: 20}}
+"""
+
+
+def test_the_box_of_a_road_user_stands_over_the_frame_that_is_shown(browser, tmp_path):
+    generate_dataset(write_toy_grid(tmp_path, ROAD_USERS), str(tmp_path / "ds"), runner="threads", workers=1)
+    table = read_columns(tmp_path / "ds/telemetry/objects/clip-00000.parquet", most=6)
+    make_report(str(tmp_path / "ds"), out=str(tmp_path / "page"))
+    for page in opened(browser, tmp_path / "page"):
+        for frame in (0, 4):
+            page.evaluate(f"scrub({frame / 10})")
+            shown = page.locator("figure.a svg.boxes rect")
+            found = {name: float(shown.get_attribute(name)) for name in ("x", "y", "width", "height")}
+            left, top, right, bottom = (
+                table[f"box_{side}"][frame] for side in ("left", "top", "right", "bottom")
+            )
+            assert found == {"x": left, "y": top, "width": right - left, "height": bottom - top}
+        assert page.text_content("figure.a svg.boxes text") == "car"
+        assert page.locator("figure.b svg.boxes rect").count() == 0
+        page.uncheck("#boxes input")
+        assert page.locator("svg.boxes rect").count() == 0
