@@ -8,17 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.side_by_side import least_cpu_s, make_row, print_rows
+from studies.evaluation.metrics.flip import flip_error
+from studies.evaluation.metrics.no_reference import piqe, temporal_error
+from studies.evaluation.metrics.road_edit import score_road_edit
+from studies.evaluation.metrics.severity import measure_image, sampled_frames
 from studies.synthetic_street import Clip, drive_clip
 from tasks.conventions import SemanticClass
-from tasks.eval.flip import flip_error
 from tasks.eval.image_quality import ssim
-from tasks.eval.no_reference import piqe, temporal_error
 from tasks.eval.poses.essential import recover_motion_essential
 from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.poses.photometric import recover_motion_photometric
 from tasks.eval.poses.pnp import recover_motion_pnp
-from tasks.eval.road_edit import score_road_edit
-from tasks.eval.severity import measure_image, sampled_frames
 
 PITCH_LIMITS_DEG = {"pnp": 0.04, "photometric": 0.02, "essential": 0.06}
 """Pitch RMSE allowed in clear weather [deg]."""

@@ -56,6 +56,8 @@ HEAT_COLUMN = "braking_heat_j_kg"
 """Column of runs.csv with the heat of the discs that an import estimates; a campaign may lack it."""
 SLOPE_COLUMN = "felt_slope_rad"
 """Column of runs.csv with the slope of the road that an import reads off the accelerometer; a campaign may lack it."""
+GAUGE_CHECKS = ("common_rest", "highest_rest")
+"""Checks of a brake pressure that rests above 0."""
 STEEPEST_ROAD = 0.4
 """Slope beyond which no road goes: our own choice, above the grade that `physical_limits.yaml` allows [rad]."""
 
@@ -165,6 +167,7 @@ def read_campaign(folder: str | Path) -> Campaign:
         zero = find_brake_rest(measure_resting_levels(taught, interval))
     runs = [run.lower_pressure(zero) for run in runs] if zero else runs
     rest = find_throttle_rest([run for run in runs if not run.held_out])
+    resting = (one.sentence for one in violations if one.check.name in GAUGE_CHECKS)
     split = "\n".join(["train", *sorted(train), "held_out", *sorted(held_out)])
     return Campaign(
         name=header.campaign,
@@ -177,6 +180,7 @@ def read_campaign(folder: str | Path) -> Campaign:
         brake_signal=signal if header.brake_stands_for is None else header.brake_stands_for,
         brake_rest=zero,
         throttle_rest=rest,
+        resting_gauge="" if zero else next(resting, ""),
     )
 
 

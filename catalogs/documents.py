@@ -64,23 +64,6 @@ def read_content(path: Path, kind: str, largest: int) -> bytes:
         raise InputError(f"{where}: a {kind} must have a proper file name; {shorten(error)}") from None
 
 
-def read_yaml(path: Path, kind: str, *, finite: bool = True) -> dict[str, Any]:
-    """The table that a YAML file holds; the rules are those of `parse_yaml`.
-
-    Parameters
-    ----------
-    path : the file
-    kind : what it is called in the sentences
-    finite : refuse infinite numbers and NaN here; False for a reader that does so beside its other rules
-
-    Raises
-    ------
-    InputError
-        If it cannot be read or breaks a rule.
-    """
-    return parse_yaml(read_content(path, kind, LARGEST_YAML), path, kind, finite=finite)
-
-
 def parse_yaml(content: bytes, origin: object, kind: str, *, finite: bool = True) -> dict[str, Any]:
     """The table that YAML text holds.
 

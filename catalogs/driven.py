@@ -75,10 +75,10 @@ def read_driven(inputs: Path) -> DrivenClips | None:
     InputError
         If a file is missing or holds something else.
     """
-    place = inputs / POLICY
-    if not place.is_file():
+    path = inputs / POLICY
+    if not path.is_file():
         return None
-    entry = parse_entry(PolicyEntry, read_content(place, "policy", LARGEST_POLICY), place, "policy")
+    entry = parse_entry(PolicyEntry, read_content(path, "policy", LARGEST_POLICY), path, "policy")
     file = inputs / PRESSURES
     try:
         table = pq.read_table(file, columns=["label", "pressure_mpa"])

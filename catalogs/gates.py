@@ -23,7 +23,8 @@ class ForeignGateEntry(CatalogueEntry):
 class GateEntry(ForeignGateEntry):
     """Content of a gate file for generated clips: with depth, degrees and metres are judged too.
 
-    The file that an older dataset keeps has no limits of the rig's other motion, and leaves it unjudged.
+    The file that an older dataset keeps has no limits of the rig's other motion, and leaves it unjudged; it also halves
+    no pictures.
     """
 
     pitch_rmse_deg: Annotated[Scalar, require_quantity("deg", above=0)]
@@ -34,3 +35,4 @@ class GateEntry(ForeignGateEntry):
     rise_rmse_m: Annotated[Scalar, require_quantity("m", above=0)] | None = None
     heave_gain_error: Annotated[Scalar, require_quantity("1", above=0)] | None = None
     heave_gain_std: Annotated[Scalar, require_quantity("1", above=0)] | None = None
+    halved_from_px: Annotated[Scalar, require_quantity("px", above=0)] | None = None

@@ -5,6 +5,7 @@ from typing import Annotated
 from pydantic import AfterValidator, Field, WithJsonSchema
 
 from catalogs.sentences import is_encodable, shorten_value
+from tasks.render.weather.named_sky import SKY_NAMES
 from tasks.surface.weather import WEATHERS, find_weather_problem
 
 LONGEST_NAME = 100
@@ -58,6 +59,13 @@ def _check_weather(name: str) -> str:
     return name
 
 
+def _check_sky(name: str) -> str:
+    if name not in SKY_NAMES:
+        *others, last = SKY_NAMES
+        raise ValueError(f"must be {', '.join(others)} or {last}; it is {shorten_value(name)}")
+    return name
+
+
 Name = Annotated[str, AfterValidator(_check_name)]
 Label = Annotated[str, AfterValidator(_check_label)]
 WeatherName = Annotated[
@@ -67,3 +75,10 @@ WeatherName = Annotated[
     WithJsonSchema({"type": "string", "enum": list(WEATHERS)}),
 ]
 """Name of a kind of weather: of a row of the table."""
+SkyName = Annotated[
+    str,
+    Field(strict=True),
+    AfterValidator(_check_sky),
+    WithJsonSchema({"type": "string", "enum": list(SKY_NAMES)}),
+]
+"""Name of a kind of sky."""

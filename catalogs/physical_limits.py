@@ -7,13 +7,16 @@ from catalogs.quantities import CatalogueEntry, Scalar, require_quantity
 Speed = Annotated[Scalar, require_quantity("km h-1", above=0)]
 Seconds = Annotated[Scalar, require_quantity("s", above=0)]
 Metres = Annotated[Scalar, require_quantity("m", above=0)]
+Degrees = Annotated[Scalar, require_quantity("deg", above=0)]
 Rate = Annotated[Scalar, require_quantity("mm h-1", above=0)]
 
 
 class PhysicalLimits(CatalogueEntry):
-    """The largest value of each quantity, and of a speed and a hazard's length also the smallest; ``position`` is along
-    the route, ``brake_time`` any time of a brake, ``hazard_slope`` of a feature's steepest flank, ``road_grade`` of a
-    scene's steepest road."""
+    """The largest value of each quantity, and of a speed, a hazard's length and the sun's height also the smallest.
+
+    ``position`` is along the route, ``brake_time`` any time of a brake, ``hazard_slope`` of a feature's steepest flank,
+    ``road_grade`` of a scene's steepest road.
+    """
 
     rain_rate: Rate
     snow_rate: Rate
@@ -31,6 +34,9 @@ class PhysicalLimits(CatalogueEntry):
     hazard_slope: Annotated[Scalar, require_quantity("1", above=0)]
     strut_travel: Metres
     road_grade: Annotated[Scalar, require_quantity("1", above=0)]
+    sun_azimuth: Degrees
+    sun_elevation: Degrees
+    lowest_sun_elevation: Degrees
     frame_rate: Annotated[Scalar, require_quantity("Hz", above=0)]
     frames: Annotated[Scalar, require_quantity("1", minimum=2)]
 

@@ -193,8 +193,8 @@ def trace_file(folder: Path, case: str) -> Path:
     InputError
         If there is none.
     """
-    places = [folder, *sorted(path for path in folder.iterdir() if path.is_dir())]
-    found = [place / f"{case}.parquet" for place in places if (place / f"{case}.parquet").is_file()]
+    folders = [folder, *sorted(path for path in folder.iterdir() if path.is_dir())]
+    found = [file for parent in folders if (file := parent / f"{case}.parquet").is_file()]
     if not found:
         raise InputError(f"{folder}: case {case} needs {case}.parquet here or one folder down; there is none")
     return found[0]

@@ -7,7 +7,7 @@ from operator import attrgetter
 from typing import Any
 
 from catalogs.entries import load
-from catalogs.names import WeatherName
+from catalogs.names import SkyName, WeatherName
 from catalogs.physical_limits import (
     PhysicalLimits,
     find_least_problem,
@@ -15,6 +15,7 @@ from catalogs.physical_limits import (
 )
 from catalogs.quantities import Scalar
 from catalogs.road_users import RoadUser
+from tasks.render.weather.named_sky import OVERCAST
 from tasks.surface.weather import DRY, WEATHERS, find_weather
 
 
@@ -37,7 +38,11 @@ class Scenario:
     hazard_center_m, hazard_length_m : where on the route the road feature lies and how long it is [m]
     hazard_height_m : positive a hump, negative a depression, 0 a flat road [m]
     objects : road users beside the ego vehicle; in no row of a table, which has one value a column
-    scene : that it drives in; None is the one scene of its grid, and stands in no row
+    scene : that it drives in; None is the one scene of its grid
+    falling : rain or snow falls in the picture; where it has ended, the road is as it left it
+    sky : kind of sky; None is closed cloud where it falls and on ice, else what the visual seed draws
+    sun_azimuth_deg, sun_elevation_deg : of the sun, from world +x towards +y and above the horizon; None is what the
+        visual seed draws [deg]
     """
 
     weather: WeatherName = DRY
@@ -55,6 +60,10 @@ class Scenario:
     hazard_length_m: float = 0.0
     hazard_height_m: float = 0.0
     scene: str | None = None
+    falling: bool = True
+    sky: SkyName | None = None
+    sun_azimuth_deg: float | None = None
+    sun_elevation_deg: float | None = None
     objects: tuple[RoadUser, ...] = ()
 
     @classmethod
@@ -66,7 +75,9 @@ class Scenario:
     def as_row(self) -> dict[str, Any]:
         """The fields in order, for a row of a table."""
         row = dict(zip(SCENARIO_FIELDS, _read_fields(self), strict=True))
-        return row if self.scene is None else row | {"scene": self.scene}
+        return row | {
+            name: value for name, usual in OPTIONAL_FIELDS.items() if (value := getattr(self, name)) != usual
+        }
 
     def as_record(self) -> dict[str, Any]:
         """The row and the road users, if any, for a manifest or a content id."""
@@ -74,13 +85,22 @@ class Scenario:
         return self.as_row() | ({"objects": users} if users else {})
 
 
-SCENARIO_FIELDS = tuple(field.name for field in fields(Scenario) if field.name not in {"scene", "objects"})
-"""Fields of every scenario; the scene is one of those alone whose grid has several, and road users are a list."""
+OPTIONAL_FIELDS = {
+    name: Scenario.__dataclass_fields__[name].default
+    for name in ("scene", "falling", "sky", "sun_azimuth_deg", "sun_elevation_deg")
+}
+"""Fields that stand in a row only where they have another value than this one."""
+SCENARIO_FIELDS = tuple(
+    field.name for field in fields(Scenario) if field.name not in {*OPTIONAL_FIELDS, "objects"}
+)
+"""Fields of every row; road users are a list."""
 _read_fields = attrgetter(*SCENARIO_FIELDS)
-NUMBERS = tuple(name for name in SCENARIO_FIELDS if name not in {"weather", "hold_speed"})
+SUN_ANGLES = ("sun_azimuth_deg", "sun_elevation_deg")
+SWITCHES = ("hold_speed", "falling")
+NUMBERS = (*(name for name in SCENARIO_FIELDS if name not in {"weather", "hold_speed"}), *SUN_ANGLES)
 NOT_NEGATIVE = (
     "precipitation_mm_h", "snow_accumulation_h", "peak_pressure_mpa", "hazard_length_m", "ramp_s", "release_s",
-    "brake_onset_s", "brake_onset_m", "hold_s",
+    "brake_onset_s", "brake_onset_m", "hold_s", *SUN_ANGLES,
 )  # fmt: skip
 HIGHEST = {
     "precipitation_mm_h": "rain_rate",
@@ -91,6 +111,8 @@ HIGHEST = {
     **dict.fromkeys(("ramp_s", "hold_s", "release_s", "brake_onset_s"), "brake_time"),
     **dict.fromkeys(("brake_onset_m", "hazard_center_m"), "position"),
     "hazard_length_m": "hazard_length",
+    "sun_azimuth_deg": "sun_azimuth",
+    "sun_elevation_deg": "sun_elevation",
 }
 """Physical limit of each number, of a height by its size; a kind of weather may have another one of its rate."""
 UNKNOWN_WEATHER = "unknown"
@@ -156,6 +178,15 @@ def _find_weather_problems(s: Scenario) -> list[str]:
         problems.append(
             f"snow_accumulation_h belongs to {lying}; the weather is {s.weather} and it is {s.snow_accumulation_h:g}"
         )
+    if not s.falling and kind.rate_limit is None:
+        problems.append(f"falling: false belongs to weather that falls; the weather is {s.weather}")
+    falls = s.falling and kind.rate_limit is not None
+    if falls and s.sky not in (None, OVERCAST):
+        problems.append(
+            f"sky {s.sky}: {s.weather} falls from closed cloud: name {OVERCAST}, or falling: false where it has ended"
+        )
+    if any(getattr(s, name) is not None for name in SUN_ANGLES) and s.sky in (None, OVERCAST):
+        problems.append("sun_azimuth_deg and sun_elevation_deg need a named sky with a sun")
     return problems
 
 
@@ -172,6 +203,10 @@ def find_range_problems(scenario: Scenario) -> list[str]:
     found = [
         find_least_problem("initial_speed_km_h", scenario.initial_speed_km_h, limits.slowest_initial_speed)
     ]
+    if scenario.sun_elevation_deg is not None:
+        found.append(
+            find_least_problem("sun_elevation_deg", scenario.sun_elevation_deg, limits.lowest_sun_elevation)
+        )
     found += [find_limit_problem(*one) for one in _list_limits(scenario, limits)]
     return problems + [problem for problem in found if problem is not None]
 
@@ -182,6 +217,7 @@ def list_ranges() -> dict[str, tuple[float | None, float]]:
     least: dict[str, float] = dict.fromkeys(NOT_NEGATIVE, 0.0)
     least["initial_speed_km_h"] = limits.slowest_initial_speed.value
     least["hazard_height_m"] = -limits.hazard_height.value
+    least["sun_elevation_deg"] = limits.lowest_sun_elevation.value
     return {name: (least.get(name), getattr(limits, highest).value) for name, highest in HIGHEST.items()}
 
 

@@ -3,6 +3,7 @@
 import os
 import sys
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from importlib.metadata import version
 from inspect import Parameter, Signature
 from typing import Annotated, Any
@@ -121,7 +122,7 @@ def _make_callback(command: Command) -> Callable[..., None]:
     """Return the function that Typer calls, whose signature carries the command's options."""
 
     def callback(**words: Any) -> None:
-        given = {option.name: words[option.name] for option in command.options}
+        given = {option.name: _read_value(option, words) for option in command.options}
         as_flow = words.get(AS_FLOW.name, False) or "PREFECT_API_URL" in os.environ
         result = run_function(command, given, as_flow)
         as_json = words.get(AS_JSON.name, False) or given.get(command.json_with, False)
@@ -134,10 +135,33 @@ def _make_callback(command: Command) -> Callable[..., None]:
         *([AS_FLOW] if command.is_flow else []),
         *([AS_JSON] if command.output != "nothing" else []),
     ]
-    parameters = [_make_parameter(option) for option in options]
+    parameters = [_make_parameter(one) for option in options for one in _list_flags(option)]
     callback.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     callback.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
     return callback
+
+
+def _list_flags(option: Option) -> list[Option]:
+    """Return an option, whose value is a word, and the flag that is short for one of its words."""
+    if not option.values:
+        return [option]
+    word = next(word for word, value in option.values.items() if value == option.default)
+    flag = Option(
+        name=f"no_{option.name}",
+        spelling=f"no_{option.keyword}",
+        kind=bool,
+        help=f"The same as --{option.keyword} {option.off}.",
+        default=False,
+    )
+    return [replace(option, default=word), *([flag] if option.off else [])]
+
+
+def _read_value(option: Option, words: Mapping[str, Any]) -> Any:
+    """Return what the function takes for an option of the command line."""
+    word = option.off if words.get(f"no_{option.name}") else words[option.name]
+    if option.values and word not in option.values:
+        raise InputError(f"--{option.keyword} must be one of {', '.join(option.values)}; it is {word}")
+    return option.values[word] if option.values else word
 
 
 def _make_parameter(option: Option) -> Parameter:

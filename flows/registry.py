@@ -5,7 +5,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
 
-from flows.commands import audits, datasets, evaluation, measured, scenes, vehicles
+from flows.commands import audits, datasets, measured, scenes, vehicles
 from flows.commands.command import Command
 
 LABORATORY = "studies.commands"
@@ -23,7 +23,6 @@ def list_laboratory() -> tuple[Command, ...]:
 COMMANDS: tuple[Command, ...] = (
     *datasets.COMMANDS,
     *audits.COMMANDS,
-    *evaluation.COMMANDS,
     *vehicles.COMMANDS,
     *measured.COMMANDS,
     *scenes.COMMANDS,

@@ -161,13 +161,13 @@ def find_reasons(changed: Sequence[str], differences: Sequence[Mapping[str, Any]
     return list(dict.fromkeys(row["input"] for row in differences if first in row["reaches"]))
 
 
-def find_value_differences(a: Any, b: Any, place: str = "") -> list[tuple[str, Any, Any]]:
+def find_value_differences(a: Any, b: Any, path: str = "") -> list[tuple[str, Any, Any]]:
     """Leaves at which two JSON-like values differ, as (path, in a, in b).
 
     Parameters
     ----------
     a, b : values; tables are compared key by key, lists of one length item by item
-    place : path so far
+    path : path so far
     """
     if isinstance(a, Mapping) and isinstance(b, Mapping):
         keys: list[Any] = sorted(a.keys() | b.keys(), key=str)
@@ -175,9 +175,9 @@ def find_value_differences(a: Any, b: Any, place: str = "") -> list[tuple[str, A
     elif isinstance(a, list) and isinstance(b, list) and len(a) == len(b):
         pairs = [(str(i), x, y) for i, (x, y) in enumerate(zip(a, b, strict=True))]
     else:
-        return [] if a == b else [(place, a, b)]
+        return [] if a == b else [(path, a, b)]
     return [
-        row for key, x, y in pairs for row in find_value_differences(x, y, f"{place}.{key}" if place else key)
+        row for key, x, y in pairs for row in find_value_differences(x, y, f"{path}.{key}" if path else key)
     ]
 
 

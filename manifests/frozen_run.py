@@ -103,8 +103,8 @@ def find_differences(
     asked = {clip["label"]: _without_hash(clip) for clip in frozen["clips"]}
     rows += find_value_differences(asked, {clip["label"]: _without_hash(clip) for clip in clips}, "clips")
     return [
-        f"{place} is {format_value(there)} in the manifest and {format_value(here)} here"
-        for place, there, here in rows
+        f"{field} is {format_value(there)} in the manifest and {format_value(here)} here"
+        for field, there, here in rows
     ]
 
 

@@ -75,13 +75,13 @@ def git_commit(root: Path = SOURCE_ROOT) -> dict[str, Any] | None:
                "status", "--porcelain=v2", "--branch", "--", *SOURCE_PACKAGES]  # fmt: skip
     variables = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
     try:
-        said = subprocess.run(
+        description = subprocess.run(
             command, cwd=root, env=variables, stdin=subprocess.DEVNULL, capture_output=True, text=True,
             timeout=GIT_WAIT_S, check=True,
         ).stdout  # fmt: skip
     except (OSError, subprocess.SubprocessError):
         return None
-    lines = said.splitlines()
+    lines = description.splitlines()
     commit = next((line.split()[-1] for line in lines if line.startswith("# branch.oid ")), "(initial)")
     changed = any(not line.startswith("#") for line in lines)
     return None if commit == "(initial)" else {"commit": commit, "changed": changed}

@@ -12,10 +12,10 @@ from pydantic import AfterValidator, ConfigDict, Field, TypeAdapter, ValidationE
 from typing_extensions import TypedDict
 
 from catalogs.road_users import RoadUser
-from catalogs.scenario import SCENARIO_FIELDS, Scenario
+from catalogs.scenario import OPTIONAL_FIELDS, SCENARIO_FIELDS, Scenario
 from catalogs.sentences import cap_problems, describe_rules, shorten_value
 from manifests.canonical import ID_LENGTH
-from tasks.conventions import CLIP_CHANNELS
+from tasks.conventions import CLIP_CHANNELS, SOME_CLIPS_CHANNELS
 from tasks.errors import InputError
 from tasks.eval.motion_agreement import PoseVerdict
 
@@ -66,7 +66,7 @@ def _check_road_users(users: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return users
 
 
-_FIGURE_NAMES = {channel.name for channel in CLIP_CHANNELS}
+_FIGURE_NAMES = {channel.name for channel in (*CLIP_CHANNELS, *SOME_CLIPS_CHANNELS)}
 STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
 Inputs = Annotated[dict[InputName, Sha256], _require_keys(EVERY_INPUT)]
@@ -78,14 +78,20 @@ if TYPE_CHECKING:  # their keys follow from what they record
     VerdictRecord = dict[str, Any]
 else:
     _fields = get_type_hints(Scenario, include_extras=True)
+    _optional = {name: NotRequired[_fields[name]] for name in OPTIONAL_FIELDS}
     _users = Annotated[list[dict[str, Any]], AfterValidator(_check_road_users), Field(min_length=1)]
     ScenarioRecord = with_config(STRICT)(
         TypedDict(
-            "ScenarioRecord", {**_fields, "scene": NotRequired[LocalName], "objects": NotRequired[_users]}
+            "ScenarioRecord",
+            {**_fields, **_optional, "scene": NotRequired[LocalName], "objects": NotRequired[_users]},
         )
     )
     # a dataset decides what it has: a figure that came later is not represented
-    _figures = {c.name: NotRequired[float | None] for c in CLIP_CHANNELS if c.name not in SCENARIO_FIELDS}
+    _figures = {
+        c.name: NotRequired[float | None]
+        for c in (*CLIP_CHANNELS, *SOME_CLIPS_CHANNELS)
+        if c.unit and c.name not in {*SCENARIO_FIELDS, *OPTIONAL_FIELDS}
+    }
     FiguresRecord = with_config(STRICT)(
         TypedDict(
             "FiguresRecord",
@@ -223,14 +229,14 @@ class FrozenRun(TypedDict):
 Record = TypeVar("Record", Receipt, PlanRecord, ManifestHead, Manifest, FrozenRun)
 
 
-def check_record(form: type[Record], value: Any, place: object) -> Record:
+def check_record(form: type[Record], value: Any, origin: object) -> Record:
     """A value that was read, in its form; numbers that canonical JSON shortens are floats again.
 
     Parameters
     ----------
     form : `Receipt`, `PlanRecord`, `ManifestHead`, `Manifest` or `FrozenRun`
     value : parsed JSON
-    place : what messages call it
+    origin : what messages call it
 
     Raises
     ------
@@ -240,11 +246,11 @@ def check_record(form: type[Record], value: Any, place: object) -> Record:
     try:
         record: Record = _ADAPTERS[form].validate_python(value)
     except ValidationError as error:
-        uneven = [f"{place}: {problem}" for problem in _find_uneven_figures(value)]
-        raise InputError(cap_problems(uneven + describe_rules(error, place))) from None
+        uneven = [f"{origin}: {problem}" for problem in _find_uneven_figures(value)]
+        raise InputError(cap_problems(uneven + describe_rules(error, origin))) from None
     problems = _find_clip_problems(value.get("clips", [])) + _find_input_problems(value)
     if problems := cap_problems(problems + _find_uneven_figures(value)):
-        raise InputError([f"{place}: {problem}" for problem in problems])
+        raise InputError([f"{origin}: {problem}" for problem in problems])
     return record
 
 
@@ -257,14 +263,14 @@ def _find_uneven_figures(value: Any) -> list[str]:
     """Figures that some clips of one record have and others lack: one version makes all of its clips alike."""
     clips = value.get("clips") if isinstance(value, Mapping) else None
     held = {
-        place: clip["figures"].keys() & _FIGURE_NAMES
-        for place, clip in enumerate(clips if isinstance(clips, list) else [])
+        index: clip["figures"].keys() & _FIGURE_NAMES
+        for index, clip in enumerate(clips if isinstance(clips, list) else [])
         if isinstance(clip, Mapping) and isinstance(clip.get("figures"), Mapping)
     }
     every: set[str] = set().union(*held.values())
     return [
-        f"clips.{place}.figures.{name} is missing: other clips have it"
-        for place, names in held.items()
+        f"clips.{index}.figures.{name} is missing: other clips have it"
+        for index, names in held.items()
         for name in sorted(every - names)
     ]
 
@@ -275,7 +281,7 @@ def _find_clip_problems(clips: Sequence[Mapping[str, Any]]) -> list[str]:
         "every clip must have a label of its own; some have the same": _are_distinct(clips, "label"),
         "every clip must have an id of its own; some have the same": _are_distinct(clips, "clip_id"),
         "the clips must stand in the order of their index, from 0; they do not": all(
-            clip.get("index", place) == place for place, clip in enumerate(clips)
+            clip.get("index", index) == index for index, clip in enumerate(clips)
         ),
     }
     return [rule for rule, kept in rules.items() if not kept]

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 CONTROLS: dict[str, tuple[str, ...]] = {
-    "weather": ("weather", "precipitation_mm_h", "snow_accumulation_h"),
+    "weather": ("weather", "precipitation_mm_h", "snow_accumulation_h", "falling"),
+    "light": ("sky", "sun_azimuth_deg", "sun_elevation_deg"),
     "speed": ("initial_speed_km_h",),
     "braking": (
         "peak_pressure_mpa",
@@ -39,7 +40,7 @@ def iterate_pairs(clips: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]
     ----------
     clips : records with ``clip_id``, ``label``, ``scenario`` and ``figures``
     """
-    # places in compact arrays: a million pairs as tuples would outweigh the clips
+    # indices in compact arrays: a million pairs as tuples would outweigh the clips
     first, second, turned = array("i"), array("i"), array("b")
     names = sorted(CONTROLS)
     for code, control in enumerate(names):
@@ -48,8 +49,8 @@ def iterate_pairs(clips: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]
                 first.append(i)
                 second.append(j)
                 turned.append(code)
-    for place in np.lexsort((np.asarray(turned), np.asarray(second), np.asarray(first))):
-        a, b, control = clips[first[place]], clips[second[place]], names[turned[place]]
+    for index in np.lexsort((np.asarray(turned), np.asarray(second), np.asarray(first))):
+        a, b, control = clips[first[index]], clips[second[index]], names[turned[index]]
         if _list_differing(a, b, control):
             yield _make_pair(a, b, control)
 
@@ -58,8 +59,8 @@ def _group_clips(clips: Sequence[Mapping[str, Any]], control: str) -> Iterator[l
     """Clips that are alike in all other controls."""
     others = [name for other, names in CONTROLS.items() if other != control for name in names]
     groups: dict[tuple[Any, ...], list[int]] = {}
-    for place, clip in enumerate(clips):
-        groups.setdefault(tuple(_read_control(clip, name) for name in others), []).append(place)
+    for index, clip in enumerate(clips):
+        groups.setdefault(tuple(_read_control(clip, name) for name in others), []).append(index)
     yield from groups.values()
 
 

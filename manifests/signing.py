@@ -28,13 +28,13 @@ LARGEST_ENVELOPE = 2**20
 """Bytes of an envelope [1]: a signature takes 200."""
 
 
-def load_signer(pem: bytes, place: object) -> CryptoSigner:
+def load_signer(pem: bytes, origin: object) -> CryptoSigner:
     """The signer of a private key.
 
     Parameters
     ----------
     pem : PKCS#8 in PEM, as ``openssl genpkey -algorithm ed25519`` writes it
-    place : where it comes from, for the sentence
+    origin : where it comes from, for the sentence
 
     Raises
     ------
@@ -42,27 +42,27 @@ def load_signer(pem: bytes, place: object) -> CryptoSigner:
         If it is no Ed25519 private key, or needs a passphrase.
     """
     if b"PUBLIC KEY-----" in pem:
-        raise InputError(f"{place}: signing needs the private key; this is a public key")
+        raise InputError(f"{origin}: signing needs the private key; this is a public key")
     try:
         key = load_pem_private_key(pem, password=None)
     except TypeError:
-        raise InputError(f"{place}: the private key must have no passphrase; it has one") from None
+        raise InputError(f"{origin}: the private key must have no passphrase; it has one") from None
     except (ValueError, UnsupportedAlgorithm):
         raise InputError(
-            f"{place}: must be an Ed25519 private key in PEM; it cannot be read as one"
+            f"{origin}: must be an Ed25519 private key in PEM; it cannot be read as one"
         ) from None
     if not isinstance(key, Ed25519PrivateKey):
-        raise InputError(f"{place}: must be an Ed25519 private key; it is of another algorithm")
+        raise InputError(f"{origin}: must be an Ed25519 private key; it is of another algorithm")
     return CryptoSigner(key)
 
 
-def load_verifier(pem: bytes, place: object) -> SSlibKey:
+def load_verifier(pem: bytes, origin: object) -> SSlibKey:
     """The public key that signatures are checked with.
 
     Parameters
     ----------
     pem : SubjectPublicKeyInfo in PEM, as ``openssl pkey -pubout`` writes it
-    place : where it comes from, for the sentence
+    origin : where it comes from, for the sentence
 
     Raises
     ------
@@ -71,14 +71,16 @@ def load_verifier(pem: bytes, place: object) -> SSlibKey:
     """
     if b"PRIVATE KEY-----" in pem:
         raise InputError(
-            f"{place}: verifying needs the public key; this is a private key, which stays with its owner"
+            f"{origin}: verifying needs the public key; this is a private key, which stays with its owner"
         )
     try:
         key = load_pem_public_key(pem)
     except (ValueError, UnsupportedAlgorithm):
-        raise InputError(f"{place}: must be an Ed25519 public key in PEM; it cannot be read as one") from None
+        raise InputError(
+            f"{origin}: must be an Ed25519 public key in PEM; it cannot be read as one"
+        ) from None
     if not isinstance(key, Ed25519PublicKey):
-        raise InputError(f"{place}: must be an Ed25519 public key; it is of another algorithm")
+        raise InputError(f"{origin}: must be an Ed25519 public key; it is of another algorithm")
     return SSlibKey.from_crypto(key)
 
 

@@ -155,9 +155,9 @@ def _describe_content(heading: str, path: Path, content: object, level: int = 2)
         further = "; ".join(f"{k} {format_value(v)}" for k, v in rest.items())
         rows.append((f"`{key}`", value, entry.get("unit", ""), further, entry["source"]))
     table = format_table(("entry", "value", "unit", "further", "source"), rows)
-    place = path.relative_to(CATALOGUE.parent).as_posix()
+    shown = path.relative_to(CATALOGUE.parent).as_posix()
     comment = format_cell(_read_comment(path))
-    return f"\n{'#' * level} {heading}\n\n`{place}`{': ' + comment if comment else ''}\n\n{table}\n"
+    return f"\n{'#' * level} {heading}\n\n`{shown}`{': ' + comment if comment else ''}\n\n{table}\n"
 
 
 def _read_comment(path: Path) -> str:

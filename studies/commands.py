@@ -15,7 +15,9 @@ from flows.commands.command import (
     select_keys,
 )
 from flows.commands.measured import MODE
+from studies.evaluation import commands as evaluation
 
+EVALUATION = "Evaluation"
 MEASURED, KNOWN, PAPER = "Drives of real cars", "Known truths and faults", "The paper"
 ORIGINS, SPEED = "Where numbers come from", "Speed"
 WIDE_COLUMNS = {
@@ -67,21 +69,6 @@ def shorten_controls(result: Result) -> Result:
             {"control": row["control"], "seen by metric (methods)": seen or row["reason"] or "none"}
         )
     return {key: result[key] for key in ("all_detected", "undetected")} | {"controls": controls}
-
-
-def show_table(result: Result) -> Result:
-    """Return the table of a judged set with a text in each cell, and what is missing."""
-    from studies.video_sets.judge_set import format_cell
-
-    rows = [{key: format_cell(cell) for key, cell in row.items()} for row in result["table"]]
-    empty = {key for key in rows[0] if all(row[key] == "-" for row in rows)}
-    table = [{key: cell for key, cell in row.items() if key not in empty} for row in rows]
-    return {
-        "protocol": result["protocol"],
-        "window": result["window"],
-        "table": table,
-        "missing": result["missing"],
-    }
 
 
 COMMANDS = (
@@ -225,39 +212,6 @@ COMMANDS = (
         options=(define_argument("name", str | None, "Benchmark to run; by default all.", None), OUT),
     ),
     Command(
-        name="lab judge-set",
-        group=PAPER,
-        sentence="Judge the clips of video editors by a protocol: a table of models, the paper's figures beside them.",
-        function="studies.video_sets.judge_set:judge_video_set",
-        options=(
-            define_argument(
-                "folder", str, "Folder of models, sources, claims and targets (docs/evidence/evaluation.md)."
-            ),
-            define_option(
-                "protocol",
-                str,
-                "Protocol: YAML file, or the name of one in studies/video_sets.",
-                "paper",
-            ),
-            define_option("out", str, "Folder for judge-set.json, judge-set.md and motion.svg."),
-            define_option(
-                "learned",
-                str | None,
-                "YAML file of local checkpoints of learned judges (CLIP, DOVER, FAST-VQA, LPIPS).",
-                None,
-            ),
-            define_option(
-                "window",
-                int | None,
-                "Smoothing of the table's motion figures [frames]: 0, 5, 7 or 9; by default the protocol's.",
-                None,
-                minimum=0,
-                maximum=9,
-            ),
-        ),
-        brief=show_table,
-    ),
-    Command(
         name="lab real-photos",
         group=KNOWN,
         sentence="Train a small network with frames and ask it about your photographs of dry, wet and snowy roads.",
@@ -287,4 +241,60 @@ COMMANDS = (
         passed=require_key("follows"),
         output="sentences",
     ),
+    Command(
+        name="lab sheets",
+        group=PAPER,
+        sentence="Draw one place in every weather, and each road feature before, at and after the wheels touch it.",
+        function="studies.paper.sheets:draw_sheets",
+        options=(
+            DATASET,
+            define_option("out", str, "Folder for weather.png and hazards.png."),
+            define_option(
+                "station",
+                float | None,
+                "Station on the route where the weathers are shown [m].",
+                None,
+                shown_default="12, or as far as every clip comes",
+            ),
+            define_option(
+                "beside",
+                list[str] | None,
+                "Finished dataset of another street, whose weathers come below; repeat it for more.",
+                None,
+            ),
+        ),
+    ),
+    Command(
+        name="lab aeb",
+        group=EVALUATION,
+        sentence="Emergency brakes against UN R152 and Euro NCAP in every weather: the speed of the impact.",
+        function="studies.emergency_braking.compare:compare_brakes",
+        options=(
+            define_option("vehicle", str, VEHICLE.help, "bmw-320i", known=VEHICLE.known),
+            define_option(
+                "protocol",
+                list[str] | None,
+                "Protocol of emergency_braking.yaml, or an OpenSCENARIO file; by default each.",
+                None,
+            ),
+            define_option("weather", list[str] | None, "Weather of that file; by default each.", None),
+            define_option(
+                "brake",
+                list[str] | None,
+                "blind, friction or driver; by default each.",
+                None,
+                known=("blind", "friction", "driver"),
+            ),
+            define_option(
+                "policy",
+                str | None,
+                "module:function of a brake of your own, as of musync drive, beside these.",
+                None,
+            ),
+            define_option("bounds", bool, "Drive each approach under the bounds of the surface too.", True),
+            OUT,
+        ),
+        brief=lambda result: {"summary": result["summary"]},
+    ),
+    *evaluation.COMMANDS,
 )

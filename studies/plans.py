@@ -4,10 +4,12 @@ from pathlib import Path
 from typing import Any
 
 from catalogs.documents import LARGEST_YAML, read_content
-from catalogs.quantities import CatalogueEntry, parse_entry
+from catalogs.quantities import CatalogueEntry, CatalogueList, parse_entry
 
 
-def load_plan(form: type[CatalogueEntry], folder: Path, name_or_path: str | Path, kind: str) -> Any:
+def load_plan(
+    form: type[CatalogueEntry | CatalogueList[Any]], folder: Path, name_or_path: str | Path, kind: str
+) -> Any:
     """Return what a plan builds, by the name of a file in the study's folder or by its own file.
 
     Parameters

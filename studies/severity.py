@@ -16,8 +16,8 @@ from flows.making.driving import simulate_drive
 from flows.making.pictures import frame_rows, render_frames, rig_of
 from flows.making.plan import freeze_grid
 from flows.store.layout import write_atomically
+from studies.evaluation.metrics.severity import measure_image, severity_agreement
 from tasks.conventions import ROAD_CLASSES
-from tasks.eval.severity import measure_image, severity_agreement
 
 SEEDS = (1, 2, 3)
 FRAMES, FRAME_RATE_HZ = 5, 2.0

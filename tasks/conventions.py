@@ -25,6 +25,8 @@ class SemanticClass(IntEnum):
     OTHER = 10
 
 
+GRAVITY = 9.80665
+"""Standard acceleration of free fall (CGPM 1901) [m/s2]."""
 ROAD_CLASSES = (SemanticClass.ROAD, SemanticClass.MARKING)
 """Classes that hold the water film and the snow cover, and that follow the road profile."""
 ANY_HEADING = "any-heading"
@@ -203,23 +205,24 @@ OBJECT_CHANNELS: tuple[Channel, ...] = (
 )  # fmt: skip
 """Columns of the table of road users beside the frame, a row a frame and road user."""
 
-VARIANT_CHANNEL = Channel(
-    name="variant",
-    unit="",
-    symbol="",
-    description="coupling that is cut on purpose, as in the paper's ablation: the picture is the scenario's, the motion is not; a sound dataset has no such column",
-)
-"""Column of the clips table of a dataset in which a coupling is cut."""
-
-SCENE_CHANNEL = Channel(
-    name="scene", unit="", symbol="", description="scene that the clip drives in; of a dataset with several"
-)
-"""Column of the clips table of a dataset of several scenes."""
+SOME_CLIPS_CHANNELS = (
+    Channel(name="variant", unit="", symbol="", description="coupling that is cut on purpose, as in the paper's ablation: the picture is the scenario's, the motion is not; a sound dataset has no such column"),
+    Channel(name="scene", unit="", symbol="", description="scene that the clip drives in; of a dataset with several"),
+    Channel(name="falling", unit="", symbol="", description="rain or snow falls in the picture; false where it has ended and the road is as it left it"),
+    Channel(name="sky", unit="", symbol="", description="kind of sky; null is closed cloud where it falls and on ice, else what the visual seed draws"),
+    Channel(name="sun_azimuth_deg", unit="degree", symbol="", description="direction of the sun, from world +x towards +y; null is what the visual seed draws"),
+    Channel(name="sun_elevation_deg", unit="degree", symbol="", description="height of the sun above the horizon; null is what the visual seed draws"),
+    Channel(name="focal_length_px", unit="px", symbol="", description="focal length of the camera, of a dataset whose clips draw their own"),
+    Channel(name="camera_height", unit="m", symbol="", description="height of the camera above the road, of such a dataset"),
+    Channel(name="camera_pitch", unit="rad", symbol="", description="pitch of the camera on the body, nose-down positive, of such a dataset"),
+    Channel(name="camera_roll", unit="rad", symbol="", description="roll of the camera on the body, to the right positive, of such a dataset"),
+)  # fmt: skip
+"""Columns of the clips table that a dataset has only where its grid asks for something that it needs them for."""
 
 CHANNELS_BY_NAME: dict[str, Channel] = {
     c.name: c
     for c in (
-        VARIANT_CHANNEL, SCENE_CHANNEL, *IDENTITY_CHANNELS, *TICK_CHANNELS, *FRAME_CHANNELS, *CLIP_CHANNELS, *CHECK_CHANNELS, *PAIR_CHANNELS,
+        *SOME_CLIPS_CHANNELS, *IDENTITY_CHANNELS, *TICK_CHANNELS, *FRAME_CHANNELS, *CLIP_CHANNELS, *CHECK_CHANNELS, *PAIR_CHANNELS,
         *OBJECT_CHANNELS,
     )
 }  # fmt: skip

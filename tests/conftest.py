@@ -88,7 +88,7 @@ def pytest_sessionfinish() -> None:
 def own_notes(folder: Path) -> Iterator[None]:
     """Keep the notes of where scenes lie in a folder, and not in the user's cache."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("flows.making.places.cache_root", lambda: folder)
+        patch.setattr("flows.making.locations.cache_root", lambda: folder)
         yield
 
 

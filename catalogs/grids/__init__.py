@@ -3,10 +3,9 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from catalogs.documents import parse_yaml
-from catalogs.grids.blocks import fields_set_by, list_combinations, names_scenes
+from catalogs.grids.blocks import fields_set_by, list_combinations
 from catalogs.grids.faults import read_form
 from catalogs.grids.form import GridFile
 from catalogs.grids.selection import CALIBRATION, facts_of, split_of
@@ -92,22 +91,15 @@ def build_grid(content: bytes, path: Path) -> Grid:
 
 def expand_grid(settings: GridFile, origin: str) -> Grid:
     """The product of the blocks, later ones over earlier ones over ``base``, less what is excluded, each checked."""
-    base = fields_set_by(settings.base)
     # a value that every level overrides is checked too: it is in the file
-    problems: dict[str, list[str]] = {problem: ["base"] for problem in find_range_problems(Scenario(**base))}
+    in_base = find_range_problems(Scenario(**fields_set_by(settings.base)))
+    problems: dict[str, list[str]] = {problem: ["base"] for problem in in_base}
     scenarios, tags, left_out = [], [], 0
     labels: set[str] = set()
     idle = set(range(len(settings.exclude)))
-    several = names_scenes(settings)
-    for combination in list_combinations(settings):
-        label = "/".join(level for level, _ in combination)
-        merged: dict[str, Any] = dict(base)
-        for _, partial in combination:
-            merged |= partial
-        if several:
-            merged.setdefault("scene", settings.scene)
-        scenario = Scenario(**merged)
-        unknown = [name for name, value in merged.items() if value != value or value == UNKNOWN_WEATHER]
+    for label, fields in list_combinations(settings, settings.base, settings.scene):
+        scenario = Scenario(**fields)
+        unknown = [name for name, value in fields.items() if value != value or value == UNKNOWN_WEATHER]
         facts = facts_of(scenario)
         met = {number for number, condition in enumerate(settings.exclude) if condition.holds(facts)}
         idle -= met

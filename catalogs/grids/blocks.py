@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-from catalogs.names import Label, WeatherName
+from catalogs.names import Label, SkyName, WeatherName
 from catalogs.road_users import RoadUser
 from catalogs.scenario import NUMBERS
 from catalogs.sentences import shorten
@@ -49,6 +49,10 @@ class PartialScenario(Strict):
     hazard_center_m: Number | None = None
     hazard_length_m: Number | None = None
     hazard_height_m: Number | None = None
+    falling: bool | None = None
+    sky: SkyName | None = None
+    sun_azimuth_deg: Number | None = None
+    sun_elevation_deg: Number | None = None
     objects: tuple[RoadUser, ...] | None = Field(
         default=None,
         exclude_if=lambda users: users is None,
@@ -139,13 +143,18 @@ def count_combinations(blocks: Blocks) -> int:
     return prod(counts)
 
 
-def list_combinations(blocks: Blocks) -> Iterator[list[Level]]:
-    """Every combination of the blocks' levels, each a list of (name, fields), in the order in which they are written.
+def list_combinations(blocks: Blocks, base: PartialScenario, scene: str) -> Iterator[Level]:
+    """Yield the label and the fields of every combination of the blocks' levels, in the order as they are written.
 
     Parameters
     ----------
-    blocks : to be multiplied: axes, then zip, then scenarios, then the hypercube
+    blocks : to be multiplied: axes, then zip, then scenarios, then the hypercube; later ones overrule earlier ones
+    base : fields that the levels overrule
+    scene : of the clips whose levels name none, where others' do
     """
+    axes = [*blocks.axes.values(), *blocks.zip.values(), blocks.scenarios]
+    several = any(level.scene is not None for levels in axes for level in levels.values())
+    default = ({"scene": scene} if several else {}) | fields_set_by(base)
     factors = [[[level] for level in _list_levels(axis)] for axis in blocks.axes.values()]
     if blocks.zip:
         steps = zip(*(_list_levels(axis) for axis in blocks.zip.values()), strict=True)
@@ -155,18 +164,11 @@ def list_combinations(blocks: Blocks) -> Iterator[list[Level]]:
     if blocks.latin_hypercube:
         factors.append([[level] for level in _draw_levels(blocks.latin_hypercube)])
     for combination in product(*factors):
-        yield [level for part in combination for level in part]
-
-
-def names_scenes(blocks: Blocks) -> bool:
-    """Return whether a level of the blocks names a scene, so that every clip does.
-
-    Parameters
-    ----------
-    blocks : of a grid
-    """
-    axes = [*blocks.axes.values(), *blocks.zip.values(), blocks.scenarios]
-    return any(level.scene is not None for levels in axes for level in levels.values())
+        levels = [level for part in combination for level in part]
+        fields = dict(default)
+        for _, set_by_level in levels:
+            fields |= set_by_level
+        yield "/".join(name for name, _ in levels), fields
 
 
 def _list_levels(axis: Mapping[str, PartialScenario]) -> list[Level]:

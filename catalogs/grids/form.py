@@ -113,7 +113,10 @@ class GridFile(Blocks):
         exclude_if=lambda compression: compression == "zstd",
         description="Of stored frames, without loss; lz4 is written more slowly and read more quickly, for training.",
     )
-    pictures: bool = Field(default=True, description="false makes telemetry alone, as --no-frames does.")
+    pictures: bool | Literal["later"] = Field(
+        default=True,
+        description="later makes frames when they are read, as --frames later does; false makes telemetry alone.",
+    )
     base: PartialScenario = Field(default=PartialScenario(), description="Fields of every scenario.")
     exclude: list[Condition] = Field(
         default=[], description="Combinations to leave out: those that meet any of these conditions."
@@ -169,6 +172,11 @@ class GridFile(Blocks):
             level for axes in (self.axes, self.zip) for axis in axes.values() for level in axis.values()
         ]
         return [user for level in levels for user in level.objects or ()]
+
+    @property
+    def stores_frames(self) -> bool:
+        """Whether frames are made with the telemetry; ``pictures`` alone says whether there are any to be seen."""
+        return self.pictures is True
 
     @property
     def has_objects(self) -> bool:

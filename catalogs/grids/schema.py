@@ -4,7 +4,7 @@ from typing import Any
 
 from catalogs.entries import entry_names, load
 from catalogs.grids import GridFile
-from catalogs.scenario import SCENARIO_FIELDS, Scenario, list_ranges
+from catalogs.scenario import OPTIONAL_FIELDS, SCENARIO_FIELDS, Scenario, list_ranges
 from catalogs.scenes import BUILT_IN
 from catalogs.street_names import HIGHEST_SEED, KINDS
 from tasks.conventions import CHANNELS_BY_NAME
@@ -37,7 +37,7 @@ def grid_schema() -> dict[str, Any]:
     schema = GridFile.model_json_schema()
     schema |= {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "muSync grid"}
     fields, ranges = schema["$defs"]["PartialScenario"]["properties"], list_ranges()
-    for name in (*SCENARIO_FIELDS, "scene"):
+    for name in (*SCENARIO_FIELDS, *OPTIONAL_FIELDS):
         channel = CHANNELS_BY_NAME[name]
         unit = f" [{channel.unit}]" if channel.unit else ""
         bounds = zip(("minimum", "maximum"), ranges.get(name, (None, None)), strict=True)

@@ -9,7 +9,7 @@ from pydantic import Field, RootModel, model_validator
 from catalogs.calibrated_range import CALIBRATION_TAGS, calibration_tag
 from catalogs.entries import load
 from catalogs.grids.blocks import Number, Strict
-from catalogs.scenario import NUMBERS, SCENARIO_FIELDS, Scenario
+from catalogs.scenario import NUMBERS, OPTIONAL_FIELDS, SCENARIO_FIELDS, SWITCHES, Scenario
 from catalogs.sentences import shorten_value
 from tasks.surface.weather import find_weather_problem
 
@@ -42,7 +42,7 @@ class Condition(RootModel[dict[str, Value | Annotated[list[Value], Field(min_len
 
     @model_validator(mode="after")
     def _names_are_known(self) -> "Condition":
-        known = (*SCENARIO_FIELDS, "scene", CALIBRATION)
+        known = (*SCENARIO_FIELDS, *OPTIONAL_FIELDS, CALIBRATION)
         problems = [
             f"{name}: no such field; there are {', '.join(known)}" for name in self.root if name not in known
         ]
@@ -73,10 +73,8 @@ class Condition(RootModel[dict[str, Value | Annotated[list[Value], Field(min_len
 
 def facts_of(scenario: Scenario) -> dict[str, Any]:
     """Return the facts that conditions test: the scenario's fields and its place in the calibrated range."""
-    return scenario.as_row() | {
-        "scene": scenario.scene,
-        CALIBRATION: calibration_tag(scenario, load("calibrated range")),
-    }
+    optional = {name: getattr(scenario, name) for name in OPTIONAL_FIELDS}
+    return scenario.as_row() | optional | {CALIBRATION: calibration_tag(scenario, load("calibrated range"))}
 
 
 def split_of(facts: Mapping[str, Any], splits: Mapping[str, Condition]) -> str | None:
@@ -95,7 +93,7 @@ def _find_value_problem(name: str, wanted: Any) -> str | None:
         return None if right else f"must be a number or an interval; it is {shorten_value(wanted)}"
     if name == "weather":
         return find_weather_problem(wanted)
-    if name == "hold_speed" and not isinstance(wanted, bool):
+    if name in SWITCHES and not isinstance(wanted, bool):
         return f"must be true or false; it is {shorten_value(wanted)}"
     return None
 

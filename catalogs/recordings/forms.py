@@ -183,10 +183,10 @@ def describe_twice(path: Path, name: str, choices: Mapping[str, str]) -> str:
     name : in the map
     choices : name by which a map takes a column, and where it stands; two or more
     """
-    places = ", ".join(f"{choice} ({where})" if where else choice for choice, where in choices.items())
+    listed = ", ".join(f"{choice} ({where})" if where else choice for choice, where in choices.items())
     return (
         f"{path.name}: signal {shorten(name, 60)} stands {len(choices)} times: in the map name one of them as its"
-        f" source: {shorten(places)}"
+        f" source: {shorten(listed)}"
     )
 
 

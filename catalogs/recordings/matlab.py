@@ -66,9 +66,9 @@ class Column:
         if len(self.scopes) == 1:  # text among the file's variables says nothing of one of them
             return ""
         info = inner.get("DataInfo")
-        places = [inner, info] if isinstance(info, dict) else [inner]
+        groups = [inner, info] if isinstance(info, dict) else [inner]
         return next(
-            (text for place in places for name in UNIT_NAMES if isinstance(text := place.get(name), str)), ""
+            (text for group in groups for name in UNIT_NAMES if isinstance(text := group.get(name), str)), ""
         )
 
 

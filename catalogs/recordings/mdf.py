@@ -90,8 +90,8 @@ def _name_channels(recording: Any) -> dict[str, Position]:
     """Return the position of each channel by the name for a map: GROUP.NAME where a name stands in several groups."""
     clocks = set(recording.masters_db.items())
     named: dict[str, Position] = {}
-    for name, places in recording.channels_db.items():
-        own = [position for position in places if position not in clocks]
+    for name, occurrences in recording.channels_db.items():
+        own = [position for position in occurrences if position not in clocks]
         labels = [_label_group(recording, position[0], [other for other, _ in own]) for position in own]
         names = [name] if len(own) == 1 else number_names([f"{label}.{name}" for label in labels])
         named |= zip(names, own, strict=True)
@@ -115,9 +115,9 @@ def _find_by_group(recording: Any, wanted: str) -> Position | None:
     """Return the one channel that a name of the form GROUP.NAME means, by any label of its group; else None."""
     found = [
         position
-        for name, places in recording.channels_db.items()
+        for name, occurrences in recording.channels_db.items()
         if wanted.endswith(f".{name}")
-        for position in places
+        for position in occurrences
         if wanted.removesuffix(f".{name}") in _list_labels(recording, position[0])
     ]
     return found[0] if len(found) == 1 else None

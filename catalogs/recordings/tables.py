@@ -47,7 +47,7 @@ class Table:
     names : of all columns, by which a map takes them
     load : returns columns by name, or why one cannot be of numbers; its rows are numbered below the names
     units : that the file states, by name
-    places : where a column stands, and what is written with its name, by name
+    described : where a column stands, and what is written with its name, by name
     csv : how text is written; None of a file that is no text
     """
 
@@ -55,7 +55,7 @@ class Table:
     names: list[str]
     load: Callable[[Iterable[str]], Mapping[str, pd.Series | str]]
     units: Mapping[str, str]
-    places: Mapping[str, str] = field(default_factory=dict)
+    described: Mapping[str, str] = field(default_factory=dict)
     csv: CsvEntry | None = None
 
     def spell(self, channel_map: ChannelMap | None, name: str) -> Spelling:
@@ -139,7 +139,7 @@ def _find_name_problems(table: Table, wanted: tuple[str, ...]) -> list[str]:
     for name in list(missing):
         if twice := [known for known in table.names if known.rpartition("#")[0] == name]:
             missing.remove(name)
-            problems.append(describe_twice(table.path, name, {k: table.places.get(k, "") for k in twice}))
+            problems.append(describe_twice(table.path, name, {k: table.described.get(k, "") for k in twice}))
     if missing:
         plain = tuple(name.split("#")[0] for name in wanted)
         row = None if table.csv is None else find_row_of_names(table.path, table.csv, plain)
@@ -235,7 +235,7 @@ def _open_csv(path: Path, options: CsvEntry) -> Table:
         names=names,
         load=lambda wanted: {name: text.samples[names.index(name)] for name in wanted},
         units=dict(zip(names, units, strict=False)),
-        places={n: ", ".join([f"column {k + 1}", *cells[k]]) for k, n in enumerate(names)},
+        described={n: ", ".join([f"column {k + 1}", *cells[k]]) for k, n in enumerate(names)},
         csv=options,
     )
 
@@ -247,11 +247,11 @@ def _open_parquet(path: Path, _: CsvEntry) -> Table:
     names = number_names([column.name for column in fields])
 
     def load(wanted: Iterable[str]) -> dict[str, pd.Series | str]:
-        places = [names.index(name) for name in wanted]
+        positions = [names.index(name) for name in wanted]
         with open_parquet(content, path.name) as parquet:
-            table = parquet.read(columns=list({fields[k].name for k in places}), use_threads=False)
+            table = parquet.read(columns=list({fields[k].name for k in positions}), use_threads=False)
             read = dict(zip(number_names(table.column_names), table.columns, strict=True))
-            columns = {names[k]: make_series(read[names[k]]) for k in places}
+            columns = {names[k]: make_series(read[names[k]]) for k in positions}
         return {
             name: f"it is of {fields[names.index(name)].type}"
             if column is None
@@ -264,7 +264,7 @@ def _open_parquet(path: Path, _: CsvEntry) -> Table:
         names=names,
         load=load,
         units={name: read_unit(column) or "" for name, column in zip(names, fields, strict=True)},
-        places={name: f"column {k + 1}, {fields[k].type}" for k, name in enumerate(names)},
+        described={name: f"column {k + 1}, {fields[k].type}" for k, name in enumerate(names)},
     )
 
 

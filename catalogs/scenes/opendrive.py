@@ -166,7 +166,7 @@ def _add_elevation(
 
 
 def _drop_even(value: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return which places to keep: not those with the value of the places before and after them."""
+    """Return which points to keep: not those with the value of the points before and after them."""
     even = np.abs(np.diff(value)) < STRAIGHT
     return ~np.concatenate([[False], even[1:] & even[:-1], [False]])
 

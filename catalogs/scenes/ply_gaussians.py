@@ -167,7 +167,7 @@ def _find_range(values: Floats) -> tuple[float, float]:
 def _decode_compressed(rows: dict[str, NDArray[np.void]], header: PlyHeader) -> RawCloud:
     vertex = rows["vertex"]
     chunk = np.arange(len(vertex)) // CHUNK_ROWS
-    place, scale, colour = (
+    mean, scale, colour = (
         [_gather(rows["chunk"], tuple(f"{end}_{name}" for name in group))[chunk] for end in ("min", "max")]
         if f"min_{group[0]}" in header.elements["chunk"].names
         else [np.zeros((len(vertex), 3), np.float32), np.ones((len(vertex), 3), np.float32)]
@@ -188,7 +188,7 @@ def _decode_compressed(rows: dict[str, NDArray[np.void]], header: PlyHeader) -> 
         sh = np.concatenate([sh, rest.reshape(len(vertex), 3, -1).transpose(0, 2, 1)], axis=1)
     with np.errstate(over="ignore", invalid="ignore"):
         return RawCloud(
-            means=_blend(place, _unpack(vertex["packed_position"], (11, 10, 11))),
+            means=_blend(mean, _unpack(vertex["packed_position"], (11, 10, 11))),
             quats=quats,
             scales=np.exp(_blend(scale, _unpack(vertex["packed_scale"], (11, 10, 11)))),
             opacities=shares[:, 3],

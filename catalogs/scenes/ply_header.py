@@ -163,15 +163,15 @@ def _read_render_mode(lines: list[list[str]]) -> tuple[bool, list[str]]:
         for line in lines
         if line[:1] == ["comment"]
     ]
-    said = [words for words in comments if re.fullmatch(r"splatrendermode:.*|antialiased \S+", words)]
-    unknown = [words for words in said if words not in RENDER_MODES]
-    modes = {RENDER_MODES[words] for words in said if words in RENDER_MODES}
+    modes_named = [words for words in comments if re.fullmatch(r"splatrendermode:.*|antialiased \S+", words)]
+    unknown = [words for words in modes_named if words not in RENDER_MODES]
+    modes = {RENDER_MODES[words] for words in modes_named if words in RENDER_MODES}
     problems = [
         f"a comment on how the cloud is drawn must be one of {', '.join(RENDER_MODES)}; it is {shorten(words, 60)!r}"
         for words in unknown
     ]
     if len(modes) > 1:
-        problems.append(f"comments must agree on how the cloud is drawn; they say {', '.join(said)}")
+        problems.append(f"comments must agree on how the cloud is drawn; they say {', '.join(modes_named)}")
     return True in modes, problems
 
 

@@ -24,9 +24,9 @@ LARGEST_FILE, LARGEST_JSON = 2**28, 2**26
 WIDTHS = {8: "TUM", 12: "KITTI", 13: "KITTI-360", 16: "4x4", 17: "KITTI-360"}
 """Numbers on a line, by the set that writes so many; those of KITTI-360 begin with the number of the picture."""
 COLMAP_WORDS = 10
-"""Words of a picture's line in COLMAP's images.txt [1]: number, quaternion, place, camera, name."""
+"""Words of a picture's line in COLMAP's images.txt [1]: number, quaternion, position, camera, name."""
 COLMAP_IMAGE = struct.Struct("<I7dI")
-"""A picture in COLMAP's images.bin, before its name: number, quaternion, place, camera."""
+"""A picture in COLMAP's images.bin, before its name: number, quaternion, position, camera."""
 COLMAP_POINT = 24
 """Bytes of a point of a picture in images.bin [1]."""
 LAST_ROW = (0, 0, 0, 1)
@@ -38,7 +38,7 @@ class PoseFile:
 
     Parameters
     ----------
-    poses : float64 [M, 4, 4] rotation and place, as they stand [unit of the file]
+    poses : float64 [M, 4, 4] rotation and position, as they stand [unit of the file]
     base : form that such a file has by its definition, of `tasks.conventions.POSE_FORMS`
     forms : those that it may have
     applied_transform : float64 [4, 4] what nerfstudio did to the frame of these poses before it wrote them
@@ -145,7 +145,7 @@ def _read_colmap_binary(content: bytes) -> PoseFile:
 
 
 def _sort_colmap(names: list[str], numbers: Floats) -> PoseFile:
-    """Poses of pictures in the order of their names, from quaternions, the scalar first, and places."""
+    """Poses of pictures in the order of their names, from quaternions, the scalar first, and positions."""
     order = _order_names(names)
     poses = make_poses(numbers[order, 4:], numbers[order, :4])
     return PoseFile(poses=poses, base="world-to-camera")
@@ -229,7 +229,7 @@ def read_numbers(lines: Sequence[tuple[int, list[str]]], columns: Sequence[int],
 
 
 def make_poses(positions: Floats, quats_wxyz: Floats) -> Floats:
-    """Poses [M, 4, 4] of places [M, 3] and unit quaternions [M, 4]."""
+    """Poses [M, 4, 4] of positions [M, 3] and unit quaternions [M, 4]."""
     length = np.linalg.norm(quats_wxyz, axis=1)
     if len(length) and np.abs(length - 1).max() > PRINTED_DIGITS:
         bad = int(np.abs(length - 1).argmax())

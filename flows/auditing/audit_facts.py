@@ -90,14 +90,17 @@ def list_unchecked(
         files = len(recorded_files(manifest)) + 1
         return [_count_unchecked("content", files, files, "files", "manifest.json itself is changed")]
     clips, pictures = len(manifest["clips"]), manifest["grid"].get("pictures", True)
+    recipes = clips if pictures == "later" else 0
     lost, files = len(compared["damaged"]), compared["files"] + len(compared["unrecorded"])
     writers = " and ".join(name_other_writers(manifest))
     strange = [
         path for path in compared["unrecorded"] if path not in {row["path"] for row in compared["damaged"]}
     ]
     rows = [
-        _count_unchecked("motion, pictures and pose check" if pictures else "motion", clips - remade, clips, "clips",
-            "not made again"),
+        _count_unchecked("motion, pictures and pose check" if pictures is True else "motion", clips - remade, clips,
+            "clips", "not made again"),
+        _count_unchecked("pictures and pose check", recipes, clips, "clips",
+            "made when they are read"),
         _count_unchecked("content", lost, files, "files", "damaged, or nobody recorded them"),
         _count_unchecked("content", len(strange), files, "files", f"nobody recorded them: {', '.join(strange)}"),
         _count_unchecked("bytes", len(others), files, "files", f"written by another {writers}; values are checked"),

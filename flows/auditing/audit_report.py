@@ -108,10 +108,10 @@ def describe_place(row: Mapping[str, Any]) -> str:
     """
     if "problem" in row:
         return f"{row['stage']}, {row['problem']}"
-    place = f", {row['counted_in']} {row['tick']}" if "tick" in row else ""
+    tick = f", {row['counted_in']} {row['tick']}" if "tick" in row else ""
     pixel = f", pixel {row['pixel'][0]} right and {row['pixel'][1]} down" if "pixel" in row else ""
     values = f": {row['recorded']} recorded, {row['remade']} made again" if "recorded" in row else ""
-    return f"{row['stage']}, {row['channel']}{place}{pixel}{values}"
+    return f"{row['stage']}, {row['channel']}{tick}{pixel}{values}"
 
 
 def write_audit_page(result: Mapping[str, Any]) -> str:

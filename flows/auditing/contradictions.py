@@ -90,14 +90,14 @@ def find_contradictions(
 
 def list_remade(plan: Plan) -> list[str]:
     """Return the paths of the files that `find_contradictions` holds against what our writer makes."""
-    names = arrays_of(plan.settings.labels, plan.settings.has_objects) if plan.settings.pictures else {}
+    names = arrays_of(plan.settings.labels, plan.settings.has_objects) if plan.settings.stores_frames else {}
     return [
         "plan.json",
         GRID,
         *SUMMARIES,
         *chain.from_iterable(table_parts(plan, table) for table in STAGED_TABLES),
         *(f"frames.zarr/{name}zarr.json" for name in (names and ["", *(f"{name}/" for name in names)])),
-        *([SHEET] if plan.settings.pictures else []),
+        *([SHEET] if plan.settings.stores_frames else []),
     ]
 
 
@@ -115,8 +115,8 @@ def _compare_json(
                 yield (
                     path,
                     [
-                        f"{path}: {place} must be {format_value(a)}, as in manifest.json; it is {format_value(b)}"
-                        for place, a, b in find_value_differences(manifest["grid"], found)
+                        f"{path}: {field} must be {format_value(a)}, as in manifest.json; it is {format_value(b)}"
+                        for field, a, b in find_value_differences(manifest["grid"], found)
                     ],
                 )
         except InputError as error:
@@ -131,8 +131,8 @@ def _compare_plan(layout: Layout, manifest: Manifest) -> Iterator[str]:
         return
     recorded: dict[str, Any] = {**manifest, "format": plan["format"]}
     recorded["clips"] = [{name: clip[name] for name in _list_names(ClipRecord)} for clip in manifest["clips"]]  # type: ignore[literal-required]
-    for place, a, b in find_value_differences({name: recorded[name] for name in plan}, plan):
-        yield f"plan.json: {place} must be {format_value(a)}, as in manifest.json; it is {format_value(b)}"
+    for field, a, b in find_value_differences({name: recorded[name] for name in plan}, plan):
+        yield f"plan.json: {field} must be {format_value(a)}, as in manifest.json; it is {format_value(b)}"
 
 
 def _list_names(record: type) -> Collection[str]:
@@ -162,7 +162,7 @@ def _compare_ids(manifest: Manifest, plan: Plan) -> Iterator[str]:
 
 def _compare_files(layout: Layout, manifest: Manifest, plan: Plan) -> Iterator[str]:
     """Yield the files that are recorded and not planned, or planned and not recorded, or recorded of another clip."""
-    arrays = arrays_of(plan.settings.labels, plan.settings.has_objects) if plan.settings.pictures else {}
+    arrays = arrays_of(plan.settings.labels, plan.settings.has_objects) if plan.settings.stores_frames else {}
     planned: dict[str, str | None] = dict.fromkeys(
         [*list_remade(plan), *(f"inputs/{name}" for name in plan.inputs)]
     )

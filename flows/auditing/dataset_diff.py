@@ -116,8 +116,8 @@ def format_text(result: Mapping[str, Any]) -> str:
     lines += [f"only in B: {label}" for label in result["only_in_b"]]
     lines.append("inputs that differ:" if result["why"] else "no recorded input differs")
     for row in result["why"]:
-        place = f"{row['input']} {row['path']}".strip()
-        lines.append(f"  {place}: {row['a']} -> {row['b']} (reaches {', '.join(row['reaches'])})")
+        field = f"{row['input']} {row['path']}".strip()
+        lines.append(f"  {field}: {row['a']} -> {row['b']} (reaches {', '.join(row['reaches'])})")
     for row in result["clips"]:
         because = ", ".join(row["why"]) or "no recorded input"
         lines.append(f"{row['label']}: {', '.join(row['changed'])} differ; can come from: {because}")

@@ -15,7 +15,7 @@ from flows.making.catalogue import Catalogue
 from flows.making.driven import refuse_driven
 from flows.making.driving import collect_surface_depths, controls_of, hazard_of, surface_of, weather_of
 from flows.making.input_changes import refuse_changed_records
-from flows.making.places import find_scene
+from flows.making.locations import find_scene
 from flows.making.plan import ClipPlan, Plan, read_plan
 from flows.making.traced import refuse_traced
 from flows.reading.suggestions import suggest_clips
@@ -103,11 +103,12 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
         grade=catalogue.grade,
     )  # fmt: skip
     response = compute_surface_response(vehicle, state.kind, state.friction)
+    route = find_route(plan.record_of(scenario.scene))
     steps = [
         *surface_steps(weather_of(driven), surface, vehicle, row),
         *force_steps(vehicle, response, hazard, mode, row, state.grip),
         *pitch_steps(vehicle, response, hazard, row, ride, steady),
-        *picture_steps(vehicle, catalogue.camera, row, first, find_route(plan.record_of(scenario.scene))),
+        *picture_steps(vehicle, catalogue.camera_of(int(planned.seed)), row, first, route),
     ]  # fmt: skip
     result = {
         "dataset": str(layout.root),

@@ -62,12 +62,12 @@ def find_footer_lies(file: pq.ParquetFile) -> Iterator[str]:
         rows = file.read_row_group(group)
         footer = file.metadata.row_group(group)
         for name, column in _list_leaves(rows):
-            place = next(i for i in range(footer.num_columns) if footer.column(i).path_in_schema == name)
-            said = footer.column(place).statistics
-            if said is None:
+            index = next(i for i in range(footer.num_columns) if footer.column(i).path_in_schema == name)
+            statistics = footer.column(index).statistics
+            if statistics is None:
                 continue
             for what, value in _measure_column(column).items():
-                stated = getattr(said, what) if what == "null_count" or said.has_min_max else None
+                stated = getattr(statistics, what) if what == "null_count" or statistics.has_min_max else None
                 if stated is not None and stated != value:
                     yield (
                         f"{what} of column {name.split('.')[0]} in row group {group} must be {format_value(value)}, as"
@@ -106,8 +106,8 @@ def find_writer_differences(file: pq.ParquetFile, wanted: bytes) -> list[str]:
     )
     rows = find_value_differences(ours, theirs)
     return [
-        f"{place} must be {format_value(a)}, as muSync writes it; it is {format_value(b)}"
-        for place, a, b in rows
+        f"{field} must be {format_value(a)}, as muSync writes it; it is {format_value(b)}"
+        for field, a, b in rows
     ] or ["must have the bytes that muSync writes of its values; it has others"]
 
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from itertools import islice, permutations, product
 
 from catalogs.grids import GridFile
-from catalogs.grids.blocks import count_combinations, fields_set_by, list_combinations, names_scenes
+from catalogs.grids.blocks import count_combinations, list_combinations
 from catalogs.grids.form import MOST_CLIPS
 from catalogs.grids.selection import CALIBRATION, facts_of
 from catalogs.scenario import Scenario
@@ -54,15 +54,8 @@ def _order_blocks(settings: GridFile) -> Iterator[GridFile]:
 def _compare_clips(settings: GridFile, plan: Plan, is_same_writer: bool) -> list[str]:
     if count_combinations(settings) > MOST_CLIPS:
         return []
-    base, several = fields_set_by(settings.base), names_scenes(settings)
-    asked: dict[str, Scenario] = {}
-    for combination in list_combinations(settings):
-        fields = dict(base)
-        for _, partial in combination:
-            fields |= partial
-        if several:
-            fields.setdefault("scene", settings.scene)
-        asked["/".join(level for level, _ in combination)] = Scenario(**fields)
+    combinations = list_combinations(settings, settings.base, settings.scene)
+    asked = {label: Scenario(**fields) for label, fields in combinations}
     seeds = range(settings.seed, settings.seed + settings.visual_seeds)
     wanted = {
         name_clip(label, seed, len(seeds)): (scenario, seed)

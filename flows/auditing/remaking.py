@@ -91,7 +91,7 @@ def _compare_clip(
     again = read_receipt(remade, clip_id)
     changed: dict[str, dict[str, Any]] = {}
     settings = plan.settings
-    arrays = arrays_of(settings.labels, settings.has_objects) if settings.pictures else ()
+    arrays = arrays_of(settings.labels, settings.has_objects) if settings.stores_frames else ()
     objects = (OBJECTS,) if settings.has_objects else ()
     for name in (*STAGED_TABLES, *objects, *arrays):
         digest = again["content"][name]
@@ -100,7 +100,7 @@ def _compare_clip(
                 columns = _read_as_stored(name, layout.root / parts[name, clip_id], remade, clip_id)
                 digest, stored = content_hash(name, columns[1]), _compare_rows(*columns)
             elif name == OBJECTS:
-                held, made = (read_objects(place, index, settings.frames) for place in (layout, remade))
+                held, made = (read_objects(side, index, settings.frames) for side in (layout, remade))
                 digest, stored = hash_objects(made), find_row_difference(held, made, list(made))
             else:
                 stored = _compare_pixels(layout, remade, index, name, digest, is_same_writer)
@@ -143,7 +143,7 @@ def _compare_pixels(
     layout: Layout, remade: Layout, index: int, name: str, digest: str, is_same_writer: bool
 ) -> dict[str, Any] | None:
     """Hold one array of a clip against the one made again; it is decoded only where its file is another."""
-    shard, again = (place.frame_shard(name, index) for place in (layout, remade))
+    shard, again = (side.frame_shard(name, index) for side in (layout, remade))
     if sha256_of_file(require_file(shard)) == sha256_of_file(again):
         return None
     recorded = read_clip(layout.frames, index, name)
@@ -162,6 +162,6 @@ def _compare_record(name: str, recorded: Any, again: Any) -> dict[str, dict[str,
     if name in {"figures", "verdict"}:
         # older records lack figures that their ticks and frames have
         again = {figure: value for figure, value in again.items() if figure in recorded}
-    for place, a, b in find_value_differences(recorded, again, name):
-        return {name: {"channel": place, "recorded": a, "remade": b}}
+    for field, a, b in find_value_differences(recorded, again, name):
+        return {name: {"channel": field, "recorded": a, "remade": b}}
     return {}

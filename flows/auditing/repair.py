@@ -4,12 +4,13 @@ from collections.abc import Iterable, Mapping
 from pathlib import PurePosixPath
 from typing import Any
 
+from flows.auditing.stored_frames import draw_sheet_again
 from flows.auditing.verify import compare_files
 from flows.making.gathering import table_parts, write_part
 from flows.making.generate import create_frame_arrays, fan_out, open_workers
 from flows.making.input_changes import recorded_inputs
 from flows.making.plan import Plan, read_plan
-from flows.making.seal import SHEET, preview_sheet
+from flows.making.seal import SHEET
 from flows.making.summaries import SUMMARIES, summarise_clips
 from flows.running.orchestration import run_as_stage
 from flows.running.runner import RunnerName, check_runner
@@ -100,15 +101,15 @@ def _repair_locked(
 
 def _refuse_files_as_folders(layout: Layout, paths: Iterable[str]) -> None:
     """Raise `InputError` where a folder is expected and something else exists, or a folder exists instead of a file."""
-    places = {place for path in paths for place in PurePosixPath(path).parents} - {PurePosixPath(".")}
-    wrong = [place for place in places if (layout.root / place).is_file()]
+    folders = {folder for path in paths for folder in PurePosixPath(path).parents} - {PurePosixPath(".")}
+    wrong = [path for path in folders if (layout.root / path).is_file()]
     wrong += [PurePosixPath(path) for path in paths if (layout.root / path).is_dir()]
     if wrong:
         raise InputError(
             [
-                f"{layout.root / place}: must not be a file where the dataset has a folder, nor a folder where it has a"
+                f"{layout.root / path}: must not be a file where the dataset has a folder, nor a folder where it has a"
                 " file: move it away and repair again"
-                for place in sorted(wrong)
+                for path in sorted(wrong)
             ]
         )
 
@@ -155,7 +156,7 @@ def restore_files(
 
 def _prepare_scratch(layout: Layout, scratch: Layout, manifest: Manifest) -> Plan:
     """Plan, inputs and empty arrays in the scratch folder, from the dataset, the manifest or the catalogue."""
-    plan = plan_of(manifest)
+    plan = Plan.of(manifest, "manifest.json")
     write_json(scratch.plan, plan.as_json())
     write_json(scratch.inputs / "grid.json", plan.settings.model_dump(mode="json"))
     inputs = recorded_inputs(layout, manifest)
@@ -181,19 +182,11 @@ def _compress_as_recorded(layout: Layout, scratch: Layout, damaged: list[str]) -
             write_atomically(made, (layout.root / kept).read_bytes())
 
 
-def plan_of(manifest: Manifest) -> Plan:
-    """The plan that a manifest was frozen from."""
-    return Plan.of(manifest, "manifest.json")
-
-
 def _remake_summaries(
     layout: Layout, scratch: Layout, plan: Plan, manifest: Manifest, wanted: Mapping[str, str]
 ) -> None:
     """Tables of clips and the contact sheet, which follow from the manifest and the other files."""
-    receipts = manifest["clips"]
-    for path, tables in summarise_clips(plan, receipts):
+    for path, tables in summarise_clips(plan, manifest["clips"]):
         write_tables(tables, scratch.root / path)
     if SHEET in wanted:
-        parts = {clip_id: path for path, ids in table_parts(plan, "frames").items() for clip_id in ids}
-        sheet = preview_sheet(layout, plan, receipts, lambda clip_id: layout.root / parts[clip_id])
-        write_atomically(scratch.root / SHEET, sheet)
+        write_atomically(scratch.root / SHEET, draw_sheet_again(layout, manifest, plan))

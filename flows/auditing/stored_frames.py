@@ -35,7 +35,7 @@ def compare_frame_metadata(
     is_same_writer : whether code and libraries are those that wrote the dataset; else only attributes that both have
         are compared, and words among them may be others
     """
-    if not plan.settings.pictures or "inputs/camera.yaml" in damaged:
+    if not plan.settings.stores_frames or "inputs/camera.yaml" in damaged:
         return
     try:
         arguments = describe_frame_arrays(layout, plan)
@@ -51,7 +51,7 @@ def compare_frame_metadata(
             if content == wanted:
                 continue
             if not is_same_writer:
-                members = [place.name for place in layout.frames.iterdir() if place.is_dir()]
+                members = [member.name for member in layout.frames.iterdir() if member.is_dir()]
                 check_frames(
                     read_local_metadata(layout.frames), members, layout.frames.name, *arguments["shape"][:2]
                 )
@@ -65,10 +65,10 @@ def compare_frame_metadata(
 def _compare_values(wanted: Any, found: Any, is_same_writer: bool) -> Iterator[str]:
     if not is_same_writer:
         wanted, found = ({"attributes": value.get("attributes", {})} for value in (wanted, found))
-    for place, a, b in find_value_differences(wanted, found):
-        if is_same_writer or not (place.rpartition(".")[2] in FREE_TEXT or ABSENT in (a, b)):
+    for field, a, b in find_value_differences(wanted, found):
+        if is_same_writer or not (field.rpartition(".")[2] in FREE_TEXT or ABSENT in (a, b)):
             yield (
-                f"{place} must be {format_value(a)}, by the plan and the kept camera; it is {format_value(b)}"
+                f"{field} must be {format_value(a)}, by the plan and the kept camera; it is {format_value(b)}"
             )
 
 
@@ -100,7 +100,7 @@ def compare_sheet(
     layout, manifest, plan : of a sealed dataset
     damaged : paths that are not read
     """
-    if plan.settings.pictures and SHEET not in damaged:
+    if plan.settings.stores_frames and SHEET not in damaged:
         try:
             same = require_file(layout.root / SHEET).read_bytes() == draw_sheet_again(layout, manifest, plan)
         except InputError as error:

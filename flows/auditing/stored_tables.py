@@ -77,10 +77,10 @@ def _compare_file(
 ) -> Iterator[Difference]:
     """Compare a table with what ``remake`` yields of it: ``names`` as recorded, and in ``lies`` what contradicts it."""
     try:
-        place = require_file(layout.root / path)
-        with pq.ParquetFile(place, pre_buffer=False, page_checksum_verification=True) as file:
+        file_path = require_file(layout.root / path)
+        with pq.ParquetFile(file_path, pre_buffer=False, page_checksum_verification=True) as file:
             present = [name for name in file.schema_arrow.names if name in names]
-            if _holds_bytes(place, encode_tables(remake(file))) and not lies:
+            if _holds_bytes(file_path, encode_tables(remake(file))) and not lies:
                 return
             lies.clear()
             schemas, words = zip(
@@ -105,8 +105,8 @@ def _find_word_lies(found: pa.Table, wanted: pa.Table) -> list[str]:
     ]  # fmt: skip
 
 
-def _holds_bytes(place: Path, pieces: Iterable[bytes]) -> bool:
-    with place.open("rb") as stream:
+def _holds_bytes(file_path: Path, pieces: Iterable[bytes]) -> bool:
+    with file_path.open("rb") as stream:
         return all(stream.read(len(piece)) == piece for piece in pieces) and not stream.read(1)
 
 
@@ -164,8 +164,8 @@ class _Part:
             # as gathering reads it, whose name for the elements is another than that of a new column
             columns |= {name: values[name].combine_chunks() for name in stored if columns[name].ndim > 1}
             columns |= {name: column[owners] for name, column in constants.items()}
-            for name, (known, places) in words.items():
-                columns[name] = pa.DictionaryArray.from_arrays(pa.array(places[owners]), pa.array(known))
+            for name, (known, codes) in words.items():
+                columns[name] = pa.DictionaryArray.from_arrays(pa.array(codes[owners]), pa.array(known))
             yield labelled_table({name: columns[name] for name in names})
 
     def _find_lies(self, clip: Receipt, columns: Columns) -> list[str]:
@@ -238,7 +238,7 @@ def _compare_figures(clip: Receipt, found: Mapping[str, float]) -> list[str]:
 
 
 def _number_words(words: Sequence[str]) -> tuple[list[str], NDArray[np.int32]]:
-    """Return the distinct words in the order of their first places, and the number of the one at each place."""
+    """Return the distinct words in the order of their first rows, and the number of each row's word."""
     known = {word: number for number, word in enumerate(dict.fromkeys(words))}
     return list(known), np.array([known[word] for word in words], np.int32)
 

@@ -11,7 +11,7 @@ from flows.store.layout import Layout
 from flows.store.links import foreign_entries
 from flows.store.lock import sole_writer
 from flows.store.outputs import Outputs
-from flows.store.sealed import read_manifest
+from flows.store.sealed import is_committed, read_manifest, read_manifest_head
 from flows.store.staging import BEGUN, left_overs, remove_left_overs, remove_staging
 from manifests.manifest import damaged_files, manifest_damage, recorded_files
 from manifests.signing import ENVELOPE
@@ -33,7 +33,8 @@ def verify_dataset(dataset: str, *, key: str | None = None, out: str | None = No
     Returns
     -------
     ``verdict``, a sentence; ``verified``; ``files``, ``intact``, ``damaged[]`` and ``unrecorded[]`` as of
-    `compare_files`; ``signed``, ``signature``, ``signers``, ``key_id`` and ``key_sha256`` as of `signature_findings`.
+    `compare_files`; ``recipes`` as of `check_recipes`; ``signed``, ``signature``, ``signers``, ``key_id`` and
+    ``key_sha256`` as of `signature_findings`.
 
     Raises
     ------
@@ -44,11 +45,16 @@ def verify_dataset(dataset: str, *, key: str | None = None, out: str | None = No
     with open_for_writing(dataset, want_everything) as layout:
         signature = signature_findings(layout, key)
         compared = run_as_stage(compare_files)(layout)
-    verified = compared["verified"] and signature["signed"] is not False
-    sentence = f"{describe_files(compared)}; {describe_signature(signature)}"
+        recipes = check_recipes(layout) if compared["verified"] else None
+    verified = (
+        compared["verified"] and signature["signed"] is not False and not (recipes and recipes["damaged"])
+    )
+    made = [describe_recipes(recipes)] if recipes else []
+    sentence = "; ".join([describe_files(compared), *made, describe_signature(signature)])
     result = {
         "verdict": f"{'verified' if verified else 'not verified'}: {sentence}",
         **compared,
+        "recipes": recipes,
         **signature,
         "verified": verified,
     }
@@ -76,6 +82,45 @@ def describe_files(compared: Mapping[str, Any]) -> str:
     if strange:
         clause += f", and {strange} more {'lies' if strange == 1 else 'lie'} there that nobody recorded"
     return clause
+
+
+def check_recipes(layout: Layout) -> dict[str, Any] | None:
+    """Return what is known of frames that are made when they are read; None of a dataset without such.
+
+    Parameters
+    ----------
+    layout : of a dataset whose files are those recorded
+
+    Returns
+    -------
+    ``clips``, whose frames are recipes; how many of them are ``made``, in the cache of this machine's code and
+    libraries; ``damaged[]``, labels of those among them whose files are not as made, or do not show the recorded motion
+    """
+    if read_manifest_head(layout)["grid"].get("pictures") != "later":
+        return None
+    # it imports what makes clips, which files alone need not wait for
+    from flows.reading.recipes import open_recipes
+
+    recipes = open_recipes(layout, read_manifest(layout))
+    plan, damaged = recipes.plan, []
+    made = [clip for clip in plan.clips if recipes.receipt(clip.index).is_file()]
+    for clip in made:
+        sound = is_committed(recipes.cache, clip.as_json(), plan.settings.rows_per_clip)
+        if not sound or recipes.read_motion(clip.index) != recipes.ticks[clip.index]:
+            damaged.append(clip.label)
+    return {"clips": len(plan.clips), "made": len(made), "damaged": damaged}
+
+
+def describe_recipes(recipes: Mapping[str, Any]) -> str:
+    """Return what is known of frames that are made when they are read, as a clause.
+
+    Parameters
+    ----------
+    recipes : of `check_recipes`
+    """
+    clause = f"the frames of {recipes['clips']} clips are recipes, {recipes['made']} of them made here"
+    damaged = recipes["damaged"]
+    return clause + (f", {len(damaged)} not as made: musync materialise makes them again" if damaged else "")
 
 
 def describe_signature(signature: Mapping[str, Any]) -> str:

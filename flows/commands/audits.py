@@ -4,7 +4,6 @@ from typing import Any
 
 from flows.commands.command import (
     DATASET,
-    GRID,
     OUT,
     RUNNER,
     Command,
@@ -24,11 +23,6 @@ LAW_COLUMNS = ("label", "passed", "laws", "column", "tightest", "not_judged")
 def shorten_law_rows(result: dict[str, Any]) -> dict[str, Any]:
     """Return the result of a physics audit with the main columns of each clip."""
     return result | {"clips": [{key: row[key] for key in LAW_COLUMNS} for row in result["clips"]]}
-
-
-def leave_out_differences(result: dict[str, Any]) -> dict[str, Any]:
-    """Return the result of a replay audit without the figures of every channel."""
-    return {key: value for key, value in result.items() if key != "largest_difference"}
 
 
 COMMANDS = (
@@ -98,7 +92,7 @@ COMMANDS = (
         name="lab audit-physics",
         group=GROUP,
         sentence="Compute every telemetry column and pose again; name law, tick, size and column of each break.",
-        function="flows.judging.physics:audit_physics",
+        function="flows.auditing.physics:audit_physics",
         options=(DATASET, OUT),
         brief=shorten_law_rows,
         passed=VERIFIED,
@@ -128,19 +122,5 @@ COMMANDS = (
         ),
         passed=require_key("agrees"),
         output="sentences",
-    ),
-    Command(
-        name="lab replay-audit",
-        group=GROUP,
-        sentence="Prove that visual seeds change the weather in the picture and nothing in the motion.",
-        function="flows.making.replay:replay_audit",
-        options=(
-            define_argument("grid", str, GRID.help, "severity", known=GRID.known),
-            define_option("seeds", int, "Number of visual seeds for each scenario.", 3),
-            define_option("frames", int, "Number of frames drawn from each run.", 2),
-            OUT,
-        ),
-        brief=leave_out_differences,
-        passed=VERIFIED,
     ),
 )

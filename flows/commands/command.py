@@ -1,6 +1,6 @@
 """One command as data: its name, the function it runs, its options, and what of the result is printed."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -25,6 +25,8 @@ class Option:
     minimum, maximum : bounds of a number
     in_store : whether the path may be an address in an object store
     known : values that the shell can complete: a list of them, or a pattern of files of the project, whose stems count
+    values : what the function takes for each word of the command line, where that is no text; there is no other word
+    off : word for which ``--no-`` and the option's name stands too
     """
 
     name: str
@@ -38,6 +40,8 @@ class Option:
     maximum: float | None = None
     in_store: bool = False
     known: tuple[str, ...] | str = ()
+    values: Mapping[str, Any] | None = None
+    off: str = ""
 
     @property
     def keyword(self) -> str:

@@ -30,12 +30,17 @@ VEHICLE = define_option(
     None,
     known="catalogs/vehicles/*.yaml",
 )
+FRAMES = {"stored": True, "later": "later", "none": False}
 PICTURES = define_option(
     "pictures",
-    bool,
-    "Render the frames; --no-frames makes telemetry alone.",
+    str,
+    "Store the frames, make them later, when they are read, or none; --no-frames is short for none.",
     True,
+    shown_default="stored",
     spelling="frames",
+    known=tuple(FRAMES),
+    values=FRAMES,
+    off="none",
 )
 
 
@@ -114,6 +119,14 @@ COMMANDS = (
         ),
         brief=list_quarantined_clips,
         passed=lambda result: not result.get("telemetry_differs"),
+    ),
+    Command(
+        name="materialise",
+        group=GROUP,
+        sentence="Make frames that were left for later, of all clips or some, so that no reader waits for them.",
+        function="flows.reading.materialise:materialise_frames",
+        options=(DATASET, CLIPS, *RUNNER[:2]),
+        brief=list_quarantined_clips,
     ),
     Command(
         name="drive",
@@ -295,29 +308,6 @@ COMMANDS = (
                 "out", str | None, "Folder for the page; by default DIR-report, beside the dataset.", None
             ),
             CLIPS,
-        ),
-    ),
-    Command(
-        name="lab sheets",
-        group=GROUP,
-        sentence="Draw one place in every weather, and each road feature before, at and after the wheels touch it.",
-        function="flows.reading.sheets:draw_sheets",
-        options=(
-            DATASET,
-            define_option("out", str, "Folder for weather.png and hazards.png."),
-            define_option(
-                "station",
-                float | None,
-                "Station on the route where the weathers are shown [m].",
-                None,
-                shown_default="12, or as far as every clip comes",
-            ),
-            define_option(
-                "beside",
-                list[str] | None,
-                "Finished dataset of another street, whose weathers come below; repeat it for more.",
-                None,
-            ),
         ),
     ),
     Command(

@@ -1,7 +1,7 @@
 """``musync drive``: a grid whose clips a policy brakes, as an ordinary dataset."""
 
 from dataclasses import fields, replace
-from typing import Any
+from typing import Any, Literal
 
 from catalogs.driven import DrivenClips, PolicyEntry, encode_driven
 from catalogs.entries import load
@@ -20,7 +20,13 @@ from tasks.errors import InputError
 
 
 def drive_grid(
-    grid: str, policy: str, out: str, *, rate_hz: float = 20.0, pictures: bool = True, **execution: Any
+    grid: str,
+    policy: str,
+    out: str,
+    *,
+    rate_hz: float = 20.0,
+    pictures: bool | Literal["later"] = True,
+    **execution: Any,
 ) -> dict[str, Any]:
     """Make the dataset of a grid whose clips a policy brakes.
 

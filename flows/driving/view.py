@@ -88,7 +88,9 @@ class StepCamera:
         )
         motion = RigMotion(
             T_world_rig=poses, frame_rate_hz=self._rate, first_frame=step - 1,
-            bodies=build_moving_bodies(self._scenario, self, motions, poses @ self.camera.T_rig_camera),
+            bodies=build_moving_bodies(
+                self._scenario, self, motions, poses @ self.camera.T_rig_camera, float(self.camera.K[0, 0])
+            ),
         )  # fmt: skip
         drawn = render_clip(
             self._edited, self.camera, motion, self._conditions, select_backend("auto"), relief=self._relief

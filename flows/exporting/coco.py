@@ -73,6 +73,7 @@ def write_coco(dataset: ExportedDataset, folder: Path) -> None:
                     images.append(
                         _describe_image(len(images) + 1, name, clip.label, frame, picture)
                         | {"T_world_camera": poses[frame].tolist()}
+                        | ({"K": clip.camera.K.tolist()} if dataset.camera.varies else {})
                         | ({} if named is None else {"scene": named})
                     )
                     masks = [
@@ -94,8 +95,8 @@ def write_coco(dataset: ExportedDataset, folder: Path) -> None:
         categories = [{"id": kind + 1, "name": kind.name.lower()} for kind in SemanticClass]
         if objects or dataset.plan.settings.has_objects:
             categories += [
-                {"id": FIRST_KIND + 1 + place, "name": kind, "supercategory": "object"}
-                for place, kind in enumerate(EVERY_KIND if dataset.plan.settings.has_objects else KINDS)
+                {"id": FIRST_KIND + 1 + index, "name": kind, "supercategory": "object"}
+                for index, kind in enumerate(EVERY_KIND if dataset.plan.settings.has_objects else KINDS)
             ]
         rest: dict[str, Any] = {
             "camera": describe_camera(dataset.camera),

@@ -13,8 +13,8 @@ from catalogs.scenario import Scenario
 from flows.making.catalogue import Catalogue
 from flows.making.gathering import table_parts
 from flows.making.plan import Plan, read_plan
+from flows.reading.frames import Frames, open_frames
 from flows.store.arrays import arrays_of
-from flows.store.frames import read_clip
 from flows.store.layout import Layout
 from flows.store.object_tables import read_objects
 from flows.store.telemetry import read_columns
@@ -34,14 +34,14 @@ class ExportedClip:
 
     Parameters
     ----------
-    layout : of its dataset
+    source : of its frames, in its dataset
     record : what the manifest says of it
     ticks_file, frames_file : Parquet files with its rows
     camera : that saw it
     plan : that it was made by
     """
 
-    layout: Layout
+    source: Frames
     record: Mapping[str, Any]
     ticks_file: str
     frames_file: str
@@ -61,7 +61,7 @@ class ExportedClip:
     @property
     def pictures(self) -> bool:
         """Whether it has frames."""
-        return self.plan.settings.pictures
+        return bool(self.plan.settings.pictures)
 
     @property
     def name(self) -> str:
@@ -89,7 +89,8 @@ class ExportedClip:
         """Columns of the table of road users; none where the dataset has no such table."""
         if not self.plan.settings.has_objects:
             return {}
-        return read_objects(self.layout, self.record["index"], self.plan.settings.frames)
+        index = self.record["index"]
+        return read_objects(self.source.find(index), index, self.plan.settings.frames)
 
     @property
     def T_world_rig(self) -> NDArray[np.float64]:
@@ -103,7 +104,7 @@ class ExportedClip:
 
     def read_array(self, name: str) -> NDArray[Any]:
         """Return one array of the clip's frames [F, H, W, ...]."""
-        return read_clip(self.layout.frames, self.record["index"], name)
+        return self.source.read(self.record["index"], name)
 
     def read_frame_telemetry(self, frame: int) -> dict[str, Any]:
         """Return the telemetry at a frame, by column, as JSON has it.
@@ -115,7 +116,7 @@ class ExportedClip:
         return {name: to_json_value(self.frames[name][frame]) for name in ("frame", "tick", *TICK_COLUMNS)}
 
     def _read(self, file: str, names: Sequence[str], rows: int) -> Columns:
-        return read_columns(self.layout.root / file, self.clip_id, names, most=rows)
+        return read_columns(self.source.layout.root / file, self.clip_id, names, most=rows)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,8 +153,12 @@ class ExportedDataset:
 
     @property
     def camera(self) -> Camera:
-        """The dataset's one camera."""
+        """The dataset's camera by the values of its file; each clip has its own where that varies."""
         return self.catalogue.camera
+
+    def camera_of(self, row: Mapping[str, Any]) -> Camera:
+        """Return the camera of a clip by its record."""
+        return self.catalogue.camera_of(int(row["seed"]))
 
     @property
     def vehicle(self) -> Vehicle:
@@ -193,15 +198,31 @@ class ExportedDataset:
             table: {clip_id: path for path, ids in table_parts(self.plan, table).items() for clip_id in ids}
             for table in ("ticks", "frames")
         }
+        source = open_frames(self.layout, self.manifest)
         for row in self.rows:
             yield ExportedClip(
-                layout=self.layout,
+                source=source,
                 record=row,
                 ticks_file=files["ticks"][row["clip_id"]],
                 frames_file=files["frames"][row["clip_id"]],
-                camera=self.camera,
+                camera=self.camera_of(row),
                 plan=self.plan,
             )
+
+
+def require_one_camera(dataset: ExportedDataset, to: str) -> None:
+    """Refuse clips with cameras of their own, where the format has one for all.
+
+    Raises
+    ------
+    InputError
+        If focal length or mount differ from clip to clip.
+    """
+    if dataset.camera.varies:
+        raise InputError(
+            f"{dataset.layout}: --to {to} has one camera for all clips; here each clip draws its own: export to another"
+            " format, or make the dataset with a camera without bounds"
+        )
 
 
 def require_pinhole(dataset: ExportedDataset, to: str) -> None:

@@ -133,8 +133,8 @@ def choose_folder(dataset: str, to: str, out: str | None) -> Path:
     """
     if out is None and is_address(dataset):
         raise InputError("--out: must name a folder where the dataset lies in an object store")
-    place = Path(dataset).resolve()
-    folder = place.with_name(f"{place.name}-{to}") if out is None else Path(out)
+    root = Path(dataset).resolve()
+    folder = root.with_name(f"{root.name}-{to}") if out is None else Path(out)
     if problems := find_dataset_problems(f"--out {folder}", folder):
         raise InputError(problems)
     if os.path.lexists(folder) and (folder.is_symlink() or not folder.is_dir() or any(folder.iterdir())):
@@ -175,6 +175,7 @@ def describe_export(dataset: ExportedDataset, to: str) -> dict[str, Any]:
                 key: row[key]
                 for key in ("index", "clip_id", "label", "split", "scenario", "figures", "verdict")
             }
+            | ({"camera": describe_camera(dataset.camera_of(row))} if dataset.camera.varies else {})
             for row in dataset.rows
         ],
     }

@@ -34,8 +34,9 @@ from manifests.provenance import code_version
 from tasks.errors import InputError
 from tasks.kernel_cache import sources_hash
 from tasks.surface.weather import WEATHERS, Weather, find_weather, surface_state
-from tasks.vehicle.model.embedded import STEP, compile_advance
+from tasks.vehicle.model.embedded import compile_advance
 from tasks.vehicle.model.embedded_variables import INPUTS, OUTPUTS, EmbeddedVariable
+from tasks.vehicle.model.simulation import INTERNAL_STEP_S
 from tasks.vehicle.parameters import Vehicle
 
 SUFFIX = ".fmu"
@@ -107,7 +108,7 @@ def write_fmu(
         "fmu": out,
         "vehicle": car.name,
         "platforms": compilable,
-        "step_s": STEP,
+        "step_s": INTERNAL_STEP_S,
         "weathers": car.find_weathers(),
         "parameters": [row.name for row in INPUTS if row.role == "parameter"],
         "inputs": [row.name for row in INPUTS if row.role == "input"],
@@ -148,8 +149,8 @@ def pack_fmu(car: Vehicle, content: bytes, surface: str, platforms: Sequence[str
     compiled, header = compile_advance(car, pavement), format_header(car, starts.values(), guid)
     for target in (PLATFORMS[name] for name in platforms):
         with TemporaryDirectory() as folder:
-            place = f"binaries/{target.name}/{identifier}{target.suffix}"
-            files[place] = build_library(compiled, header, target, Path(folder))
+            path = f"binaries/{target.name}/{identifier}{target.suffix}"
+            files[path] = build_library(compiled, header, target, Path(folder))
     archive = BytesIO()
     with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as packed:
         for name, data in files.items():
@@ -208,11 +209,15 @@ def format_description(
     units = ElementTree.SubElement(root, "UnitDefinitions")
     for unit, base in UNITS.items():
         ElementTree.SubElement(ElementTree.SubElement(units, "Unit", name=write_unit(unit)), "BaseUnit", base)
-    ElementTree.SubElement(root, "DefaultExperiment", startTime="0", stopTime="5", stepSize=str(2 * STEP))
+    ElementTree.SubElement(
+        root, "DefaultExperiment", startTime="0", stopTime="5", stepSize=str(2 * INTERNAL_STEP_S)
+    )
     variables = ElementTree.SubElement(root, "ModelVariables")
-    for place, row in enumerate((*INPUTS, *OUTPUTS)):
-        said = f"{row.description}: {_number_weathers(weathers)}" if row.kind == "choice" else row.description
-        _add_variable(variables, row, said, place, starts.get(row.name))
+    for reference, row in enumerate((*INPUTS, *OUTPUTS)):
+        description = (
+            f"{row.description}: {_number_weathers(weathers)}" if row.kind == "choice" else row.description
+        )
+        _add_variable(variables, row, description, reference, starts.get(row.name))
     structure = ElementTree.SubElement(root, "ModelStructure")
     for group in ("Outputs", "InitialUnknowns"):
         unknowns = ElementTree.SubElement(structure, group)
@@ -241,14 +246,14 @@ def _number_weathers(weathers: Sequence[str]) -> str:
 
 
 def _add_variable(
-    parent: ElementTree.Element, row: EmbeddedVariable, description: str, place: int, start: float | None
+    parent: ElementTree.Element, row: EmbeddedVariable, description: str, reference: int, start: float | None
 ) -> None:
     fixed = {"parameter": {"causality": "parameter", "variability": "fixed"}, "input": {"causality": "input"}}
     roles = fixed.get(row.role, {"causality": "output", "initial": "calculated"})
     if row.kind != "real" and row.role != "parameter":
         roles |= {"variability": "discrete"}
-    said = {"name": row.name, "valueReference": str(place), "description": description}
-    variable = ElementTree.SubElement(parent, "ScalarVariable", said | roles)
+    attributes = {"name": row.name, "valueReference": str(reference), "description": description}
+    variable = ElementTree.SubElement(parent, "ScalarVariable", attributes | roles)
     if row.kind == "boolean":
         ElementTree.SubElement(variable, "Boolean", start="true" if start else "false")
         return

@@ -15,8 +15,9 @@ from typing import Any
 import llvmlite.binding as llvm
 
 from tasks.errors import InputError
-from tasks.vehicle.model.embedded import DONE, NO_TYRE, START, STEP, measure_block
+from tasks.vehicle.model.embedded import DONE, NO_TYRE, START, measure_block
 from tasks.vehicle.model.embedded_variables import INPUTS, OUTPUTS, PLACE
+from tasks.vehicle.model.simulation import INTERNAL_STEP_S
 from tasks.vehicle.model.states import STATE_WIDTH
 from tasks.vehicle.parameters import Vehicle
 
@@ -186,7 +187,7 @@ def format_header(vehicle: Vehicle, starts: Iterable[float], guid: str) -> str:
         "PARAMETERS": sum(row.role == "parameter" for row in INPUTS), "INPUTS": len(INPUTS),
         "OUTPUTS": len(OUTPUTS), "TIME": len(INPUTS) + len(OUTPUTS), "WEATHER": PLACE["weather"],
         "STATE_WIDTH": STATE_WIDTH, "BLOCK": measure_block(vehicle), "START": START, "DONE": DONE,
-        "NO_TYRE": NO_TYRE, "STEP": STEP,
+        "NO_TYRE": NO_TYRE, "STEP": INTERNAL_STEP_S,
     }  # fmt: skip
     names = ", ".join(f'"{row.name}"' for row in (*INPUTS, *OUTPUTS))
     lines = [f'#define GUID "{guid}"', *(f"#define {name} ({value!r})" for name, value in numbers.items())]

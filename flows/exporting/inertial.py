@@ -7,10 +7,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from flows.exporting.dataset import ExportedClip
+from tasks.conventions import GRAVITY
 from tasks.vehicle.parameters import Vehicle
 
-STANDARD_GRAVITY = 9.80665
-"""CGPM 1901 [m s-2]."""
 FORWARD, LEFT, UP = np.eye(3)
 Vectors = NDArray[np.float64]
 
@@ -39,7 +38,7 @@ class InertialMotion:
 
 
 def compute_inertial_motion(
-    clip: ExportedClip, vehicle: Vehicle, place: ArrayLike = (0, 0, 0)
+    clip: ExportedClip, vehicle: Vehicle, position: ArrayLike = (0, 0, 0)
 ) -> InertialMotion:
     """Return the motion of a point of the body.
 
@@ -52,7 +51,7 @@ def compute_inertial_motion(
     ----------
     clip : that was driven
     vehicle : that drove it
-    place : of the point in the rig [m]
+    position : of the point in the rig [m]
     """
     frames, ticks, t = clip.frames, clip.ticks, clip.frames["t_ns"] * 1e-9
     attitude = Rotation.from_matrix(clip.T_world_rig[:, :3, :3])
@@ -64,7 +63,7 @@ def compute_inertial_motion(
     )
 
     centre = np.array([-vehicle.cg_to_front_axle, 0.0, vehicle.cg_height])
-    arm = pitching.apply(np.asarray(place, np.float64) - centre)
+    arm = pitching.apply(np.asarray(position, np.float64) - centre)
     reach = centre + np.outer(frames["heave"], UP) + arm
     pitch_rate = np.outer(frames["pitch_rate"], LEFT)
     moved = np.outer(frames["heave_rate"], UP) + np.cross(pitch_rate, arm)
@@ -89,7 +88,7 @@ def compute_inertial_motion(
     return InertialMotion(
         attitude=attitude,
         velocity=route.apply(along + np.cross(turn, reach) + moved),
-        force=route.apply(acceleration) + STANDARD_GRAVITY * UP,
+        force=route.apply(acceleration) + GRAVITY * UP,
         turn_rate=route.apply(turn + pitch_rate),
     )
 

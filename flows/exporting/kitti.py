@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flows.exporting.dataset import ExportedClip, ExportedDataset, require_pinhole
+from flows.exporting.dataset import ExportedClip, ExportedDataset, require_one_camera, require_pinhole
 from flows.exporting.inertial import compute_inertial_motion
 from flows.exporting.road_users import describe_kitti_label, list_objects_by_frame
 from tasks.render.camera import PIXEL_CENTRE, Camera
@@ -47,13 +47,14 @@ def write_kitti(dataset: ExportedDataset, folder: Path) -> None:
     Raises
     ------
     InputError
-        If the camera's lens distorts.
+        If the camera's lens distorts, or each clip has a camera of its own.
     """
     require_pinhole(dataset, "kitti")
+    require_one_camera(dataset, "kitti")
     raw = folder / "raw" / DATE
     poses = folder / "odometry" / "poses"
-    for place in (raw, poses):
-        place.mkdir(parents=True)
+    for subfolder in (raw, poses):
+        subfolder.mkdir(parents=True)
     for name, content in _describe_raw_calibration(dataset.camera).items():
         (raw / name).write_text(content)
     shown = 0

@@ -43,8 +43,8 @@ FILES_PER_CHUNK = 1000
 SAMPLED = 4
 """Statistics of pictures take every fourth pixel of every fourth row; LeRobot's own writer samples them too."""
 COUNTED = ("frame_index", "episode_index", "index", "task_index")
-_PLACE = "chunk-{chunk_index:03d}/file-{file_index:03d}"
-DATA_PATH, VIDEO_PATH = f"data/{_PLACE}.parquet", f"videos/{{video_key}}/{_PLACE}.mp4"
+_FILE_NUMBERS = "chunk-{chunk_index:03d}/file-{file_index:03d}"
+DATA_PATH, VIDEO_PATH = f"data/{_FILE_NUMBERS}.parquet", f"videos/{{video_key}}/{_FILE_NUMBERS}.mp4"
 
 
 def write_lerobot(dataset: ExportedDataset, folder: Path) -> None:
@@ -76,12 +76,15 @@ def write_lerobot(dataset: ExportedDataset, folder: Path) -> None:
     dataset = replace(dataset, rows=sort_by_split(dataset.rows))
     episodes, first, total = [], 0, RunningStatistics()
     for number, clip in enumerate(dataset):
-        place = {"chunk_index": number // FILES_PER_CHUNK, "file_index": number % FILES_PER_CHUNK}
+        numbers = {"chunk_index": number // FILES_PER_CHUNK, "file_index": number % FILES_PER_CHUNK}
         columns = _collect_columns(clip, state, number, first, rate)
         if most := _count_road_users(dataset):
             columns[ENVIRONMENT] = _list_environment(clip, most)
         pictures = clip.read_array("rgb")
-        data, film = folder / DATA_PATH.format(**place), folder / VIDEO_PATH.format(video_key=CAMERA, **place)
+        data, film = (
+            folder / DATA_PATH.format(**numbers),
+            folder / VIDEO_PATH.format(video_key=CAMERA, **numbers),
+        )
         for file in (data, film):
             file.parent.mkdir(parents=True, exist_ok=True)
         pq.write_table(null_missing(_make_table(columns)), data)
@@ -93,7 +96,7 @@ def write_lerobot(dataset: ExportedDataset, folder: Path) -> None:
         own.add(CAMERA, sampled, frames=len(pictures))
         total.merge(own)
         last = first + len(pictures)
-        episodes.append(_describe_episode(clip, number, (first, last), place, rate) | _flatten(own))
+        episodes.append(_describe_episode(clip, number, (first, last), numbers, rate) | _flatten(own))
         first = last
     _write_meta(folder, dataset, state, episodes, total, frames=first)
 
@@ -164,18 +167,18 @@ def _make_table(columns: Mapping[str, NDArray[Any]]) -> pa.Table:
 
 
 def _describe_episode(
-    clip: ExportedClip, number: int, span: tuple[int, int], place: Mapping[str, int], rate: float
+    clip: ExportedClip, number: int, span: tuple[int, int], numbers: Mapping[str, int], rate: float
 ) -> dict[str, Any]:
     return {
         "episode_index": number,
         "tasks": [clip.label],
         "length": span[1] - span[0],
-        "data/chunk_index": place["chunk_index"],
-        "data/file_index": place["file_index"],
+        "data/chunk_index": numbers["chunk_index"],
+        "data/file_index": numbers["file_index"],
         "dataset_from_index": span[0],
         "dataset_to_index": span[1],
-        f"videos/{CAMERA}/chunk_index": place["chunk_index"],
-        f"videos/{CAMERA}/file_index": place["file_index"],
+        f"videos/{CAMERA}/chunk_index": numbers["chunk_index"],
+        f"videos/{CAMERA}/file_index": numbers["file_index"],
         f"videos/{CAMERA}/from_timestamp": 0.0,
         f"videos/{CAMERA}/to_timestamp": (span[1] - span[0]) / rate,
         "meta/episodes/chunk_index": 0,
@@ -234,9 +237,9 @@ def _write_meta(
 ) -> None:
     import pandas as pd
 
-    place = {"chunk_index": 0, "file_index": 0}
+    numbers = {"chunk_index": 0, "file_index": 0}
     meta = folder / "meta"
-    table = meta / "episodes" / f"{_PLACE.format(**place)}.parquet"
+    table = meta / "episodes" / f"{_FILE_NUMBERS.format(**numbers)}.parquet"
     table.parent.mkdir(parents=True)
     pq.write_table(null_missing(pa.Table.from_pylist(episodes)), table)
     tasks = pd.Index([episode["tasks"][0] for episode in episodes], name="task")

@@ -84,7 +84,7 @@ def _write_clip(clip: ExportedClip, dataset: ExportedDataset, folder: Path, scen
                 "t_ns": t_ns,
             }
         )
-    content = _describe_camera(dataset.camera) | {
+    content = _describe_camera(clip.camera) | {
         "gaussians_file": f"../{scene}",
         "frames": frames,
     }

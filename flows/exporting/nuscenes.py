@@ -42,7 +42,9 @@ CHANNEL = "CAM_FRONT"
 FIRST_SCENE = 2000
 MOST_SCENES = 8000
 """A scene's number has four digits."""
-STREAMED = ("ego_pose", "scene", "sample", "sample_data", "instance", "sample_annotation")
+STREAMED = (
+    "calibrated_sensor", "ego_pose", "scene", "sample", "sample_data", "instance", "sample_annotation",
+)  # fmt: skip
 VISIBILITIES = ("v0-40", "v40-60", "v60-80", "v80-100")
 RPM = 60 / (2 * np.pi)
 """Revolutions a minute in one radian a second."""
@@ -89,8 +91,8 @@ def write_nuscenes(dataset: ExportedDataset, folder: Path) -> None:
             f"{dataset.layout}: --to nuscenes takes {MOST_SCENES} clips at most: name some with --clip"
         )
     tables = folder / VERSION
-    for place in (tables, folder / "samples" / CHANNEL, folder / "can_bus", folder / "maps"):
-        place.mkdir(parents=True)
+    for subfolder in (tables, folder / "samples" / CHANNEL, folder / "can_bus", folder / "maps"):
+        subfolder.mkdir(parents=True)
     (folder / "maps" / "none.png").write_bytes(encode_png(np.full((1, 1, 3), 255, np.uint8)))
     for name, rows in _describe_fixed(dataset).items():
         write_json(tables / f"{name}.json", rows)
@@ -130,7 +132,7 @@ def describe_can_bus(clip: ExportedClip, vehicle: Vehicle, start_us: int) -> dic
     ticks = clip.ticks
     poses = compute_ego_poses(clip, vehicle)
     motion = compute_inertial_motion(clip, vehicle, _rig_from_ego(vehicle)[:3, 3])
-    turns, places = compute_quaternions(poses, scalar_first=True).tolist(), poses[:, :3, 3].tolist()
+    turns, positions = compute_quaternions(poses, scalar_first=True).tolist(), poses[:, :3, 3].tolist()
     at = (start_us + clip.frames["t_ns"] // 1000).tolist()
     speeds, forces, rates = (
         motion.attitude.inv().apply(vectors).tolist()
@@ -138,7 +140,7 @@ def describe_can_bus(clip: ExportedClip, vehicle: Vehicle, start_us: int) -> dic
     )
     return {
         "pose": [
-            {"accel": forces[k], "orientation": turns[k], "pos": places[k], "rotation_rate": rates[k],
+            {"accel": forces[k], "orientation": turns[k], "pos": positions[k], "rotation_rate": rates[k],
              "utime": at[k], "vel": speeds[k]}
             for k in range(len(at))
         ],
@@ -184,6 +186,13 @@ def _write_scene(
     count = len(frames["frame"])
     poses = compute_ego_poses(clip, dataset.vehicle)
     turns, pictures = compute_quaternions(poses, scalar_first=True), clip.read_array("rgb")
+    mount = np.linalg.inv(_rig_from_ego(dataset.vehicle)) @ clip.camera.T_rig_camera
+    rows_of["calibrated_sensor"].append(
+        {"token": make_token("calibrated_sensor", clip.clip_id), "sensor_token": make_token("sensor"),
+         "translation": mount[:3, 3].tolist(),
+         "rotation": compute_quaternions(mount[None], scalar_first=True)[0].tolist(),
+         "camera_intrinsic": (clip.camera.K - PIXEL_CENTRE).tolist()}
+    )  # fmt: skip
     rows_of["scene"].append(
         {"token": own, "log_token": make_token("log"), "nbr_samples": count, "name": scene,
          "description": clip.label, "first_sample_token": make_token("sample", clip.clip_id, 0),
@@ -203,7 +212,7 @@ def _write_scene(
         )
         rows_of["sample_data"].append(
             {"token": make_token("sample_data", clip.clip_id, frame), "sample_token": sample,
-             "ego_pose_token": ego, "calibrated_sensor_token": make_token("calibrated_sensor"),
+             "ego_pose_token": ego, "calibrated_sensor_token": make_token("calibrated_sensor", clip.clip_id),
              "timestamp": at_us, "fileformat": "png", "is_key_frame": True, "filename": name,
              "height": dataset.camera.height, "width": dataset.camera.width}
             | dict(_link("sample_data", clip, frame, count))
@@ -212,7 +221,7 @@ def _write_scene(
 
 def _write_annotations(clip: ExportedClip, rows_of: dict[str, JsonArray]) -> None:
     frames = list_objects_by_frame(clip)
-    for place, first in enumerate(frames[0]):
+    for index, first in enumerate(frames[0]):
         number = first["object"]
         token = make_token("instance", clip.clip_id, number)
         boxes = [make_token("sample_annotation", clip.clip_id, number, frame) for frame in range(len(frames))]
@@ -221,7 +230,7 @@ def _write_annotations(clip: ExportedClip, rows_of: dict[str, JsonArray]) -> Non
              "nbr_annotations": len(boxes), "first_annotation_token": boxes[0], "last_annotation_token": boxes[-1]}
         )  # fmt: skip
         for frame, rows in enumerate(frames):
-            row = rows[place]
+            row = rows[index]
             length, width, height = row["size"]
             rows_of["sample_annotation"].append(
                 {"token": boxes[frame], "sample_token": make_token("sample", clip.clip_id, frame),
@@ -240,9 +249,7 @@ def _link(table: str, clip: ExportedClip, frame: int, count: int) -> Iterator[tu
 
 
 def _describe_fixed(dataset: ExportedDataset) -> dict[str, list[dict[str, Any]]]:
-    camera = dataset.camera
-    mount = np.linalg.inv(_rig_from_ego(dataset.vehicle)) @ camera.T_rig_camera
-    log, sensor = make_token("log"), make_token("sensor")
+    log = make_token("log")
     users = dataset.plan.settings.has_objects
     categories = dict.fromkeys(names.nuscenes for names in NAMES.values()) if users else {}
     attributes = dict.fromkeys(name for names in NAMES.values() for name in names[2:]) if users else {}
@@ -258,13 +265,7 @@ def _describe_fixed(dataset: ExportedDataset) -> dict[str, list[dict[str, Any]]]
                  "date_captured": "", "location": describe_scenes(dataset.manifest)}],
         "map": [{"token": make_token("map"), "log_tokens": [log], "category": "semantic_prior",
                  "filename": "maps/none.png"}],
-        "sensor": [{"token": sensor, "channel": CHANNEL, "modality": "camera"}],
-        "calibrated_sensor": [
-            {"token": make_token("calibrated_sensor"), "sensor_token": sensor,
-             "translation": mount[:3, 3].tolist(),
-             "rotation": compute_quaternions(mount[None], scalar_first=True)[0].tolist(),
-             "camera_intrinsic": (camera.K - PIXEL_CENTRE).tolist()}
-        ],
+        "sensor": [{"token": make_token("sensor"), "channel": CHANNEL, "modality": "camera"}],
     }  # fmt: skip
 
 

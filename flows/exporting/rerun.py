@@ -63,11 +63,11 @@ def _send_telemetry(rerun: Any, recording: Any, clip: ExportedClip) -> None:
         values = np.asarray(clip.ticks[name], np.float64)
         known = ~np.isnan(values)
         if name != "t_ns" and known.any():
-            place = f"telemetry/{name}"
+            entity = f"telemetry/{name}"
             caption = f"{words[name]['description']} [{words[name]['unit'] or '1'}]"
-            recording.log(place, rerun.SeriesLines(names=caption), static=True)
+            recording.log(entity, rerun.SeriesLines(names=caption), static=True)
             recording.send_columns(
-                place,
+                entity,
                 indexes=[rerun.TimeColumn(TIMELINE, duration=times[known])],
                 columns=rerun.Scalars.columns(scalars=values[known]),
             )

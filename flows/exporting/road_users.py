@@ -44,8 +44,8 @@ def list_objects_by_frame(clip: ExportedClip) -> list[list[dict[str, Any]]]:
     frames: list[list[dict[str, Any]]] = [[] for _ in range(clip.plan.settings.frames)]
     columns = clip.objects
     names = [name for name in columns if name not in {"clip_id", "label", "weather", "frame"}]
-    for place, frame in enumerate(columns.get("frame", ())):
-        row = {name: columns[name][place] for name in names}
+    for index, frame in enumerate(columns.get("frame", ())):
+        row = {name: columns[name][index] for name in names}
         frames[int(frame)].append(
             {name: v.tolist() if isinstance(v, np.ndarray) else to_json_value(v) for name, v in row.items()}
         )

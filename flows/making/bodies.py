@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from catalogs.scenario import Scenario
 from catalogs.scenes.gaussian_files import read_gaussians
-from tasks.render.camera import Camera
 from tasks.render.moving_bodies import MovingBody
 from tasks.scene.road_users.bodies import COARSEST_M, FINEST_M, build_road_user, wrap_own_body
 from tasks.scene.road_users.motion import Motion
@@ -19,22 +18,22 @@ CELL_PX = 2.5
 
 
 class BodySource(Protocol):
-    """What bodies are built from: sizes by kind [m], bodies of the user's by name, and the camera that sees them."""
+    """What bodies are built from: sizes by kind [m], and bodies of the user's by name."""
 
     @property
     def road_user_sizes(self) -> Mapping[str, tuple[float, ...]]:
         """Kind to length, width and height [m]."""
-
-    @property
-    def camera(self) -> Camera:
-        """The camera."""
 
     def own_body(self, name: str) -> Path:
         """Return the file of a body that a scenario names."""
 
 
 def build_moving_bodies(
-    scenario: Scenario, catalogue: BodySource, motions: list[Motion], T_world_camera: NDArray[np.float64]
+    scenario: Scenario,
+    catalogue: BodySource,
+    motions: list[Motion],
+    T_world_camera: NDArray[np.float64],
+    focal_px: float,
 ) -> list[MovingBody]:
     """Return the bodies of a scenario's road users on their way; numbers count from 1 in its order.
 
@@ -44,6 +43,7 @@ def build_moving_bodies(
     catalogue : of the dataset, or of a drive by steps
     motions : of each, at the frames
     T_world_camera : float64 [F, 4, 4] poses of the camera, which decide how fine a body is [m]
+    focal_px : focal length of the camera, which decides it too [px]
     """
     bodies = []
     for number, (user, motion) in enumerate(zip(scenario.objects, motions, strict=True), start=1):
@@ -51,7 +51,7 @@ def build_moving_bodies(
         if user.body is not None:
             body = wrap_own_body(user.kind, size, read_gaussians(catalogue.own_body(user.body)))
         else:
-            cell = _choose_cell(motion, size, T_world_camera, float(catalogue.camera.K[0, 0]))
+            cell = _choose_cell(motion, size, T_world_camera, focal_px)
             body = build_road_user(user.kind, size, cell)
         bodies.append(
             MovingBody(

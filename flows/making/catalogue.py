@@ -17,7 +17,7 @@ from catalogs.vehicles import VehicleFile, open_vehicle
 from catalogs.weather.grip import WeatherFolder
 from catalogs.weather.look import load_weather
 from catalogs.wet_friction import WET_FRICTION
-from flows.making.places import find_scene
+from flows.making.locations import find_scene
 from flows.making.plan import read_plan
 from flows.making.traced import Reference
 from flows.store.layout import Layout
@@ -79,8 +79,12 @@ class Catalogue:
 
     @cached_property
     def camera(self) -> Camera:
-        """The camera."""
+        """The camera by the values of its file; that of a clip is of `camera_of`."""
         return load("camera", self._inputs / "camera.yaml")
+
+    def camera_of(self, seed: int) -> Camera:
+        """Return the camera of a clip, whose visual seed draws what has bounds."""
+        return load("camera", self._inputs / "camera.yaml", seed) if self.camera.varies else self.camera
 
     @cached_property
     def gates(self) -> PoseThresholds:

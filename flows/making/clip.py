@@ -7,6 +7,7 @@ receipt last, by rename: where the receipt exists, the clip is complete. Making 
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import cv2
@@ -24,8 +25,8 @@ from flows.making.driving import (
     surface_of,
 )
 from flows.making.gate import judge_motion, nothing_to_judge
+from flows.making.locations import note_location
 from flows.making.pictures import frame_rows, gather_motion, render_frames, rig_of
-from flows.making.places import remember_place
 from flows.making.plan import ClipPlan, Plan, read_plan
 from flows.making.road_users import judge_road_users
 from flows.making.traced import replay_drive, unknown_ranges
@@ -37,6 +38,7 @@ from flows.store.object_tables import hash_objects, make_object_table
 from flows.store.telemetry import content_hash, labelled_table, write_parquet
 from manifests.canonical import sha256_of_file
 from tasks.errors import InputError
+from tasks.render.camera import Camera, measure_mount
 from tasks.render.object_truth import measure_objects
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.rollout import Rollout, compute_lift_times, compute_peaks
@@ -57,6 +59,11 @@ class ClipWork:
     clip: ClipPlan
     plan: Plan
     catalogue: Catalogue
+
+    @cached_property
+    def camera(self) -> Camera:
+        """The camera of the clip."""
+        return self.catalogue.camera_of(int(self.clip.seed))
 
 
 def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
@@ -80,13 +87,31 @@ def make_clip(layout: Layout, index: int, scene: str) -> dict[str, Any]:
     cost.end_step("surface")
     ride, ranges = roll_out(work)
     cost.end_step("rollout")
-    frames, buffers = draw_frames(work, surface, ride)
+    frames = frame_rows(ride, work.plan, work.catalogue)
+    buffers = draw_frames(work, surface, ride, frames) if work.plan.settings.stores_frames else {}
     cost.end_step("frames")
     checked, verdict = check_motion(work, surface, frames, buffers)
     cost.end_step("check")
     receipt = commit_clip(layout, work, surface, ride, ranges, frames | checked, buffers, verdict)
     cost.end_step("commit")
     return receipt | {"cost": cost.as_json()}
+
+
+def draw_window(layout: Layout, index: int, scene: str, shown: range) -> tuple[dict[str, NDArray[Any]], str]:
+    """Return some frames of a clip, which are written nowhere, and the hash of the telemetry that they show.
+
+    Parameters
+    ----------
+    layout, index, scene : as of `make_clip`
+    shown : the frames; with labels the whole clip is made for them
+    """
+    work = open_work(layout, index, scene)
+    surface, ride = map_surface(work), _move_car(work)
+    frames, whole = frame_rows(ride, work.plan, work.catalogue), work.plan.settings.labels
+    buffers = draw_frames(work, surface, ride, frames, None if whole else shown)
+    if whole:
+        buffers = {name: values[shown.start : shown.stop] for name, values in buffers.items()}
+    return buffers, content_hash("ticks", ride.columns)
 
 
 def warm_up(layout: Layout, scene: str) -> None:
@@ -104,8 +129,10 @@ def warm_up(layout: Layout, scene: str) -> None:
     for clip in {clip.scenario.weather: clip for clip in reversed(shown)}.values():
         work = replace(first, clip=clip, plan=short)
         surface = map_surface(work)
-        frames, buffers = draw_frames(work, surface, _move_car(work))
-        check_motion(work, surface, frames, buffers)
+        ride = _move_car(work)
+        frames = frame_rows(ride, short, work.catalogue)
+        if short.settings.stores_frames:
+            check_motion(work, surface, frames, draw_frames(work, surface, ride, frames))
 
 
 def open_work(layout: Layout, index: int, scene: str) -> ClipWork:
@@ -119,7 +146,7 @@ def open_work(layout: Layout, index: int, scene: str) -> ClipWork:
     cv2.setNumThreads(1)  # one thread a clip: more within a frame cost more than they give
     plan = read_plan(layout.root)
     clip = plan.clips[index]
-    remember_place(plan.record_of(clip.scenario.scene)["sha256"], scene)
+    note_location(plan.record_of(clip.scenario.scene)["sha256"], scene)
     return ClipWork(clip=clip, plan=plan, catalogue=catalogue_of(layout.root, clip.scenario.scene))
 
 
@@ -159,27 +186,25 @@ def _move_car(work: ClipWork) -> Rollout:
 
 
 def draw_frames(
-    work: ClipWork, surface: SurfaceState, ride: Rollout
-) -> tuple[dict[str, NDArray[Any]], dict[str, NDArray[Any]]]:
-    """Step 3: the rows of the frames' table, and the finished frames with depth and class; no frames where none are
-    asked for.
-    """
-    frames = frame_rows(ride, work.plan, work.catalogue)
-    if not work.plan.settings.pictures:
-        return frames, {}
+    work: ClipWork, surface: SurfaceState, ride: Rollout, frames: Columns, shown: range | None = None
+) -> dict[str, NDArray[Any]]:
+    """Step 3: the finished frames with depth and class; ``shown`` is that of `tasks.render.clip.RigMotion`."""
     rig_at = rig_of(ride, frames, work.catalogue)
     seed = int(work.clip.seed)
-    return frames, render_frames(work.clip.scenario, surface, frames, work.plan, work.catalogue, seed, rig_at)
+    return render_frames(work.clip.scenario, surface, frames, work.plan, work.catalogue, seed, rig_at, shown)
 
 
 def check_motion(
     work: ClipWork, surface: SurfaceState, frames: Columns, buffers: Columns
 ) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
     """Step 4: the motion that the frames show, as columns of their table, and the verdict of the gate on it."""
+    later = work.plan.settings.pictures == "later"
     found = (
-        judge_motion(buffers, frames, surface.film_depth_mm, work.catalogue)
+        judge_motion(buffers, frames, surface.film_depth_mm, work.catalogue, work.camera)
         if buffers
-        else nothing_to_judge(len(frames["frame"]))
+        else nothing_to_judge(
+            len(frames["frame"]), "frames are made later" if later else "no frames were made"
+        )
     )
     verdict = found.pop("verdict")
     return found, verdict
@@ -228,6 +253,7 @@ def commit_clip(
             "stopping_distance": ride.stopping_distance,
             **collect_motion_figures(ride.columns),
             "lateral_demand": peak_lateral_demand(ride, work.catalogue.scene.route),
+            **(measure_mount(work.camera) if work.camera.varies else {}),
             "static_pitch": ride.static_pitch,
             **_judge_approach(work, surface, ride),
             "calibration_extrapolated": ride.calibration_extrapolated,
@@ -247,8 +273,10 @@ def _observe_objects(
     if not work.clip.scenario.objects:
         return {}
     rig_at = rig_of(ride, frames, work.catalogue)
-    motion = gather_motion(work.clip.scenario, surface, frames, work.plan, work.catalogue, rig_at)
-    return measure_objects(buffers, work.catalogue.camera, motion)
+    motion = gather_motion(
+        work.clip.scenario, surface, frames, work.plan, work.catalogue, work.camera, rig_at
+    )
+    return measure_objects(buffers, work.camera, motion)
 
 
 def _judge_approach(work: ClipWork, surface: SurfaceState, ride: Rollout) -> dict[str, float | bool]:

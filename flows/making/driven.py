@@ -61,13 +61,13 @@ def driven_ranges_of(
     return label_ranges(sampled_friction(weather_of(scenario), catalogue.surface, catalogue.study), again)
 
 
-def refuse_driven(inputs: Iterable[str], place: object, command: str) -> None:
+def refuse_driven(inputs: Iterable[str], origin: object, command: str) -> None:
     """Refuse a dataset whose brake follows from no scenario.
 
     Parameters
     ----------
     inputs : names of its frozen inputs
-    place : what messages call the dataset
+    origin : what messages call the dataset
     command : that needs the scenario's brake
 
     Raises
@@ -77,5 +77,6 @@ def refuse_driven(inputs: Iterable[str], place: object, command: str) -> None:
     """
     if is_driven(inputs):
         raise InputError(
-            f"{place}: a policy braked its clips (musync drive); musync {command} needs a dataset whose scenarios brake"
+            f"{origin}: a policy braked its clips (musync drive);"
+            f" musync {command} needs a dataset whose scenarios brake"
         )

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from catalogs.scenario import Scenario
+from tasks.render.weather.named_sky import NamedSky
 from tasks.scene.route import Route
 from tasks.scene.route_shape import find_lateral_demand
 from tasks.studies.label_ranges import label_ranges, sampled_friction
@@ -104,6 +105,16 @@ def weather_of(scenario: Scenario) -> Weather:
         kind=scenario.weather,
         precipitation_mm_h=scenario.precipitation_mm_h,
         snow_accumulation_h=scenario.snow_accumulation_h,
+        falling=scenario.falling,
+    )
+
+
+def sky_of(scenario: Scenario) -> NamedSky:
+    """Return what the scenario says of the sky."""
+    return NamedSky(
+        kind=scenario.sky,
+        sun_azimuth_deg=scenario.sun_azimuth_deg,
+        sun_elevation_deg=scenario.sun_elevation_deg,
     )
 
 

@@ -14,7 +14,7 @@ from flows.making.driving import simulate_drive
 from flows.making.generate import generate_dataset
 from flows.making.grid_entries import find_private_entries, read_entries
 from flows.making.grid_inputs import grade_of
-from flows.making.places import find_scene
+from flows.making.locations import find_scene
 from flows.making.plan import Plan, freeze_grid
 from flows.making.run_report import RunReport
 from flows.running.progress import progress_bar
@@ -260,9 +260,9 @@ def ticks_of(plan: Plan, asked: GridFile) -> dict[str, str]:
 
 
 def _grid_of(frozen: FrozenRun) -> Grid:
-    place = f"manifest {frozen['name']}"
-    settings = recorded_grid(frozen["grid"], place)
-    return expand_grid(settings.model_copy(update={"scene": find_scene(frozen["scene"])}), place)
+    origin = f"manifest {frozen['name']}"
+    settings = recorded_grid(frozen["grid"], origin)
+    return expand_grid(settings.model_copy(update={"scene": find_scene(frozen["scene"])}), origin)
 
 
 def _plan_clips(grid: Grid) -> tuple[Plan, dict[str, bytes]]:
@@ -272,7 +272,7 @@ def _plan_clips(grid: Grid) -> tuple[Plan, dict[str, bytes]]:
 
 def _read_parameters(plan: Plan, inputs: Mapping[str, bytes]) -> dict[str, Any]:
     parsed = {name: parse_input(name, content) for name, content in inputs.items()}
-    return parameters_that_matter(parsed, plan.settings.pictures)
+    return parameters_that_matter(parsed, bool(plan.settings.pictures))
 
 
 def _list_records(plan: Plan) -> list[dict[str, Any]]:

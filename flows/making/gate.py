@@ -18,8 +18,9 @@ from tasks.eval.poses.checks import (
     hide_moving,
     prepare_clip,
 )
+from tasks.eval.poses.halving import halve_camera, halve_frames
 from tasks.eval.poses.undistort import undistort_frames
-from tasks.render.camera import PIXEL_CENTRE
+from tasks.render.camera import PIXEL_CENTRE, Camera
 
 
 def judge_motion(
@@ -27,14 +28,16 @@ def judge_motion(
     frames: Mapping[str, NDArray[Any]],
     film_depth_mm: float,
     catalogue: Catalogue,
+    camera: Camera,
 ) -> dict[str, Any]:
     """Motion that the gate's pose check recovers from the finished frames, compared with the telemetry."""
-    camera = catalogue.camera
     shown = {name: buffers[name] for name in ("rgb", "depth", "class")}
     if "instance" in buffers:
         shown["depth"] = hide_moving(buffers["depth"], buffers["instance"])
     pinhole = undistort_frames(shown, camera.K - PIXEL_CENTRE, camera.distortion)
-    recovered = POSE_CHECKS[GATE_CHECK](prepare_for_checks(pinhole, frames, film_depth_mm, catalogue))
+    halved = camera.height >= catalogue.gates.halved_from_px
+    checked = prepare_for_checks(pinhole, frames, film_depth_mm, catalogue, camera, halved=halved)
+    recovered = POSE_CHECKS[GATE_CHECK](checked)
     body = pose_body(
         frames["heave"], frames["pitch"], catalogue.vehicle.cg_to_front_axle, catalogue.vehicle.cg_height
     )
@@ -52,28 +55,37 @@ def prepare_for_checks(
     frames: Mapping[str, NDArray[Any]],
     film_depth_mm: float,
     catalogue: Catalogue,
+    camera: Camera,
+    *,
+    halved: bool = False,
 ) -> CheckedClip:
-    """Return a clip's undistorted ``rgb``, ``depth`` and ``class`` as every pose check takes them."""
-    camera = catalogue.camera
+    """Return a clip's undistorted ``rgb``, ``depth`` and ``class`` as every pose check takes them, or half as wide."""
+    seen = JudgeCamera(
+        K=camera.K - PIXEL_CENTRE,
+        T_rig_camera=camera.T_rig_camera,
+        distortion=camera.distortion,
+        line_delay_s=camera.line_delay_s,
+    )
     return prepare_clip(
-        pinhole,
-        JudgeCamera(
-            K=camera.K - PIXEL_CENTRE,
-            T_rig_camera=camera.T_rig_camera,
-            distortion=camera.distortion,
-            line_delay_s=camera.line_delay_s,
-        ),
+        halve_frames(pinhole) if halved else pinhole,
+        halve_camera(seen) if halved else seen,
         frame_interval_s=float(frames["t_ns"][1] - frames["t_ns"][0]) * 1e-9,
         film_depth_mm=film_depth_mm,
         route_rotations=catalogue.scene.route.pose(frames["station"])[:, :3, :3],
     )
 
 
-def nothing_to_judge(frames: int) -> dict[str, Any]:
-    """Return the result of `judge_motion` where there is no picture: every value is not represented."""
+def nothing_to_judge(frames: int, reason: str) -> dict[str, Any]:
+    """Return the result of `judge_motion` where there is no picture: every value is not represented.
+
+    Parameters
+    ----------
+    frames : of the clip [1]
+    reason : why there is none
+    """
     verdict = {figure.name: None for figure in fields(PoseVerdict)}
     return {
         "recovered_pitch": np.full(frames, np.nan),
         "recovered_progress": np.full(frames, np.nan),
-        "verdict": verdict | {"reasons": ["no frames were made"]},
+        "verdict": verdict | {"reasons": [reason]},
     }

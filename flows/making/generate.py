@@ -5,14 +5,15 @@ from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor
 from contextlib import contextmanager, suppress
 from functools import partial
-from typing import Any
+from typing import Any, Literal
 
 from catalogs.grids import Grid
 from catalogs.scenes import load_scene
 from catalogs.sentences import name_some
+from flows.making.catalogue import Catalogue
 from flows.making.clip import make_clip, warm_up
 from flows.making.input_changes import frozen_inputs, restore_inputs
-from flows.making.places import find_scene
+from flows.making.locations import find_scene
 from flows.making.plan import Plan, hold_plan, make_plan, plan_differences, read_plan
 from flows.making.run_report import RunCost, RunReport, list_step_times
 from flows.making.seal import seal_dataset
@@ -42,6 +43,7 @@ from flows.store.sealed import is_committed, read_manifest
 from flows.store.staging import BEGUN, is_of_begun_run, left_overs, remove_left_overs
 from manifests.manifest import is_quarantined
 from tasks.errors import InputError
+from tasks.render.camera import Camera
 from tasks.render.rasterise.backend import select_backend
 
 SHOWN = 8
@@ -57,12 +59,12 @@ def generate_dataset(
     scheduler: str | None = None,
     backend: str = "auto",
     vehicle: str | None = None,
-    pictures: bool = True,
+    pictures: bool | Literal["later"] = True,
 ) -> RunReport:
     """Make the dataset of ``grid`` in ``out``, or what is missing of it; ``vehicle`` takes the grid's place.
 
-    Of a grid with ``poses`` each clip shows the motion of the trace with its conditions. Without ``pictures`` nothing
-    is rendered: telemetry alone, of the same clips.
+    Of a grid with ``poses`` each clip shows the motion of the trace with its conditions. Of ``pictures`` False
+    makes telemetry alone, of the same clips, and ``later`` frames when they are read.
     The runner ``auto`` is that of `flows.running.runner.choose_runner`.
 
     Raises
@@ -77,7 +79,7 @@ def generate_dataset(
     cost = RunCost()
     quarantined: dict[str, list[str]] | None = None
     with open_for_writing(out, want_progress) as layout:
-        wrong = list_runner_problems(choose_runner(runner, pictures, scheduler), scheduler)
+        wrong = list_runner_problems(choose_runner(runner, pictures is True, scheduler), scheduler)
         try:
             plan, inputs = make_plan(grid, select_backend(backend).name, vehicle, pictures=pictures)
         except InputError as error:
@@ -191,8 +193,8 @@ def _refuse_other_plan(layout: Layout, plan: Plan, inputs: Mapping[str, bytes]) 
 
 
 def create_frame_arrays(layout: Layout, plan: Plan) -> None:
-    """Create the empty Zarr arrays of a plan; none where it makes telemetry alone."""
-    if plan.settings.pictures:
+    """Create the empty Zarr arrays of a plan; none where frames are not stored: Zarr would read black pictures."""
+    if plan.settings.stores_frames:
         create_arrays(layout.frames, **describe_frame_arrays(layout, plan))
 
 
@@ -210,8 +212,7 @@ def describe_frame_arrays(layout: Layout, plan: Plan) -> dict[str, Any]:
     camera = load("camera", layout.inputs / "camera.yaml")
     attributes = {
         "camera": camera.name,
-        "K": camera.K.tolist(),
-        "T_rig_camera": camera.T_rig_camera.tolist(),
+        **_describe_geometry(layout, plan, camera),
         "frame_rate_hz": plan.settings.frame_rate_hz,
         "axes": "rig: x forward, y left, z up (ISO 8855); camera: x right, y down, z forward",
     }
@@ -233,6 +234,15 @@ def describe_frame_arrays(layout: Layout, plan: Plan) -> dict[str, Any]:
     }
 
 
+def _describe_geometry(layout: Layout, plan: Plan, camera: Camera) -> dict[str, Any]:
+    """Intrinsics and mount of the camera; of each clip in its order where clips draw their own."""
+    if not camera.varies:
+        return {"K": camera.K.tolist(), "T_rig_camera": camera.T_rig_camera.tolist()}
+    kept = Catalogue(layout.inputs)
+    own = [kept.camera_of(int(clip.seed)) for clip in plan.clips]
+    return {name: [getattr(one, name).tolist() for one in own] for name in ("K", "T_rig_camera")}
+
+
 @contextmanager
 def open_workers(
     layout: Layout, plan: Plan, runner: RunnerChoice, workers: int | None, scheduler: str | None
@@ -245,7 +255,7 @@ def open_workers(
     runner, workers, scheduler : as of `generate_dataset`
     """
     warm = partial(warm_up, layout, find_scene(plan.record_of(plan.clips[0].scenario.scene)))
-    chosen = choose_runner(runner, plan.settings.pictures, scheduler)
+    chosen = choose_runner(runner, plan.settings.stores_frames, scheduler)
     if chosen != "threads":
         load_scene.cache_clear()  # planning read its route; the workers read it again, and this process does not
     with hold_plan(layout.root, plan), open_executor(chosen, workers, scheduler, warm) as executor:
@@ -257,9 +267,9 @@ def fan_out(layout: Layout, plan: Plan, indices: list[int], executor: Executor) 
     cost, committed = RunCost(), 0
     failures: dict[str, BaseException] = {}
     named = {index: plan.clips[index].scenario.scene for index in indices}
-    places = {scene: find_scene(plan.record_of(scene)) for scene in set(named.values())}
+    folders = {scene: find_scene(plan.record_of(scene)) for scene in set(named.values())}
     # a worker then loads each scene once
-    jobs = ((layout, index, places[named[index]]) for index in sorted(indices, key=lambda k: named[k] or ""))
+    jobs = ((layout, index, folders[named[index]]) for index in sorted(indices, key=lambda k: named[k] or ""))
     with progress_bar("clips", len(indices)) as advance:
         for (_, index, _), future in run_unordered(executor, make_clip, jobs):
             label, error = plan.clips[index].label, future.exception()

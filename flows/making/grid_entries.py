@@ -73,13 +73,13 @@ class GridEntries:
     ----------
     contents : name under ``inputs/`` to what a dataset keeps
     values : name under ``inputs/`` to what a sound file holds
-    places : name under ``inputs/`` to the setting that names a file, or names a vehicle that does, and the file
+    files : name under ``inputs/`` to the setting that names a file, or names a vehicle that does, and the file
     problems : one sentence each
     """
 
     contents: dict[str, bytes]
     values: Mapping[str, Any]
-    places: Mapping[str, tuple[str, Path]]
+    files: Mapping[str, tuple[str, Path]]
     problems: list[str]
 
     @property
@@ -115,7 +115,7 @@ def read_entries(settings: GridFile, weathers: Collection[str] = ()) -> GridEntr
     """
     contents: dict[str, bytes] = {}
     values: dict[str, Any] = {}
-    places: dict[str, tuple[str, Path]] = {}
+    files: dict[str, tuple[str, Path]] = {}
     problems: list[str] = []
     tyre: tuple[Path, bytes] | None = None
     for row in INPUTS:
@@ -125,23 +125,23 @@ def read_entries(settings: GridFile, weathers: Collection[str] = ()) -> GridEntr
         try:
             if row.kind == "vehicle":
                 file = open_vehicle(reference)
-                content, place, value, tyre = file.content, file.source, file.build(), file.tyre
+                content, path, value, tyre = file.content, file.source, file.build(), file.tyre
             else:
-                content, place, value = open_entry(row.kind, reference)
+                content, path, value = open_entry(row.kind, reference)
         except InputError as error:
             problems += error.problems
             continue
         contents[row.name], values[row.name] = content, value
         if row.setting is not None:
-            places[row.name] = row.setting, place
+            files[row.name] = row.setting, path
     families = {WEATHERS[kind].tyre_family for kind in weathers if kind in WEATHERS}
     unasked = WEATHERS.keys() - families - set(weathers)
     contents |= {
         f"weather/{name}.yaml": content for name, content in WEATHER.contents.items() if name not in unasked
     }
     if tyre is not None:
-        place, content = tyre
-        contents[place.name], places[place.name] = content, ("vehicle", place)
+        path, content = tyre
+        contents[path.name], files[path.name] = content, ("vehicle", path)
     for own in dict.fromkeys(user.body for user in settings.road_users if user.body is not None):
         name = f"{BODIES}/{Path(own).name}"
         try:
@@ -154,7 +154,7 @@ def read_entries(settings: GridFile, weathers: Collection[str] = ()) -> GridEntr
             problems.append(
                 f"objects: body {own}: another body has the name {Path(own).name}: rename one of them"
             )
-    return GridEntries(contents=contents, values=values, places=places, problems=problems)
+    return GridEntries(contents=contents, values=values, files=files, problems=problems)
 
 
 def find_private_entries(settings: GridFile) -> list[str]:

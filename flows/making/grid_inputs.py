@@ -8,15 +8,15 @@ from catalogs.grids import Grid
 from catalogs.physical_limits import find_limit_problem
 from catalogs.road_grade import name_grade_file, write_road_grade
 from catalogs.scenario import find_range_problems, find_route_problems, find_scenario_problems
-from catalogs.scenes import load_route, scene_identity
+from catalogs.scenes import is_built_in, load_route, load_scene, scene_identity
 from catalogs.sentences import cap_problems
 from catalogs.street_names import parse_street_name
 from catalogs.studies.ablation import cut_coupling
 from flows.making.bends import find_bend_problems
 from flows.making.driving import hazard_of, surface_of
 from flows.making.grid_entries import GridEntries, read_entries, recorded_reference
+from flows.making.locations import note_location
 from flows.making.memory import find_memory_problems
-from flows.making.places import remember_place
 from flows.making.road_users import find_road_user_problems
 from flows.making.traced import read_trace_inputs
 from tasks.errors import InputError
@@ -56,6 +56,7 @@ def read_grid_inputs(grid: Grid, tick_rate_hz: int) -> tuple[GridEntries, Scenes
     sound = not problems
     if scenes:
         problems += _find_route_problems(grid, scenes)
+        problems += cap_problems(_find_sky_problems(grid, scenes))
         if grid.poses is None:
             entries.contents.update(_list_grades(grid, scenes))
     if sound:
@@ -113,7 +114,7 @@ def _identify_scene(name_or_folder: str) -> dict[str, Any]:
         "name": recorded_reference(name_or_folder),
         "sha256": scene_identity(name_or_folder),
     }
-    remember_place(scene["sha256"], name_or_folder)
+    note_location(scene["sha256"], name_or_folder)
     street = parse_street_name(name_or_folder)
     return scene if street is None else scene | {"kind": street.kind, "seed": street.seed}
 
@@ -143,7 +144,8 @@ def _find_buried_cameras(grid: Grid, entries: GridEntries) -> list[str]:
     """Scenarios in whose pictures the camera would look out of the snow."""
     if not grid.settings.pictures:
         return []
-    height_m = float(entries.camera.T_rig_camera[2, 3])
+    camera = entries.camera
+    height_m = camera.spread.get("height_above_road", camera.T_rig_camera[2:3, 3])[0]
     deepest_mm = 1e3 * height_m / HIGHEST_LUMP
     return [
         f"scenario {label}: snow must be less than {deepest_mm:g} mm deep in a picture: its lumps reach the camera"
@@ -209,3 +211,17 @@ def _find_route_problems(grid: Grid, scenes: Scenes) -> list[str]:
             ):
                 problems.setdefault(problem, f"scenario {label}: {problem}")
     return list(problems.values())
+
+
+def _find_sky_problems(grid: Grid, scenes: Scenes) -> list[str]:
+    """Scenarios that name a sky over a scene whose light is not known, so that no other can be put on."""
+    lit = {
+        named: is_built_in(scene) or load_scene(scene).daylight is not None
+        for named in scenes
+        if (scene := named or grid.settings.scene)
+    }
+    return [
+        f"scenario {label}: sky {scenario.sky} needs a scene that knows its own light, as the built-in streets do"
+        for label, scenario in grid.scenarios
+        if scenario.sky is not None and not lit[scenario.scene]
+    ]

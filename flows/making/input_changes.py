@@ -10,7 +10,7 @@ from catalogs.sentences import cap_problems
 from catalogs.vehicles import open_vehicle
 from flows.making.grid_entries import read_entries
 from flows.making.grid_inputs import grade_of
-from flows.making.places import find_scene, noted_place
+from flows.making.locations import find_scene, noted_location
 from flows.store.address import send_files
 from flows.store.layout import Layout, write_atomically
 from flows.store.sealed import read_plan_record, recorded_grid, refuse_changed_files
@@ -88,7 +88,7 @@ def recorded_inputs(layout: Layout, manifest: Manifest) -> dict[str, bytes]:
 
 def _read_candidates(layout: Layout, manifest: Manifest, name: str, at_hand: bytes | None) -> Iterator[bytes]:
     """Yield what may be an input: from the dataset, the catalogue, where it lay, or the scene that it follows from."""
-    for file in (layout.inputs / name, noted_place(manifest["inputs"][name])):
+    for file in (layout.inputs / name, noted_location(manifest["inputs"][name])):
         with suppress(InputError):
             if file is not None and file.is_file():
                 yield file.read_bytes()

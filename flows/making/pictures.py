@@ -11,10 +11,10 @@ from catalogs.grids.form import TICK_RATE_HZ
 from catalogs.scenario import Scenario
 from flows.making.bodies import build_moving_bodies
 from flows.making.catalogue import Catalogue
-from flows.making.driving import hazard_of, weather_of
+from flows.making.driving import hazard_of, sky_of, weather_of
 from flows.making.plan import Plan, frame_ticks
 from flows.making.road_users import move_road_users
-from tasks.render.camera import RigAt, body_poses, continuous_rig
+from tasks.render.camera import Camera, RigAt, body_poses, continuous_rig
 from tasks.render.clip import RigMotion, render_clip
 from tasks.render.feature_sign import add_sign
 from tasks.render.kerb_face import extend_kerbs
@@ -64,18 +64,19 @@ def render_frames(
     catalogue: Catalogue,
     seed: int,
     rig_at: RigAt,
+    shown: range | None = None,
 ) -> dict[str, NDArray[Any]]:
-    """Render the clip's finished frames, depth and class."""
+    """Render the clip's finished frames, depth and class; ``shown`` is that of `RigMotion`."""
     T_world_rig = frames["T_world_rig"].reshape(-1, 4, 4)
-    scene = catalogue.scene
+    scene, camera = catalogue.scene, catalogue.camera_of(seed)
     if (street := catalogue.street) is not None:
         scene = replace(
             scene,
             gaussians=detail_cars(
                 scene.gaussians,
                 *street,
-                T_world_rig @ catalogue.camera.T_rig_camera,
-                float(catalogue.camera.K[0, 0]),
+                T_world_rig @ camera.T_rig_camera,
+                float(camera.K[0, 0]),
             ),
         )
     gaussians, relief = edit_scene(
@@ -86,13 +87,14 @@ def render_frames(
     )
     buffers = render_clip(
         replace(scene, gaussians=gaussians),
-        catalogue.camera,
-        gather_motion(scenario, state, frames, plan, catalogue, rig_at),
+        camera,
+        replace(gather_motion(scenario, state, frames, plan, catalogue, camera, rig_at), shown=shown),
         ClipConditions(
             state=state,
             pavement=catalogue.surface,
             parameters=catalogue.weather_parameters,
             seed=seed,
+            sky=sky_of(scenario),
             anchors=_anchors_of(scenario, plan, catalogue),
             refracts=plan.settings.composition == "paper",
         ),
@@ -112,18 +114,19 @@ def gather_motion(
     frames: Mapping[str, NDArray[Any]],
     plan: Plan,
     catalogue: Catalogue,
+    camera: Camera,
     rig_at: RigAt,
 ) -> RigMotion:
     """Return the motion of rig and road users at a clip's frames."""
     sizes, time = catalogue.road_user_sizes, frames["tick"] / TICK_RATE_HZ
     motions = move_road_users(scenario, sizes, catalogue.scene, state.friction, time)
     T_world_rig = frames["T_world_rig"].reshape(-1, 4, 4)
-    T_world_camera = T_world_rig @ catalogue.camera.T_rig_camera
+    T_world_camera = T_world_rig @ camera.T_rig_camera
     return RigMotion(
         T_world_rig=T_world_rig,
         frame_rate_hz=plan.settings.frame_rate_hz,
         rig_at=rig_at,
-        bodies=build_moving_bodies(scenario, catalogue, motions, T_world_camera),
+        bodies=build_moving_bodies(scenario, catalogue, motions, T_world_camera, float(camera.K[0, 0])),
     )
 
 
@@ -162,6 +165,6 @@ def edit_scene(
 def _anchors_of(scenario: Scenario, plan: Plan, catalogue: Catalogue) -> tuple[SurfaceState, ...]:
     """Return the anchors about the clip's rate that the paper's composition blends."""
     look = catalogue.weather_parameters.find_look(scenario.weather)
-    if plan.settings.composition != "paper" or look.anchors_mm_h is None:
+    if plan.settings.composition != "paper" or look.anchors_mm_h is None or not scenario.falling:
         return ()
     return adjacent_anchors(weather_of(scenario), look.anchors_mm_h, catalogue.surface)

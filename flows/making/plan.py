@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from catalogs.vehicles import open_vehicle
 from flows.making.grid_entries import recorded_settings
 from flows.making.grid_inputs import read_grid_inputs
 from flows.making.identity import identify_clip, identify_run, list_deciding, narrow_deciding
-from flows.making.places import remember_place
+from flows.making.locations import note_location
 from flows.store.layout import Layout
 from flows.store.sealed import PLAN_FORMAT, read_plan_record, recorded_grid
 from manifests.canonical import content_id, sha256_of
@@ -132,13 +132,13 @@ class Plan:
         yield f"\n ]{after}\n".encode()
 
     @classmethod
-    def of(cls, content: PlanRecord | Manifest, place: object) -> "Plan":
-        """A plan from its record, or from a manifest, whose clips say more; ``place`` is what messages call it."""
+    def of(cls, content: PlanRecord | Manifest, origin: object) -> "Plan":
+        """A plan from its record, or from a manifest, whose clips say more; ``origin`` is what messages call it."""
         asked = [field.name for field in fields(ClipPlan)]
         clips: list[dict[str, Any]] = [{name: clip[name] for name in asked} for clip in content["clips"]]  # type: ignore[literal-required]
         return cls(
             run_id=content["run_id"],
-            settings=recorded_grid(content["grid"], place),
+            settings=recorded_grid(content["grid"], origin),
             scene=content["scene"],
             scenes=tuple(content.get("scenes", ())),
             backend=content["backend"],
@@ -149,7 +149,11 @@ class Plan:
 
 
 def make_plan(
-    source: str | Path | Grid, backend: str, vehicle: str | None = None, *, pictures: bool = True
+    source: str | Path | Grid,
+    backend: str,
+    vehicle: str | None = None,
+    *,
+    pictures: bool | Literal["later"] = True,
 ) -> tuple[Plan, dict[str, bytes]]:
     """Check a grid against its catalogue entries and scene, and freeze it.
 
@@ -158,7 +162,8 @@ def make_plan(
     source : grid file, the name of one that ships, or a grid that is already read
     backend : rasteriser
     vehicle : takes the place of the grid's; a frozen one runs in the mode it was fitted in
-    pictures : False makes telemetry alone, with the clip ids of the same grid with frames
+    pictures : False makes telemetry alone, and ``later`` frames when they are read; True does as the grid says. The
+        ids of the clips are the same
 
     Returns
     -------
@@ -176,8 +181,8 @@ def make_plan(
         raise InputError([*faults.problems, *(f"{source}: {problem}" for problem in behind)]) from None
     if vehicle is not None:
         grid = replace(grid, settings=_with_vehicle(grid.settings, vehicle))
-    if not pictures:
-        grid = replace(grid, settings=grid.settings.model_copy(update={"pictures": False}))
+    if pictures is not True:
+        grid = replace(grid, settings=grid.settings.model_copy(update={"pictures": pictures}))
     name = source.settings.name if isinstance(source, Grid) else str(source)
     return freeze_grid(grid, name, backend)
 
@@ -200,9 +205,9 @@ def freeze_grid(grid: Grid, source: str, backend: str) -> tuple[Plan, dict[str, 
         )
     made_with = {"code": code_version(), "libraries": library_versions()}
     recorded = recorded_settings(settings)
-    for name, (setting, place) in entries.places.items():
+    for name, (setting, path) in entries.files.items():
         if getattr(settings, setting) != getattr(recorded, setting):
-            remember_place(hashes[name], place)
+            note_location(hashes[name], path)
     run_id = identify_run(
         deciding, recorded.model_dump(mode="json"), (clip.clip_id for clip in clips), made_with
     )
@@ -249,8 +254,8 @@ def read_plan(root: Path) -> Plan:
     """
     if (held := _HELD.get(root)) is not None:
         return held
-    place = Layout(root).plan
-    return Plan.of(read_plan_record(Layout(root)), place)
+    path = Layout(root).plan
+    return Plan.of(read_plan_record(Layout(root)), path)
 
 
 def plan_differences(
@@ -271,7 +276,7 @@ def plan_differences(
     rows = find_input_differences(bare[0], bare[1], their_inputs, our_inputs)
     rest = [(f"{row['input']} {row['path']}".strip(), row["a"], row["b"]) for row in rows]
     return [
-        f"{place} is {format_value(a)} there and {format_value(b)} here" for place, a, b in (*grid, *rest)
+        f"{field} is {format_value(a)} there and {format_value(b)} here" for field, a, b in (*grid, *rest)
     ]
 
 

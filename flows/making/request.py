@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from catalogs.entries import load
 from flows.making.freezing import reproduce_run
@@ -18,7 +18,7 @@ def make_dataset(
     manifest: str | None = None,
     vehicle: str | None = None,
     poses: str | None = None,
-    pictures: bool = True,
+    pictures: bool | Literal["later"] = True,
     **execution: Any,
 ) -> dict[str, Any]:
     """Make the dataset of a grid, or that of a frozen run again.
@@ -47,10 +47,10 @@ def make_dataset(
         return list_facts(generate_dataset(asked, out, vehicle=vehicle, pictures=pictures, **execution))
     if manifest is None or grid is not None:
         raise InputError("generate needs either a GRID or --manifest NAME, and not both")
-    if vehicle is not None or poses is not None or not pictures:
+    if vehicle is not None or poses is not None or pictures is not True:
         raise InputError(
             "--manifest sets the vehicle, its motion and whether frames are rendered: leave out --vehicle, --poses and"
-            " --no-frames"
+            " --frames"
         )
     report, differing = reproduce_run(manifest, out, **execution)
     return list_facts(report) | {

@@ -132,10 +132,10 @@ def _find_problems(scenario: Scenario, grid: Grid, entries: GridEntries) -> list
     problems = []
     for name, motion, size in zip(names, motions, boxes, strict=True):
         if (met := find_obstacle(motion.T_world_body, size, scene.gaussians)) is not None:
-            place, kind = met
-            station, lateral, _ = scene.route.project(motion.T_world_body[place, None, :3, 3])
+            moment, kind = met
+            station, lateral, _ = scene.route.project(motion.T_world_body[moment, None, :3, 3])
             problems.append(
-                f"{name} must keep clear of the street; at {time[place]:g} s, station {station[0]:.1f} m and"
+                f"{name} must keep clear of the street; at {time[moment]:g} s, station {station[0]:.1f} m and"
                 f" {lateral[0]:.1f} m to the left, it is in something of class {kind.name.lower()}: move its track"
             )
         ego, ego_size = _place_ego(scene, entries)

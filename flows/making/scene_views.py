@@ -34,11 +34,9 @@ SHEET, SMALL = (480, 320), (120, 80)
 GRAIN = (24, 16)
 """Width and height of the pictures in which streets are compared: what they show, not how they are textured [px]."""
 STEP = 1.0
-"""Way between two pictures of one place of a street [m]."""
+"""Way between two pictures of one station of a street [m]."""
 SEEN, MOST_HOLES = 0.5, 0.002
 """Opacity below which a pixel of the road is a hole, and the share of such pixels [1]."""
-LEAST_RATIO = 3.0
-"""Difference of a street to the one most like it, over that of two pictures of one place [1]."""
 AHEAD = (4.0, 40.0)
 """Nearest and farthest road that is looked at for holes [m]."""
 
@@ -131,7 +129,7 @@ def check_scenes(
 def check_scene(
     scene: Scene, steepest_grade: float, backend: str
 ) -> tuple[dict[str, Any], NDArray[np.float64]]:
-    """Return the figures and faults of a scene, and its small pictures [place, 2, h, w, 3] a metre apart.
+    """Return the figures and faults of a scene, and its small pictures [station, 2, h, w, 3] a metre apart.
 
     Parameters
     ----------
@@ -141,12 +139,12 @@ def check_scene(
     """
     figures = measure_soundness(scene)
     faults = find_faults(figures, steepest_grade)
-    places = [share * (scene.route.length - STEP) for share in SHOWN]
-    views = list(_look(scene, [s + step for s in places for step in (0.0, STEP)], SMALL, backend))
+    stations = [share * (scene.route.length - STEP) for share in SHOWN]
+    views = list(_look(scene, [s + step for s in stations for step in (0.0, STEP)], SMALL, backend))
     holes = float(np.mean([hole for _, hole in views[::2]]))
     if holes > MOST_HOLES:
         faults.append(f"at most {MOST_HOLES:.1%} of the road that is seen may be holes; {holes:.2%} is")
-    grain = np.stack([_coarsen(picture) for picture, _ in views]).reshape(len(places), 2, *GRAIN[::-1], 3)
+    grain = np.stack([_coarsen(picture) for picture, _ in views]).reshape(len(stations), 2, *GRAIN[::-1], 3)
     known = {name: None if isnan(value) else value for name, value in figures.items()}
     return {**known, "holes": holes, "faults": faults}, grain
 
@@ -156,7 +154,7 @@ def compare_streets(grains: NDArray[np.float64]) -> tuple[NDArray[np.float64], N
 
     Parameters
     ----------
-    grains : small pictures of `check_scene`, [N, place, 2, h, w, 3]
+    grains : small pictures of `check_scene`, [N, station, 2, h, w, 3]
     """
     within = np.sqrt(np.mean((grains[:, :, 0] - grains[:, :, 1]) ** 2, axis=(1, 2, 3, 4)))
     flat = grains[:, :, 0].reshape(len(grains), -1)

@@ -49,14 +49,14 @@ def seal_dataset(layout: Layout, plan: Plan, executor: Executor | None = None) -
     for path, tables in summarise_clips(plan, _read_receipts(layout, plan.clips)):
         write_tables(tables, layout.root / path)
     sheet = layout.root / SHEET
-    if plan.settings.pictures:
+    if plan.settings.stores_frames:
         shown = list(_read_receipts(layout, pick_evenly(plan.clips, PREVIEW_CLIPS)))
         write_atomically(
             sheet, preview_sheet(layout, plan, shown, lambda clip_id: layout.staged(clip_id, "frames"))
         )
     made = [
         *(layout.root / path for path in SUMMARIES),
-        *([sheet] if plan.settings.pictures else []),
+        *([sheet] if plan.settings.stores_frames else []),
     ]
     shared = [
         *made,
@@ -101,7 +101,7 @@ def _read_here(layout: Layout, plan: Plan) -> Iterator[Path]:
     """The files of finished clips that sealing reads beside their tables, and those of clips on the contact sheet."""
     for clip in plan.clips:
         yield layout.receipt(clip.clip_id)
-    for clip in pick_evenly(plan.clips, PREVIEW_CLIPS) if plan.settings.pictures else []:
+    for clip in pick_evenly(plan.clips, PREVIEW_CLIPS) if plan.settings.stores_frames else []:
         yield layout.staged(clip.clip_id, "frames")
         yield layout.frame_shard("rgb", clip.index)
 

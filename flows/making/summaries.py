@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 import pyarrow as pa
 
-from catalogs.variants import Variant
+from catalogs.scenario import OPTIONAL_FIELDS
 from flows.making.plan import ClipPlan, Plan
 from flows.store.telemetry import labelled_table
 from manifests.manifest import is_quarantined
@@ -33,35 +33,41 @@ def summarise_clips(plan: Plan, receipts: Iterable[Receipt]) -> Iterator[tuple[s
     plan : of the dataset
     receipts : of its clips, in its order, each read once
     """
-    clips = clips_table(receipts, plan.settings.variant)
+    clips = clips_table(receipts, plan)
     yield CLIPS, iter([clips])
     outcomes = Outcomes(plan.clips, clips)
     del clips
     yield PAIRS, pairs_tables(outcomes)
 
 
-def clips_table(receipts: Iterable[Receipt], variant: Variant) -> pa.Table:
+def clips_table(receipts: Iterable[Receipt], plan: Plan) -> pa.Table:
     """One row a clip: controls, surface, outcome and verdict; where a coupling is cut, also which.
 
     Parameters
     ----------
     receipts : of the clips
-    variant : of the dataset
+    plan : of the dataset
     """
+    named = {name for clip in plan.clips for name in clip.scenario.as_row()}
+    usual = {name: value for name, value in OPTIONAL_FIELDS.items() if name in named}
     columns: dict[str, list[pa.Array]] = {}
     for batch in batched(receipts):
-        rows = [_clip_row(receipt) for receipt in batch]
+        rows = [_clip_row(receipt, usual) for receipt in batch]
         for name in columns or rows[0]:
             columns.setdefault(name, []).append(_pack([row.get(name) for row in rows]))
     # each column's parts go when it is whole
+    variant = plan.settings.variant
     cut = {} if variant == "full" else {"variant": variant}
     return labelled_table({name: _join(columns.pop(name)) for name in list(columns)}, cut)
 
 
-def _clip_row(r: Receipt) -> dict[str, Any]:
+def _clip_row(r: Receipt, usual: Mapping[str, Any]) -> dict[str, Any]:
+    """The row of a clip; ``usual`` has what its scenario does not name where another clip's does."""
+    named = {name: r["scenario"].get(name, value) for name, value in usual.items()}
     return (
         {name: r[name] for name in ("clip_id", "index", "label", "seed", "split", "calibration")}
-        | {name: value for name, value in r["scenario"].items() if name != "objects"}
+        | {name: value for name, value in r["scenario"].items() if name not in {"objects", *named}}
+        | named
         | r["figures"]
         | {"quarantined": is_quarantined(r)}
         | {f"check_{key}": value for key, value in r["verdict"].items() if key != "reasons"}
@@ -96,9 +102,9 @@ class Outcomes(Sequence[Mapping[str, Any]]):
     def __len__(self) -> int:
         return len(self.clips)
 
-    def __getitem__(self, place: Any) -> Any:
-        clip = self.clips[place]
-        figures = {name: values[place] for name, values in self.figures.items()}
+    def __getitem__(self, index: Any) -> Any:
+        clip = self.clips[index]
+        figures = {name: values[index] for name, values in self.figures.items()}
         return {
             "clip_id": clip.clip_id,
             "label": clip.label,

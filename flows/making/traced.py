@@ -100,13 +100,13 @@ def unknown_ranges() -> dict[str, float]:
     return {f"{name}_p{percentile:02d}": float("nan") for name in names for percentile in PERCENTILES}
 
 
-def refuse_traced(inputs: Iterable[str], place: object, command: str) -> None:
+def refuse_traced(inputs: Iterable[str], origin: object, command: str) -> None:
     """Refuse a dataset whose motion no vehicle of this project made.
 
     Parameters
     ----------
     inputs : names of its frozen inputs
-    place : what messages call the dataset
+    origin : what messages call the dataset
     command : that computes the motion again
 
     Raises
@@ -116,7 +116,7 @@ def refuse_traced(inputs: Iterable[str], place: object, command: str) -> None:
     """
     if is_traced(inputs):
         raise InputError(
-            f"{place}: its motion is that of reference traces (generate --poses), which no vehicle model made;"
+            f"{origin}: its motion is that of reference traces (generate --poses), which no vehicle model made;"
             f" musync {command} needs a dataset that muSync drove"
         )
 

@@ -16,9 +16,9 @@ from flows.pages.figures import Figure, Line, Panel, Style
 from flows.pages.static import as_svg
 from flows.pages.writer import Section, Table, write_page
 from flows.store.outputs import Outputs
-from tasks.eval.agreement_groups import summarise_by_control, summarise_groups
+from tasks.eval.agreement_groups import summarise_cases, summarise_groups
 from tasks.eval.state_agreement import CaseAgreement, case_agreement
-from tasks.eval.stop_agreement import stop_agreement
+from tasks.eval.stop_agreement import STOP_FIGURES, stop_agreement
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Mode, Rollout, simulate_scenario
@@ -27,7 +27,6 @@ PAPER = ("paper-reference", "paper")
 """The paper's vehicle and mode, drawn beside any other."""
 BY = dict.fromkeys(("flat", "hump", "depression"), "road")
 """What a group's cases have in common, by its name; other names are those of what the cases vary."""
-STOP_FIGURES = ("braking_time_error_s", "slip_distance_error_m")
 Curves = dict[str, NDArray[np.float64]]
 QUANTITIES = {
     "speed": "speed [m/s]",
@@ -98,27 +97,32 @@ def agreement_of(model: Vehicle, reference: list[tuple[ReferenceCase, Traces]], 
         ride = simulate_case(model, case, columns, mode)
         scored = case_agreement(columns, ride.columns, case.facts(model.wheelbase), ride.static_pitch)
         splits.setdefault(case.split, []).append(scored)
-        stop = stop_agreement(columns, ride.columns, case.facts(model.wheelbase))
-        stops = dict.fromkeys(STOP_FIGURES) if stop is None else asdict(stop)
-        rows.append({"split": case.split} | asdict(scored) | {"window": list(scored.window)} | stops)
+        stop = stop_agreement(columns, ride.columns, case.facts(model.wheelbase)) or dict.fromkeys(
+            STOP_FIGURES
+        )
+        rows.append(
+            {"split": case.split}
+            | asdict(scored)
+            | {"window": list(scored.window)}
+            | (stop or dict.fromkeys(STOP_FIGURES))
+        )
     controls = {case.case: case.control for case, _ in reference}
     groups = [
-        {"split": split, "by": BY.get(name, name), "name": name, "cases": group.count, "mean": _make_plain(group.mean),
-         "maximum": _make_plain(group.maximum), "event_unit": group.event_unit,
-         "group": name, "count": group.count, **_make_plain(group.mean)}
+        {"split": split, "by": BY.get(name, name), "name": name, **group,
+         "group": name, "count": group["cases"], **group["mean"]}
         for split, cases in splits.items()
-        for name, group in (summarise_groups(cases) | summarise_by_control(cases, controls)).items()
+        for name, group in summarise_groups(cases, controls).items()
     ]  # fmt: skip
     braked = {case.split for case, _ in reference if case.braked and case.hazard_height_m != 0}
     for group in groups:
         group["road_cases_brake"] = group["split"] in braked
         if group["group"] == "flat":
             group |= _average_stops([row for row in rows if row["split"] == group["split"]])
-    overall = summarise_groups([case for cases in splits.values() for case in cases])["all"].mean
+    overall = summarise_cases([case for cases in splits.values() for case in cases])
     return {
         "cases": rows,
         "groups": groups,
-        "mean": _make_plain(overall),
+        "mean": overall["mean"],
         "beside_print": put_beside_print(
             [
                 *groups,
@@ -181,11 +185,6 @@ def _average_stops(rows: list[dict[str, Any]]) -> dict[str, float]:
     """Mean absolute errors of the stops among a split's cases; nothing where none stops."""
     found = {name: [row[name] for row in rows if row[name] is not None] for name in STOP_FIGURES}
     return {name: sum(values) / len(values) for name, values in found.items() if values}
-
-
-def _make_plain(figures: dict[str, float]) -> dict[str, float | None]:
-    """JSON has no NaN: a figure that a group cannot have is null."""
-    return {name: None if value != value else value for name, value in figures.items()}
 
 
 def draw_trajectories(

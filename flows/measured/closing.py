@@ -171,9 +171,9 @@ def _describe_own_numbers(outcome: Outcome, library: Sequence[Effect]) -> str:
     if outcome.verdict.effects or outcome.verdict.experiment is not None:
         return ""
     base = outcome.fitted
-    place = int(np.argmax(base.pulls[: len(SESSION)]))
-    number = next(e for e in library if e.effect_class == "retune" and e.parameters[0].name == SESSION[place])
-    return f"most: {number.say({SESSION[place]: float(base.session[place])})}"
+    index = int(np.argmax(base.pulls[: len(SESSION)]))
+    number = next(e for e in library if e.effect_class == "retune" and e.parameters[0].name == SESSION[index])
+    return f"most: {number.describe({SESSION[index]: float(base.session[index])})}"
 
 
 def split_of(campaign: Campaign) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from tasks.identification.decision.verdict import Outcome
 from tasks.identification.decision.words import join_phrases
 from tasks.identification.inference.disturbance import FRICTION
 
-TOLD_PULL = 2.5
+REPORTED_PULL = 2.5
 """Pull of a run's friction from which it is reported, in tolerances: one such run in 80 has it by chance [1]."""
 
 
@@ -29,14 +29,14 @@ def compute_friction_pulls(outcome: Outcome) -> dict[str, float]:
 
 
 def find_pulled_runs(result: Mapping[str, Any]) -> dict[str, float]:
-    """Return the runs of a verdict that pull friction by more than `TOLD_PULL` tolerances, with their pull [1].
+    """Return the runs of a verdict that pull friction by more than `REPORTED_PULL` tolerances, with their pull [1].
 
     Parameters
     ----------
     result : the verdict as plain values
     """
     pulls: Mapping[str, float] = result["friction_pulls_sigma"]
-    return {name: pull for name, pull in pulls.items() if abs(pull) > TOLD_PULL}
+    return {name: pull for name, pull in pulls.items() if abs(pull) > REPORTED_PULL}
 
 
 def describe_friction_pulls(result: Mapping[str, Any], tolerance: float) -> dict[str, Any]:
@@ -55,7 +55,7 @@ def describe_friction_pulls(result: Mapping[str, Any], tolerance: float) -> dict
         sentence += f" But in {join_phrases(pulled)} the tyres do not grip as the surface mapping says."
     listed = join_phrases(f"{name} by {pull:+.1f}" for name, pull in pulled.items())
     reason = (
-        f"runs at their limit pull friction by more than {TOLD_PULL:g} of its tolerances ({tolerance:.1%} each):"
+        f"runs at their limit pull friction by more than {REPORTED_PULL:g} of its tolerances ({tolerance:.1%} each):"
         f" {listed}; what is named does not explain it, and stops at the limit are predicted no better"
     )
     return {**result, "sentence": sentence, "reasons": [*result["reasons"], reason]}

@@ -91,12 +91,12 @@ def grown_vehicle(
     kept = {effect: limits for effect, limits in before["bounds"].items() if effect in base.effects}
     bounds = kept | bounds
     rivals = [rival.name for _, rival in verdict.rivals]
-    untold = f"; the runs cannot tell it from {', '.join(rivals)}" if rivals else ""
+    undecided = f"; the runs cannot tell it from {', '.join(rivals)}" if rivals else ""
     provenance = {
         "mode": "coupled",
         "base": source.stem,
         "base_sha256": sha256_of([content]),
-        "procedure": f"close-loop, verdict {verdict.verdict}: {', '.join(e.name for e in verdict.effects)}{untold}",
+        "procedure": f"close-loop, verdict {verdict.verdict}: {', '.join(e.name for e in verdict.effects)}{undecided}",
         "procedure_sha256": sha256_of_file(find_entry("library of effects")),
         "version": code_version()["version"],
         "split": f"train of {verdict.campaign}",

@@ -43,19 +43,19 @@ def read_recordings(
         Listing the problems of all, where more are faulty than may be left out.
     """
     recordings: Signals = {}
-    problems: list[PlacedProblem] = []
+    problems: list[RecordingProblem] = []
     for file in files:
         try:
             recordings[file] = read_signals(file, channel_map)
         except InputError as error:
-            problems += [place_in_file(file, problem) for problem in error.problems]
+            problems += [split_origin(file, problem) for problem in error.problems]
     if not recordings or len(files) - len(recordings) > MOST_FAULTY * len(files):
         raise InputError(join_shared_problems(problems, len(files), "files", exact=True))
     channel_map = _fill_units(channel_map, recordings)
     for file in list(recordings):
         if found := _find_recording_problems(recordings[file], channel_map):
             problems += [
-                PlacedProblem(name=file.name, place=file.name, sentence=problem) for problem in found
+                RecordingProblem(name=file.name, origin=file.name, sentence=problem) for problem in found
             ]
             del recordings[file]
     joined = join_shared_problems(problems, len(files), "files", exact=True)
@@ -75,7 +75,7 @@ def find_signal_problems(source: Path, channel_map: ChannelMap | None) -> list[s
     """
     if channel_map is None:
         return []
-    problems: list[PlacedProblem] = []
+    problems: list[RecordingProblem] = []
     try:
         files = recording_files(source, channel_map)
     except InputError as error:
@@ -84,7 +84,7 @@ def find_signal_problems(source: Path, channel_map: ChannelMap | None) -> list[s
         try:
             read_signals(file, channel_map)
         except InputError as error:
-            problems += [place_in_file(file, problem) for problem in error.problems]
+            problems += [split_origin(file, problem) for problem in error.problems]
     return join_shared_problems(problems, len(files), "files", exact=True)
 
 
@@ -104,7 +104,7 @@ def leave_out_faulty(
         part of the split keeps none.
     """
     placed = [
-        PlacedProblem(name=run.name, place=f"{run.name} ({run.file.name})", sentence=problem)
+        RecordingProblem(name=run.name, origin=f"{run.name} ({run.file.name})", sentence=problem)
         for run, found in made
         for problem in found.problems
     ]
@@ -147,22 +147,22 @@ def _find_recording_problems(signals: dict[str, Signal], channel_map: ChannelMap
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlacedProblem:
+class RecordingProblem:
     """A fault and where it is.
 
     Parameters
     ----------
     name : of the run or the file, short
-    place : the same in full; empty where the sentence needs none
-    sentence : the fault, without the place
+    origin : the same in full; empty where the sentence needs none
+    sentence : the fault, without its origin
     """
 
     name: str
-    place: str
+    origin: str
     sentence: str
 
 
-def place_in_file(path: Path, problem: str) -> PlacedProblem:
+def split_origin(path: Path, problem: str) -> RecordingProblem:
     """Return a file's fault, whose sentence begins with the file's path or name, without it.
 
     Parameters
@@ -170,18 +170,18 @@ def place_in_file(path: Path, problem: str) -> PlacedProblem:
     path : of the file
     problem : as its reader reported it
     """
-    place = next((start for start in (str(path), path.name) if problem.startswith(start)), "")
-    sentence = problem[len(place) :].lstrip(": ") if place else problem
-    return PlacedProblem(name=path.name, place=place, sentence=sentence)
+    origin = next((start for start in (str(path), path.name) if problem.startswith(start)), "")
+    sentence = problem[len(origin) :].lstrip(": ") if origin else problem
+    return RecordingProblem(name=path.name, origin=origin, sentence=sentence)
 
 
 def join_shared_problems(
-    found: Sequence[PlacedProblem], total: int, kind: str, *, exact: bool = False
+    found: Sequence[RecordingProblem], total: int, kind: str, *, exact: bool = False
 ) -> list[str]:
-    """Return one sentence per fault, where three or more places that share a fault share its sentence.
+    """Return one sentence per fault, where three or more recordings that share a fault share its sentence.
 
-    Figures that differ stand as a range, such as 212..250. Of two faults of one place that differ in figures alone, the
-    first is joined with the first of other places.
+    Figures that differ stand as a range, such as 212..250. Of two faults of one recording that differ in figures alone,
+    the first is joined with the first of other recordings.
 
     Parameters
     ----------
@@ -190,12 +190,12 @@ def join_shared_problems(
     kind : what they are, such as runs
     exact : join only what is reported in the same figures, as the names of signals are
     """
-    groups: dict[tuple[str, int], list[PlacedProblem]] = {}
+    groups: dict[tuple[str, int], list[RecordingProblem]] = {}
     counts: dict[tuple[str, str], int] = {}
     for problem in found:
         form = problem.sentence if exact else NUMBER.sub("#", problem.sentence)
-        before = counts.get((problem.place, form), 0)
-        counts[problem.place, form] = before + 1
+        before = counts.get((problem.origin, form), 0)
+        counts[problem.origin, form] = before + 1
         groups.setdefault((form, before), []).append(problem)
     return [
         sentence
@@ -203,17 +203,17 @@ def join_shared_problems(
         for sentence in (
             [_join_group(group, total, kind)]
             if len(group) >= SHARED
-            else [f"{problem.place}: {problem.sentence}".removeprefix(": ") for problem in group]
+            else [f"{problem.origin}: {problem.sentence}".removeprefix(": ") for problem in group]
         )
     ]
 
 
-def _join_group(group: Sequence[PlacedProblem], total: int, kind: str) -> str:
+def _join_group(group: Sequence[RecordingProblem], total: int, kind: str) -> str:
     names = [shorten(problem.name, 60) for problem in group]
     return f"in {len(names)} of {total} {kind} ({list_names(names)}): {_write_ranges(group)}"
 
 
-def _write_ranges(group: Sequence[PlacedProblem]) -> str:
+def _write_ranges(group: Sequence[RecordingProblem]) -> str:
     """Return the sentence of a group, each figure that differs as a range from the lowest to the highest."""
     if len({problem.sentence for problem in group}) == 1:
         return group[0].sentence

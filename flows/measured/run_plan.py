@@ -149,8 +149,8 @@ def _cut_recordings(
             )
         for part in parts:
             if part.fault:
-                place = f"{shorten(file.relative_to(root))} from {part.start:.3f} to {part.end:.3f} s"
-                left_out.append(f"{place}: {part.fault}")
+                part_name = f"{shorten(file.relative_to(root))} from {part.start:.3f} to {part.end:.3f} s"
+                left_out.append(f"{part_name}: {part.fault}")
                 faulty += 1
                 continue
             number = len(runs) + 1

@@ -27,14 +27,14 @@ def list_recorded_signals(source: str, map: str | None) -> dict[str, Any]:
     InputError
         Listing every recording that cannot be read.
     """
-    place = Path(source)
+    path = Path(source)
     channel_map = None if map is None else _load_readable_map(map)
     listed: dict[str, list[dict[str, Any]]] = {}
     problems: list[str] = []
-    for file in recording_files(place):
+    for file in recording_files(path):
         try:
             rows = summarise_signals(file, channel_map)
-            listed[file.relative_to(recording_root(place)).as_posix()] = [asdict(row) for row in rows]
+            listed[file.relative_to(recording_root(path)).as_posix()] = [asdict(row) for row in rows]
         except InputError as error:
             problems += error.problems
     if problems:

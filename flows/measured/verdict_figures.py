@@ -42,14 +42,14 @@ def draw_run(run: RunPrediction, noise: Mapping[str, Any], left: Mapping[str, An
     """
     thin = slice(None, None, max(run.model.samples // POINTS, 1))
     time = (np.arange(run.model.samples) * run.model.run.interval)[thin]
-    panels, said = [], []
+    panels, summary = [], []
     for c in run.channels:
         name, unit = CHANNELS[c], format_plain_unit(CHANNEL_UNITS[c])
         reach = NORMAL_QUANTILE * noise[name]["sigma"]
         measured = run.model.measured[thin, c]
         predicted = {model: values[thin, c] for model, values in run.predicted.items()}
         after = predicted["after"]
-        said.append(
+        summary.append(
             f"{_as_words(name)} {left[name]['frozen']:.3g} → {left[name]['after']:.3g} {unit}".rstrip()
         )
         panels.append(Panel(title=_as_words(name), y=unit, lines=[
@@ -66,9 +66,9 @@ def draw_run(run: RunPrediction, noise: Mapping[str, Any], left: Mapping[str, An
         Panel(title="brake pressure", y="MPa", lines=[Line(name="", x=time, y=run.model.pressure[thin])])
     )
     return Figure(
-        caption=f"{run.model.run.name}: error frozen → after: {'; '.join(said)}",
+        caption=f"{run.model.run.name}: error frozen → after: {'; '.join(summary)}",
         description=f"Measured, frozen and after over time of {run.model.run.name}, and what each leaves:"
-        f" {'; '.join(said)}; below them the brake pressure",
+        f" {'; '.join(summary)}; below them the brake pressure",
         panels=panels,
         columns=2,
         linked=True,
@@ -115,8 +115,8 @@ def make_brake_curve(runs: Sequence[RunPrediction]) -> dict[str, NDArray[np.floa
     """
     pressure, measured, frozen, fitted = np.concatenate([_compute_decelerations(run) for run in runs], axis=1)
     edges = np.linspace(0.0, max(float(pressure.max(initial=0.0)), 1e-9), BINS + 1)
-    place = np.clip(np.digitize(pressure, edges) - 1, 0, BINS - 1)
-    parts = [place == k for k in range(BINS) if np.sum(place == k) >= FEWEST_SAMPLES]
+    bins = np.clip(np.digitize(pressure, edges) - 1, 0, BINS - 1)
+    parts = [bins == k for k in range(BINS) if np.sum(bins == k) >= FEWEST_SAMPLES]
     return {
         name: np.array([statistic(values[part]) for part in parts])
         for name, values, statistic in (
@@ -190,7 +190,7 @@ def draw_correlation(correlation: Mapping[str, Mapping[str, Any]]) -> Figure:
     ----------
     correlation : by channel, as of a verdict's ``residual_input_correlation``
     """
-    panels, said = [], []
+    panels, summary = [], []
     for channel, c in correlation.items():
         ends = [c["lag_s"][0], c["lag_s"][-1]]
         panels.append(Panel(title=_as_words(channel), x="residual after pressure [s]", y="correlation", lines=[
@@ -198,10 +198,10 @@ def draw_correlation(correlation: Mapping[str, Mapping[str, Any]]) -> Figure:
             *(Line(name=model, x=c["lag_s"], y=c[model], style=style) for model, style in STYLES.items()),
         ]))  # fmt: skip
         most = ", ".join(f"{max(map(abs, c[model])):.3g} {model}" for model in STYLES)
-        said.append(f"{_as_words(channel)} at most {most}, band {c['band']:.3g}")
+        summary.append(f"{_as_words(channel)} at most {most}, band {c['band']:.3g}")
     return Figure(
         caption="Correlation over the delay of the residual",
-        description=f"Correlation with brake pressure: {'; '.join(said)}",
+        description=f"Correlation with brake pressure: {'; '.join(summary)}",
         panels=panels,
         columns=2,
     )
@@ -213,8 +213,8 @@ def _draw_limits(name: str, ends: Values, reach: float) -> Line:
 
 
 def _draw_band(name: str, x: NDArray[np.float64], explanation: Explanation, form: Candidate) -> Line:
-    places = explanation.find_places(form)
-    values, reach = explanation.values[places], NORMAL_QUANTILE * explanation.errors[places]
+    numbers = explanation.find_numbers(form)
+    values, reach = explanation.values[numbers], NORMAL_QUANTILE * explanation.errors[numbers]
     return Line(
         name=name, x=x, y=values, low=values - reach, high=values + reach, marked=True, style=STYLES[name]
     )

@@ -120,14 +120,14 @@ class Figure:
         return list(first.values())
 
 
-def pick_style(place: int) -> Style:
+def pick_style(index: int) -> Style:
     """Return colour and dash of one of many lines.
 
     Parameters
     ----------
-    place : of the line among those of the figure, from 0
+    index : of the line among those of the figure, from 0
     """
-    dash, colour = divmod(place, len(COLOURS))
+    dash, colour = divmod(index, len(COLOURS))
     return Style(COLOURS[colour], [*DASHES][dash % len(DASHES)])
 
 
@@ -156,24 +156,24 @@ def as_plotly(figure: Figure, digits: int | None = DIGITS) -> dict[str, Any]:
         "grid": {"rows": rows, "columns": columns, "pattern": "independent", "ygap": gap},
     }  # fmt: skip
     for k, panel in enumerate(figure.panels):
-        place = "" if k == 0 else str(k + 1)
-        axes = {"xaxis": f"x{place}", "yaxis": f"y{place}"}
+        axis = "" if k == 0 else str(k + 1)
+        axes = {"xaxis": f"x{axis}", "yaxis": f"y{axis}"}
         for line in panel.lines:
             *band, drawn = _draw_line(line, digits)
             data += [*(edge | axes for edge in band), drawn | axes | {"showlegend": line in first}]
         is_last = k + 1 == len(figure.panels)
-        layout[f"xaxis{place}"] = {"title": {"text": "" if stacked and not is_last else _as_text(panel.x)}}
-        layout[f"xaxis{place}"] |= {"matches": "x"} if figure.linked and k else {}
-        layout[f"xaxis{place}"] |= {"showticklabels": False} if stacked and not is_last else {}
-        layout[f"yaxis{place}"] = {"title": {"text": _as_text(panel.y)}}
+        layout[f"xaxis{axis}"] = {"title": {"text": "" if stacked and not is_last else _as_text(panel.x)}}
+        layout[f"xaxis{axis}"] |= {"matches": "x"} if figure.linked and k else {}
+        layout[f"xaxis{axis}"] |= {"showticklabels": False} if stacked and not is_last else {}
+        layout[f"yaxis{axis}"] = {"title": {"text": _as_text(panel.y)}}
         if (found := panel.find_range()) is not None:
-            layout[f"yaxis{place}"]["range"] = found
+            layout[f"yaxis{axis}"]["range"] = found
         layout["annotations"].append({
-            "text": _as_text(panel.title), "xref": f"x{place} domain", "yref": f"y{place} domain", "x": 0, "y": 1,
+            "text": _as_text(panel.title), "xref": f"x{axis} domain", "yref": f"y{axis} domain", "x": 0, "y": 1,
             "xanchor": "left", "yanchor": "bottom", "showarrow": False,
         })  # fmt: skip
         layout["shapes"] += [
-            {"type": "rect", "xref": f"x{place}", "yref": f"y{place} domain", "x0": start, "x1": end, "y0": 0, "y1": 1,
+            {"type": "rect", "xref": f"x{axis}", "yref": f"y{axis} domain", "x0": start, "x1": end, "y0": 0, "y1": 1,
              "fillcolor": read_colours()["soft"] + BAND, "line": {"width": 0}, "layer": "below"}
             for start, end in panel.shaded
         ]  # fmt: skip

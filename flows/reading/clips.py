@@ -78,10 +78,14 @@ class Clip:
         InputError
             If the dataset has no frames, the clip no such frame, or the picture is damaged.
         """
+        frames = self.dataset.head["grid"]["frames"]
+        chosen = frames // 2 if frame is None else frame
+        if not (is_whole(chosen) and 0 <= chosen < frames):
+            raise InputError(f"frame {frame}: must be one of the {frames} frames of the clip, from 0")
+        if self.dataset.head["grid"].get("pictures") == "later":
+            made = self.dataset.source.read_window(self.record["index"], slice(chosen, chosen + 1), ["rgb"])
+            return made["rgb"][0]
         rgb: Any = self.dataset.frames["rgb"]
-        chosen = rgb.shape[1] // 2 if frame is None else frame
-        if not (is_whole(chosen) and 0 <= chosen < rgb.shape[1]):
-            raise InputError(f"frame {frame}: must be one of the {rgb.shape[1]} frames of the clip, from 0")
         try:
             picture: NDArray[np.uint8] = rgb[self.record["index"], chosen]
         except (ValueError, RuntimeError, OSError) as error:
@@ -101,14 +105,14 @@ class Clip:
         return clip_card(self)
 
 
-def find_clip(rows: Sequence[Mapping[str, Any]], name: object, place: object) -> Mapping[str, Any]:
+def find_clip(rows: Sequence[Mapping[str, Any]], name: object, origin: object) -> Mapping[str, Any]:
     """Return the record of the clip of this label or id.
 
     Parameters
     ----------
     rows : all clips of a dataset
     name : label or id
-    place : what messages call the dataset
+    origin : what messages call the dataset
 
     Raises
     ------
@@ -117,7 +121,7 @@ def find_clip(rows: Sequence[Mapping[str, Any]], name: object, place: object) ->
     """
     found = next((row for row in rows if name in (row["label"], row["clip_id"])), None)
     if found is None:
-        raise suggest_clips(place, [name], [row["label"] for row in rows], "list(data)")
+        raise suggest_clips(origin, [name], [row["label"] for row in rows], "list(data)")
     return found
 
 

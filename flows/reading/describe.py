@@ -2,10 +2,10 @@
 
 from collections import Counter
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 from catalogs.entries import load
-from catalogs.grids import warn_of_late_brakes
+from catalogs.grids import GridFile, warn_of_late_brakes
 from catalogs.variants import warn_of_variant
 from flows.making.bends import warn_of_bends
 from flows.making.grid_entries import read_entries
@@ -13,6 +13,7 @@ from flows.making.plan import make_plan
 from flows.store.address import open_for_reading, stored_bytes, want_manifest
 from flows.store.sealed import read_manifest, recorded_grid
 from manifests.manifest import describe_scenes
+from tasks.render.camera import Camera
 
 CPU_SECONDS_PER_FRAME, CPU_SECONDS_PER_MEGAPIXEL = 0.1, 0.24
 """Of a finished frame with its pose check, on the built-in street: the demo, and a dry clip at 1280 x 720."""
@@ -58,8 +59,29 @@ def describe_dataset(dataset: str) -> dict[str, Any]:
     }
 
 
-def validate_grid(grid: str, *, vehicle: str | None = None, pictures: bool = True) -> dict[str, Any]:
-    """Check a grid without making anything; counts and estimates.
+def estimate_cost(settings: GridFile, camera: Camera, clips: int, *, pictures: bool) -> dict[str, float]:
+    """Return what clips take by experience: ``cpu_minutes`` [min] and ``megabytes`` [MB].
+
+    Parameters
+    ----------
+    settings : of the grid
+    camera : that sees them
+    clips : number of them [1]
+    pictures : whether frames are made and stored; else telemetry alone
+    """
+    frames = clips * settings.frames if pictures else 0
+    pixels = frames * camera.width * camera.height
+    per_pixel = BYTES_PER_PIXEL + (BYTES_OF_LABELS_PER_PIXEL if settings.labels else 0)
+    seconds = CPU_SECONDS_PER_CLIP * clips + CPU_SECONDS_PER_FRAME * frames
+    seconds += CPU_SECONDS_PER_MEGAPIXEL * pixels / 1e6
+    stored = per_pixel * pixels + BYTES_PER_TICK * clips * settings.rows_per_clip["ticks"]
+    return {"cpu_minutes": round(seconds / 60, 1), "megabytes": round(stored / 1e6, 1)}
+
+
+def validate_grid(
+    grid: str, *, vehicle: str | None = None, pictures: bool | Literal["later"] = True
+) -> dict[str, Any]:
+    """Check a grid without making anything; counts and estimates, of frames stored and of frames made when read.
 
     Parameters
     ----------
@@ -78,27 +100,35 @@ def validate_grid(grid: str, *, vehicle: str | None = None, pictures: bool = Tru
     driven = {"vehicle": vehicle or read.settings.vehicle, "vehicle_mode": settings.vehicle_mode}
     read = replace(read, settings=read.settings.model_copy(update=driven))
     entries = read_entries(read.settings)
-    camera = entries.camera
     warnings = [
         w
         for w in (warn_of_variant(settings.variant), warn_of_late_brakes(read), warn_of_bends(read, entries))
         if w
     ]
-    frames = len(plan.clips) * settings.frames if settings.pictures else 0
-    ticks = len(plan.clips) * plan.ticks_per_clip
-    pixels = frames * camera.width * camera.height
-    per_pixel = BYTES_PER_PIXEL + (BYTES_OF_LABELS_PER_PIXEL if settings.labels else 0)
-    seconds = CPU_SECONDS_PER_CLIP * len(plan.clips) + CPU_SECONDS_PER_FRAME * frames
-    seconds += CPU_SECONDS_PER_MEGAPIXEL * pixels / 1e6
+    count = len(plan.clips)
+    stored, telemetry = (
+        estimate_cost(settings, entries.camera, count, pictures=pictures) for pictures in (True, False)
+    )
+    asked = stored if settings.stores_frames else telemetry
     return {
         "grid": settings.name,
         "run_id": plan.run_id,
         **({"warning": "; ".join(warnings)} if warnings else {}),
-        "clips": len(plan.clips),
-        "frames": frames,
-        "ticks": ticks,
-        "cpu_minutes_estimate": round(seconds / 60, 1),
-        "megabytes_estimate": round((per_pixel * pixels + BYTES_PER_TICK * ticks) / 1e6, 1),
+        "clips": count,
+        "frames": count * settings.frames if settings.pictures else 0,
+        "ticks": count * plan.ticks_per_clip,
+        "cpu_minutes_estimate": asked["cpu_minutes"],
+        "megabytes_estimate": asked["megabytes"],
+        **(
+            {
+                "frames_estimates": [
+                    {"frames": "stored", **stored, "cpu_minutes_when_read": 0.0},
+                    {"frames": "later", **telemetry, "cpu_minutes_when_read": stored["cpu_minutes"]},
+                ]
+            }
+            if settings.pictures
+            else {}
+        ),
         "calibration": dict(Counter(clip.calibration for clip in plan.clips)),
         "splits": dict(Counter(clip.split for clip in plan.clips if clip.split)),
         "labels": [clip.label for clip in plan.clips],

@@ -1,4 +1,4 @@
-"""Pictures to H.264 and back; the same pictures give the same bytes.
+"""Pictures to H.264; the same pictures give the same bytes.
 
 The chroma of H.264 4:2:0 needs an even width and height: a picture of odd size gets its last row or column once more.
 """
@@ -38,25 +38,6 @@ def write_film(
         for frame in (*_make_frames(pictures), None):
             for packet in stream.encode(frame):
                 container.mux(packet)
-
-
-def through_film(pictures: NDArray[np.uint8], frame_rate_hz: float, crf: int) -> NDArray[np.uint8]:
-    """Encode pictures as a film and return the decoded pictures.
-
-    Parameters
-    ----------
-    pictures : uint8 [F, H, W, 3] sRGB
-    frame_rate_hz : as `write_film` takes it [Hz]
-    crf : constant rate factor [1]
-    """
-    film = BytesIO()
-    height, width = pictures.shape[1:3]
-    write_film(film, list(pictures), frame_rate_hz, crf)
-    film.seek(0)
-    with av.open(film, "r", format="mp4") as container:
-        return np.stack(
-            [frame.to_ndarray(format="rgb24")[:height, :width] for frame in container.decode(video=0)]
-        )
 
 
 def _make_frames(pictures: Iterable[NDArray[np.uint8]]) -> Iterable[av.VideoFrame]:

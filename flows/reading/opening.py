@@ -28,6 +28,7 @@ if TYPE_CHECKING:  # each takes its time to import, and few people need all of t
     import pyarrow.dataset
     import zarr
 
+    from flows.reading.frames import Frames
     from flows.reading.windows import ClipWindows
 
 _Answer = TypeVar("_Answer")
@@ -211,6 +212,13 @@ class Dataset:
     @property
     def _layout(self) -> Layout:
         return Layout(self.root, self.origin)
+
+    @cached_property
+    def source(self) -> "Frames":
+        """Where whole clips and windows of the frames are read."""
+        from flows.reading.frames import open_frames
+
+        return open_frames(self._layout, self.manifest)
 
     @cached_property
     def frames(self) -> "zarr.Group":

@@ -29,6 +29,10 @@ def open_frames_store(layout: Layout, manifest: Mapping[str, Any]) -> Any:
     """
     grid = manifest["grid"]
     require_frames(manifest, layout)
+    if grid["pictures"] == "later":
+        from flows.reading.recipes import open_recipes
+
+        return open_recipes(layout, manifest).as_zarr()
     if layout.origin is None:
         open_for_reading(layout.root, lambda name: name.startswith("frames.zarr/"))
         read = read_local_metadata(layout.frames)

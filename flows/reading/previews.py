@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 
 from flows.making.plan import Plan
 from flows.reading.film import write_film
+from flows.reading.frames import Frames, open_frames
 from flows.reading.suggestions import suggest_clips
 from flows.running.progress import progress_bar
 from flows.store.address import open_for_reading
-from flows.store.frames import read_clip
-from flows.store.layout import Layout
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest, refuse_changed_clips, require_frames
 from flows.store.telemetry import read_columns
@@ -53,11 +52,11 @@ def make_films(
     refuse_changed_clips(layout, manifest, chosen, "frames")
     names = name_films(rows)
     results = Outputs(out, "lab preview", *(names[row["clip_id"]] for row in chosen))
-    films = []
+    films, frames = [], open_frames(layout, manifest)
     with progress_bar("films", len(chosen)) as advance:
         for row in chosen:
             film = BytesIO()
-            write_film(film, _draw_pictures(layout, row, traces), plan.settings.frame_rate_hz)
+            write_film(film, _draw_pictures(frames, row, traces), plan.settings.frame_rate_hz)
             name = names[row["clip_id"]]
             results.write(name, film.getvalue())
             films.append(str(results.path(name)))
@@ -108,10 +107,10 @@ def select_clips(
     return [row for row in rows if row["label"] in names or row["clip_id"] in names]
 
 
-def _draw_pictures(layout: Layout, row: Mapping[str, Any], traces: bool) -> list[NDArray[np.uint8]]:
-    pictures = list(read_clip(layout.frames, row["index"], "rgb"))
+def _draw_pictures(frames: Frames, row: Mapping[str, Any], traces: bool) -> list[NDArray[np.uint8]]:
+    pictures = list(frames.read(row["index"], "rgb"))
     if not traces:
         return pictures
     names = [trace.column for trace in TRACES]
-    columns = read_columns(layout.telemetry / "frames", row["clip_id"], names, most=len(pictures))
+    columns = read_columns(frames.layout.telemetry / "frames", row["clip_id"], names, most=len(pictures))
     return [add_traces(picture, columns, frame) for frame, picture in enumerate(pictures)]

@@ -15,7 +15,7 @@ from flows.reading.connection import connect_views
 from flows.reading.suggestions import suggest_names
 from flows.reading.views import VIEWS
 from flows.store.arrays import EVERY_ARRAY
-from tasks.conventions import SCENE_CHANNEL, VARIANT_CHANNEL, Channel
+from tasks.conventions import SOME_CLIPS_CHANNELS, Channel
 from tasks.errors import InputError
 
 MOST_VALUES = 20_000_000
@@ -223,8 +223,7 @@ def list_columns(*, grid: bool = False) -> dict[str, Any]:
 
         return grid_schema()
     views = {view: [_describe_channel(channel) for channel in channels] for view, channels in VIEWS.items()}
-    # of a dataset in which a coupling is cut, and of one of several scenes
-    views["clips"] += [_describe_channel(VARIANT_CHANNEL), _describe_channel(SCENE_CHANNEL)]
+    views["clips"] += [_describe_channel(channel) for channel in SOME_CLIPS_CHANNELS]
     return views | {
         "arrays": [
             _describe_channel(array.channel)

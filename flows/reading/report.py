@@ -22,11 +22,11 @@ from flows.making.seal import pick_evenly
 from flows.pages.figures import STYLE_SHEET, Figure, Panel, as_plotly
 from flows.pages.writer import FILES, fill_template, read_plotly
 from flows.reading.film import write_film
+from flows.reading.frames import Frames, open_frames
 from flows.reading.previews import select_clips
 from flows.running.progress import progress_bar
 from flows.running.runner import open_executor, run_unordered
 from flows.store.address import open_for_reading
-from flows.store.frames import read_clip
 from flows.store.layout import Layout, list_abandoned
 from flows.store.object_tables import read_objects
 from flows.store.outputs import MARKER, Outputs, read_marker
@@ -97,7 +97,7 @@ def make_report(dataset: str, *, out: str | None = None, clips: list[str] | None
     ]
     page = Outputs(folder, COMMAND, *fixed, *of_clips)
     with page.alone():
-        made = _write_clips(layout, manifest, brought, page, pictures, ticks)
+        made = _write_clips(open_frames(layout, manifest), manifest, brought, page, pictures, ticks)
         for name, content in fixed.items():
             page.write(name, content)
         page.remove_others(OF_A_CLIP.fullmatch)
@@ -130,7 +130,7 @@ def page_data(manifest: Mapping[str, Any], brought: set[str], pictures: bool) ->
     """
     grid, rows = manifest["grid"], manifest["clips"]
     settings = recorded_grid(grid, "manifest")
-    place = {row["clip_id"]: k for k, row in enumerate(rows)}
+    index = {row["clip_id"]: k for k, row in enumerate(rows)}
     kept = (
         "clip_id", "label", "seed", "split", "calibration", "scenario", "figures", "verdict", "content"
     )  # fmt: skip
@@ -152,7 +152,7 @@ def page_data(manifest: Mapping[str, Any], brought: set[str], pictures: bool) ->
             }
             for row in rows
         ],
-        "pairs": [[place[p["clip_id_a"]], place[p["clip_id_b"]], p["control"]] for p in iterate_pairs(rows)],
+        "pairs": [[index[p["clip_id_a"]], index[p["clip_id_b"]], p["control"]] for p in iterate_pairs(rows)],
         "figure": as_plotly(
             Figure(caption="", panels=[Panel(y="", lines=[]) for _ in TRACES], linked=True, panel_px=PANEL_PX)
         ),
@@ -160,7 +160,7 @@ def page_data(manifest: Mapping[str, Any], brought: set[str], pictures: bool) ->
 
 
 def locate_horizon(layout: Layout) -> dict[str, float] | None:
-    """Return where a level car's horizon stands in the picture, and how far it moves; None without a camera file.
+    """Return where a level car's horizon stands in the picture, and how far it moves; None without one camera.
 
     Parameters
     ----------
@@ -175,6 +175,8 @@ def locate_horizon(layout: Layout) -> dict[str, float] | None:
     if not path.is_file():
         return None
     camera = load("camera", path)
+    if camera.varies:
+        return None
     ahead, _, up = camera.T_rig_camera[:3, 2]
     focal, middle = camera.K[1, 1] / camera.height, camera.K[1, 2] / camera.height
     return {"level": float(middle + focal * up / ahead), "per_slope": float(focal)}
@@ -214,7 +216,7 @@ def list_boxes(
 
 
 def _write_clips(
-    layout: Layout,
+    frames: Frames,
     manifest: Mapping[str, Any],
     brought: Sequence[Mapping[str, Any]],
     page: Outputs,
@@ -224,7 +226,7 @@ def _write_clips(
     """Write the telemetry and make the missing films of some clips, on all processors; how many films were made."""
     filmed = {row["clip_id"] for row in brought if pictures and not page.path(_film_name(row)).is_file()}
     jobs = (
-        (layout, row, ticks, manifest["grid"]["frame_rate_hz"] if row["clip_id"] in filmed else None)
+        (frames, row, ticks, manifest["grid"]["frame_rate_hz"] if row["clip_id"] in filmed else None)
         for row in brought
     )
     with progress_bar("report", len(brought)) as advance, open_executor("threads") as executor:
@@ -236,19 +238,19 @@ def _write_clips(
 
 
 def _make_clip_files(
-    layout: Layout, row: Mapping[str, Any], rows: int, frame_rate_hz: float | None
+    frames: Frames, row: Mapping[str, Any], rows: int, frame_rate_hz: float | None
 ) -> dict[str, str | bytes | memoryview]:
     """Return the content of a clip's files by name: its telemetry, and its film where it has a frame rate."""
     clip_id, names = row["clip_id"], [channel.name for channel in TICK_CHANNELS]
-    folder = layout.telemetry / "ticks" / f"family={row['scenario']['weather']}"
+    folder = frames.layout.telemetry / "ticks" / f"family={row['scenario']['weather']}"
     ticks = read_columns(folder, clip_id, names, most=rows)
-    content = pack_columns(ticks, names) | {"boxes": list_boxes(layout, row, rows)}
+    content = pack_columns(ticks, names) | {"boxes": list_boxes(frames.layout, row, rows)}
     files: dict[str, str | bytes | memoryview] = {
         _traces_name(row): f"clipArrived({_format_script(clip_id)}, {_format_script(content)});\n"
     }
     if frame_rate_hz is not None:
         film = BytesIO()
-        write_film(film, list(read_clip(layout.frames, row["index"], "rgb")), frame_rate_hz)
+        write_film(film, list(frames.read(row["index"], "rgb")), frame_rate_hz)
         files[_film_name(row)] = film.getvalue()
     return files
 

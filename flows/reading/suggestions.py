@@ -25,18 +25,18 @@ def suggest_names(what: str, wrong: Sequence[object], known: Sequence[str], list
 
 
 def suggest_clips(
-    place: object, wrong: Sequence[object], labels: Sequence[str], lister: str = "musync lab describe"
+    origin: object, wrong: Sequence[object], labels: Sequence[str], lister: str = "musync lab describe"
 ) -> InputError:
     """Return the error for clips that a dataset does not have, one sentence each.
 
     Parameters
     ----------
-    place : what messages call the dataset
+    origin : what messages call the dataset
     wrong : labels or ids as the user gave them
     labels : of its clips
     lister : how to see them all
     """
-    return suggest_names(f"{place}: clip", wrong, labels, lister)
+    return suggest_names(f"{origin}: clip", wrong, labels, lister)
 
 
 def _describe(what: str, name: object, known: Sequence[str], lister: str) -> str:

@@ -69,15 +69,15 @@ def table_files(layout: Layout, manifest: Mapping[str, Any]) -> dict[str, dict[s
     return tables
 
 
-def bound_rows(manifest: Mapping[str, Any], place: object) -> dict[str, int]:
+def bound_rows(manifest: Mapping[str, Any], origin: object) -> dict[str, int]:
     """Return how many rows a file of each table may have by the grid of its dataset.
 
     Parameters
     ----------
     manifest : of the dataset
-    place : what messages call it
+    origin : what messages call it
     """
-    clip_rows = recorded_grid(manifest["grid"], place).rows_per_clip
+    clip_rows = recorded_grid(manifest["grid"], origin).rows_per_clip
     return {table: rows * CLIPS_PER_FILE for table, rows in clip_rows.items()} | MOST_ROWS
 
 

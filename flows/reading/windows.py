@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +14,13 @@ from torch.utils.data import Dataset, Sampler
 
 from catalogs.sentences import shorten, shorten_value
 from flows.reading.arguments import is_whole
+from flows.reading.frames import Frames, open_frames
 from flows.reading.table_files import table_files
-from flows.store.arrays import EVERY_ARRAY
-from flows.store.frame_metadata import check_array, check_frames, read_local_metadata
-from flows.store.frames import read_frames
+from flows.store.arrays import arrays_of
+from flows.store.frame_metadata import check_frames, read_local_metadata
 from flows.store.layout import Layout
 from flows.store.parquet_files import CHECKED, CLIPS_PER_FILE, refuse_footer
+from flows.store.sealed import recorded_grid
 from manifests.manifest import is_quarantined
 from tasks.errors import InputError
 
@@ -32,7 +33,7 @@ class ClipWindows(Dataset[dict[str, Any]]):
 
     Parameters
     ----------
-    frames : folder of the Zarr group
+    source : of the frames
     clips : index of each clip in the arrays
     telemetry : float32 [clips, frames, columns], in the units of the frame table
     columns : their names
@@ -42,7 +43,7 @@ class ClipWindows(Dataset[dict[str, Any]]):
     left_out : labels of the clips in quarantine that are not among them
     """
 
-    frames: Path
+    source: Frames
     clips: tuple[int, ...]
     telemetry: torch.Tensor
     columns: tuple[str, ...]
@@ -50,7 +51,6 @@ class ClipWindows(Dataset[dict[str, Any]]):
     window: int
     starts: tuple[int, ...]
     left_out: tuple[str, ...]
-    _shapes: dict[str, tuple[int, ...]] = field(default_factory=dict, init=False, repr=False)
 
     def __len__(self) -> int:
         return len(self.clips) * len(self.starts)
@@ -58,32 +58,15 @@ class ClipWindows(Dataset[dict[str, Any]]):
     def __getitem__(self, item: int) -> dict[str, Any]:
         if not 0 <= item < len(self):
             raise IndexError(item)
-        place, turn = divmod(item, len(self.starts))
-        clip, span = self.clips[place], slice(self.starts[turn], self.starts[turn] + self.window)
+        index, start = divmod(item, len(self.starts))
+        clip, span = self.clips[index], slice(self.starts[start], self.starts[start] + self.window)
         sample: dict[str, Any] = {
             "clip": clip,
             "start": span.start,
-            "telemetry": self.telemetry[place, span],
+            "telemetry": self.telemetry[index, span],
         }
-        return sample | {name: torch.from_numpy(self._pictures(name, clip, span)) for name in self.arrays}
-
-    def __getstate__(self) -> dict[str, Any]:
-        # each worker looks at the arrays itself: it may be on another machine
-        return self.__dict__ | {"_shapes": {}}
-
-    def _pictures(self, name: str, clip: int, span: slice) -> np.ndarray:
-        try:
-            return read_frames(self.frames, name, self._shape(name), clip, span)
-        except (ValueError, RuntimeError, OSError) as error:
-            raise InputError(
-                f"{self.frames / name}: clip {clip}: cannot be read; {shorten(error)}: musync lab repair makes it again"
-            ) from None
-
-    def _shape(self, name: str) -> tuple[int, ...]:
-        if name not in self._shapes:
-            # its metadata again: the dataset may be another since the windows were made
-            self._shapes[name] = check_array(read_local_metadata(self.frames), name, self.frames)
-        return self._shapes[name]
+        pictures = self.source.read_window(clip, span, self.arrays)
+        return sample | {name: torch.from_numpy(values) for name, values in pictures.items()}
 
 
 class SeededOrder(Sampler[int]):
@@ -146,10 +129,11 @@ def windows_of(
         row for row in manifest["clips"] if clips is None or row["label"] in clips or row["clip_id"] in clips
     ]
     files = list(table_files(layout, manifest)["frames"].values())
-    stored = {name for name in EVERY_ARRAY if (layout.frames / name).is_dir()}
+    settings = recorded_grid(manifest["grid"], layout.manifest)
+    known = arrays_of(settings.labels, settings.has_objects) if settings.pictures else {}
     problems = _find_column_problems(files[0], columns)
-    problems += [f"array {name!r}: the dataset has {', '.join(sorted(stored)) or 'no frames'}"
-                 for name in arrays if name not in stored]  # fmt: skip
+    problems += [f"array {name!r}: the dataset has {', '.join(sorted(known)) or 'no frames'}"
+                 for name in arrays if name not in known]  # fmt: skip
     if not (is_whole(window) and 1 <= window <= frames):
         problems.append(
             f"window must be a whole number in 1 to the {frames} frames of a clip; it is {shorten_value(window)}"
@@ -180,7 +164,8 @@ def windows_of(
             f" ({', '.join(left_out)}); quarantined=True takes them too",
             stacklevel=3,
         )
-    if arrays:
+    source = open_frames(layout, manifest)
+    if arrays and settings.stores_frames:
         check_frames(
             read_local_metadata(layout.frames), arrays, layout.frames, len(manifest["clips"]), frames
         )
@@ -193,7 +178,7 @@ def windows_of(
             " musync verify says which files are damaged"
         )
     return ClipWindows(
-        frames=layout.frames,
+        source=source,
         clips=tuple(row["index"] for row in rows),
         telemetry=torch.from_numpy(np.stack([values[row["clip_id"]] for row in rows])),
         columns=tuple(columns),

@@ -92,12 +92,12 @@ def check_joining(client: Any, address: str) -> Iterator[None]:
     check = JoiningCheck(facts_here())
     seen = set(client.get_events(TURNED_AWAY))
 
-    def tell(event: tuple[float, str]) -> None:
+    def report(event: tuple[float, str]) -> None:
         if event not in seen:
             seen.add(event)
             print_lines(f"--scheduler {address}: {event[1]}", error=True)
 
-    client.subscribe_topic(TURNED_AWAY, tell)
+    client.subscribe_topic(TURNED_AWAY, report)
     client.register_plugin(check)
     try:
         yield
@@ -106,7 +106,7 @@ def check_joining(client: Any, address: str) -> Iterator[None]:
         client.unsubscribe_topic(TURNED_AWAY)
         # the scheduler keeps what it could not deliver in time
         for event in client.get_events(TURNED_AWAY):
-            tell(event)
+            report(event)
 
 
 class JoiningCheck(WorkerPlugin):
@@ -142,26 +142,26 @@ def share_gpus(client: Any) -> None:
     ----------
     client : `distributed.Client` of the cluster
     """
-    places = {worker: place for workers in _by_host(client).values() for place, worker in enumerate(workers)}
-    client.run(_take_gpu, places)
+    indices = {worker: index for workers in _by_host(client).values() for index, worker in enumerate(workers)}
+    client.run(_take_gpu, indices)
 
 
-def gpu_for(place: int, visible: str | None, present: Sequence[str]) -> str | None:
+def gpu_for(index: int, visible: str | None, present: Sequence[str]) -> str | None:
     """Return the GPU of a worker; None where Slurm or dask-cuda has already assigned one.
 
     Parameters
     ----------
-    place : of the worker among those of its machine, from 0
+    index : of the worker among those of its machine, from 0
     visible : ``CUDA_VISIBLE_DEVICES`` of the worker, None where it is not set
     present : GPUs of the machine
     """
     choice = list(present) if visible is None else [name for name in visible.split(",") if name]
-    return choice[place % len(choice)] if len(choice) > 1 else None
+    return choice[index % len(choice)] if len(choice) > 1 else None
 
 
-def _take_gpu(places: Mapping[str, int], dask_worker: Any) -> None:
+def _take_gpu(indices: Mapping[str, int], dask_worker: Any) -> None:
     present = sorted(re.findall(r"^nvidia(\d+)$", "\n".join(os.listdir("/dev")), flags=re.M), key=int)
-    chosen = gpu_for(places[dask_worker.address], os.environ.get(VISIBLE), present)
+    chosen = gpu_for(indices[dask_worker.address], os.environ.get(VISIBLE), present)
     if chosen is not None:
         os.environ[VISIBLE] = chosen
 

@@ -85,8 +85,8 @@ def explain_end(error: BaseException, given: Sequence[str]) -> tuple[int, list[s
     if isinstance(error, ClipsFailed):
         sentence = str(error)
     else:
-        said = cut_middle(" ".join(f"{type(error).__name__}: {error}".split()), 300)
-        sentence = f"a defect of muSync, not of your input, ended the command ({said})"
+        message = cut_middle(" ".join(f"{type(error).__name__}: {error}".split()), 300)
+        sentence = f"a defect of muSync, not of your input, ended the command ({message})"
     file = keep_traceback(error, given)
     where = (
         "could not be written anywhere"
@@ -110,7 +110,7 @@ def is_out_of_memory(error: BaseException) -> bool:
 
 
 def input_sentence(error: BaseException, given: Sequence[str]) -> str | None:
-    """The sentence for a place that cannot be used; None for an error that is no fault of such a place.
+    """The sentence for a path that cannot be used; None for an error that is no fault of such a path.
 
     Parameters
     ----------
@@ -138,23 +138,23 @@ def input_sentence(error: BaseException, given: Sequence[str]) -> str | None:
         sentence = NAMED.get(error.errno or 0)
     if sentence is None:
         return None
-    return f"{cut_middle(_name_place(path), 200)}: {sentence}" if path else sentence
+    return f"{cut_middle(_name_path(path), 200)}: {sentence}" if path else sentence
 
 
 def disk_full_sentence(error: BaseException) -> str | None:
     """The sentence for a disk, quota or file size limit that is used up; None for any other error."""
     if isinstance(error, OSError) and error.errno in FULL:
-        place = f"{_name_place(str(error.filename))}: " if error.filename else ""
-        return place + FULL[error.errno]
+        start = f"{_name_path(str(error.filename))}: " if error.filename else ""
+        return start + FULL[error.errno]
     return None
 
 
-def _name_place(path: str) -> str:
+def _name_path(path: str) -> str:
     """The path, or the dataset's folder in place of what lies in its staging folder, of which no user has heard."""
     from flows.store.layout import STAGING
 
-    place = Path(path)
-    return next((str(above.parent) for above in (place, *place.parents) if above.name == STAGING), path)
+    inner = Path(path)
+    return next((str(above.parent) for above in (inner, *inner.parents) if above.name == STAGING), path)
 
 
 def keep_traceback(error: BaseException, given: Sequence[str]) -> Path | None:
@@ -214,7 +214,7 @@ def _is_in_cache(path: str) -> bool:
 
 def _is_given(path: str, given: Sequence[str]) -> bool:
     """Whether a path is one of the command line's, lies in one or has one below it."""
-    place = Path(path).absolute()
+    absolute = Path(path).absolute()
     words = [word.partition("=")[2] if word.startswith("--") and "=" in word else word for word in given]
     paths = [Path(word).absolute() for word in words if word and not word.startswith("-")]
-    return any(place.is_relative_to(path) or path.is_relative_to(place) for path in paths)
+    return any(absolute.is_relative_to(path) or path.is_relative_to(absolute) for path in paths)

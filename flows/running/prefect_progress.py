@@ -39,7 +39,7 @@ class RunProgress:
 
     def __init__(self) -> None:
         self._artifact: UUID | None = None
-        self._told = 0.0
+        self._reported = 0.0
         self._title = ""
         self._pieces: deque[dict[str, Any]] = deque(maxlen=MOST_ROWS)
 
@@ -60,7 +60,7 @@ class RunProgress:
                 {"name": escape_controls(progress.name), "outcome": outcome, **progress.facts}
             )
         edge = done in (0, total)
-        if not (failed or edge) and time.monotonic() - self._told < EVERY_S:
+        if not (failed or edge) and time.monotonic() - self._reported < EVERY_S:
             return
         line = escape_controls(
             f"{progress.title} {done}/{total} {describe_piece(progress.name, failed)}".rstrip()
@@ -69,7 +69,7 @@ class RunProgress:
         # of ten thousand failures each gets its row, and not a call of the server too
         if failed and not edge:
             return
-        self._told = time.monotonic()
+        self._reported = time.monotonic()
         with _go_on_without_artifact():
             self._show(100.0 * done / total if total else 100.0, line)
 

@@ -54,7 +54,7 @@ class Advance(Protocol):
 
 @contextmanager
 def watch_progress(watcher: Watcher) -> Iterator[None]:
-    """Tell a watcher of the progress of everything that runs within the block."""
+    """Report to a watcher the progress of everything that runs within the block."""
     token = _WATCHERS.set((*_WATCHERS.get(), watcher))
     try:
         yield
@@ -67,7 +67,7 @@ def progress_bar(title: str, total: int) -> Iterator[Advance]:
     """Yield a function to call with the name of each finished piece of work."""
     done, watchers = 0, _WATCHERS.get()
 
-    def tell(progress: Progress) -> None:
+    def report(progress: Progress) -> None:
         for watcher in watchers:
             watcher(progress)
 
@@ -77,9 +77,9 @@ def progress_bar(title: str, total: int) -> Iterator[Advance]:
             nonlocal done
             done += 1
             show(describe_piece(name, failed))
-            tell(Progress(title=title, done=done, total=total, name=name, failed=failed, facts=facts or {}))
+            report(Progress(title=title, done=done, total=total, name=name, failed=failed, facts=facts or {}))
 
-        tell(Progress(title=title, done=done, total=total))
+        report(Progress(title=title, done=done, total=total))
         yield advance
 
 

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from flows.running.terminal import escape_controls
-from flows.scheduled.notification import WHEN_NONE_IS_NAMED, NotTold, send_notice
+from flows.scheduled.notification import WHEN_NONE_IS_NAMED, NoticeFailed, send_notice
 from flows.scheduled.run_record import LOCAL
 from flows.store.objects import Objects, is_address
 from flows.store.outputs import Outputs
@@ -27,7 +27,7 @@ def report_failure(grid: str, root: str, at: datetime, error: BaseException, not
     ----------
     grid, root, at : of the run
     error : what ended it
-    notify : as of `flows.scheduled.notification.send_notice`; None tells nobody
+    notify : as of `flows.scheduled.notification.send_notice`; None notifies nobody
     """
     facts = {
         "error": f"{type(error).__name__}: {error}",
@@ -47,12 +47,12 @@ def report_run(
     ----------
     event : of `flows.scheduled.notification.EVENTS`
     grid, root, at : of the run
-    further : what is to be said of it
-    notify : as of `flows.scheduled.notification.send_notice`; None tells nobody. What cannot be sent is noted in the
+    further : facts of the report, by their keys
+    notify : as of `flows.scheduled.notification.send_notice`; None notifies nobody. What cannot be sent is noted in the
         report
     """
     name = report_name(at, event)
-    place = Outputs((LOCAL if is_address(root) else Path(root)).resolve(), "schedule", name)
+    report = Outputs((LOCAL if is_address(root) else Path(root)).resolve(), "schedule", name)
     facts = {
         "what": WHAT[event],
         "grid": grid,
@@ -63,24 +63,24 @@ def report_run(
     # what failed may say anything, but a line of its own it does not get
     facts = {key: escape_controls(value) for key, value in facts.items()}
     text = "".join(f"{key}: {value}\n" for key, value in facts.items())
-    place.write(name, text)
-    path = place.path(name)
+    report.write(name, text)
+    path = report.path(name)
     if notify is not None:
         try:
             send_notice(notify, event, facts, path)
-        except (NotTold, OSError, subprocess.SubprocessError) as fault:
+        except (NoticeFailed, OSError, subprocess.SubprocessError) as fault:
             text += escape_controls(f"notification {_without_secrets(notify)} failed: {fault}") + "\n"
-            place.write(name, text)
+            report.write(name, text)
     if is_address(root):
         try:
             Objects(root).write(name, text.encode())
         except InputError as fault:  # the store may be what failed
-            place.write(name, text + escape_controls(f"the report could not be sent: {fault}") + "\n")
+            report.write(name, text + escape_controls(f"the report could not be sent: {fault}") + "\n")
     return path
 
 
 def wants_notice(event: str, notify_on: str = WHEN_NONE_IS_NAMED) -> bool:
-    """Whether a schedule tells of an event, by the value of ``--notify-on``."""
+    """Whether a schedule notifies of an event, by the value of ``--notify-on``."""
     return event in (word.strip() for word in notify_on.split(","))
 
 

@@ -18,7 +18,7 @@ FROM_ENVIRONMENT = "env:"
 """Before the name of a variable that holds the address, so that no secret stands in a command line or a database."""
 
 
-class NotTold(RuntimeError):
+class NoticeFailed(RuntimeError):
     """The service did not take a notification."""
 
 
@@ -35,7 +35,7 @@ def send_notice(notify: str, event: str, facts: Mapping[str, str], report: Path)
 
     Raises
     ------
-    NotTold, OSError, subprocess.SubprocessError
+    NoticeFailed, OSError, subprocess.SubprocessError
         If it could not be sent.
     """
     target = read_target(notify)
@@ -46,13 +46,15 @@ def send_notice(notify: str, event: str, facts: Mapping[str, str], report: Path)
 
     kind = apprise.NotifyType.FAILURE if event == "failed" else apprise.NotifyType.INFO
     body = "\n".join(f"{key}: {value}" for key, value in facts.items() if key != "what")
-    with apprise.LogCapture(level=logging.WARNING) as said:
+    with apprise.LogCapture(level=logging.WARNING) as log:
         service = _find_service(target, {**facts, "event": event, "report": str(report)})
         taken = service is not None and apprise.Apprise(service).notify(
             body, title=f"muSync: {facts['what']}", notify_type=kind, body_format=apprise.NotifyFormat.TEXT
         )
         if not taken:
-            raise NotTold(" ".join(said.getvalue().split()) or "no service of Apprise has such an address")
+            raise NoticeFailed(
+                " ".join(log.getvalue().split()) or "no service of Apprise has such an address"
+            )
 
 
 def read_target(notify: str) -> str:

@@ -126,14 +126,14 @@ def _make_dataset_at(
 ) -> str:
     log = get_run_logger()
 
-    def tell(event: str, facts: dict[str, str]) -> None:
+    def report(event: str, facts: dict[str, str]) -> None:
         if notify is not None and wants_notice(event, notify_on):
             report_run(event, grid, root, at, facts, notify)
 
     try:
         with (
             show_progress(),
-            watch_lateness(at, _next_time(), lambda sentence: tell("late", {"why": sentence})),
+            watch_lateness(at, _next_time(), lambda sentence: report("late", {"why": sentence})),
         ):
             result = make_dataset(grid, root, at=at, **execution)
     except Exception as error:
@@ -144,7 +144,7 @@ def _make_dataset_at(
     verdict = f"{result['clips']} clips, {result['made']} made now, {len(wrong)} in quarantine"
     log.info("verdict: %s%s", verdict, f" ({', '.join(wrong)})" if wrong else "")
     _show_result(result)
-    tell("done", {"dataset": dataset, "verdict": verdict})
+    report("done", {"dataset": dataset, "verdict": verdict})
     if keep is not None:
         _remove_oldest(Path(dataset).name.rpartition("-")[0], root, keep)
     return dataset
@@ -203,19 +203,19 @@ def serve_schedule(every: str, options: dict[str, Any]) -> None:
 
 
 @contextmanager
-def watch_lateness(at: datetime, next_at: datetime | None, tell: Callable[[str], object]) -> Iterator[None]:
-    """Tell, once, of a run that is late while the block makes it.
+def watch_lateness(at: datetime, next_at: datetime | None, report: Callable[[str], object]) -> Iterator[None]:
+    """Report, once, a run that is late while the block makes it.
 
     Parameters
     ----------
     at : scheduled time of the run
     next_at : of the next run; None where none is planned
-    tell : called with a sentence, from another thread where the next run falls due
+    report : called with a sentence, from another thread where the next run falls due
     """
     now = datetime.now(UTC)
     if now - at > LATE_AFTER:
         late_min = (now - at).total_seconds() / 60
-        tell(f"it was due at {_format(at)} and began {late_min:.0f} min later")
+        report(f"it was due at {_format(at)} and began {late_min:.0f} min later")
         next_at = None
     if next_at is None or next_at <= now:
         yield
@@ -223,7 +223,7 @@ def watch_lateness(at: datetime, next_at: datetime | None, tell: Callable[[str],
     sentence = (
         f"it was due at {_format(at)} and still goes on at {_format(next_at)}, when the next run is due"
     )
-    timer = Timer((next_at - now).total_seconds(), tell, [sentence])
+    timer = Timer((next_at - now).total_seconds(), report, [sentence])
     timer.daemon = True
     timer.start()
     try:

@@ -98,7 +98,7 @@ def estimate_left(times: Iterable[float], now: float, missing: int) -> float | N
     if not gaps:
         return None
     pause = max(PAUSE_S, PAUSE_FACTOR * median(gaps))
-    first = max((place for place, gap in enumerate(gaps, start=1) if gap > pause), default=0)
+    first = max((index for index, gap in enumerate(gaps, start=1) if gap > pause), default=0)
     paced = len(recent) - 1 - first
     span = recent[-1] - recent[first]
     if paced < 1 or span <= 0.0:

@@ -60,9 +60,9 @@ def _made_in_folder(root: str, grid: str) -> Iterator[str]:
         if not dated(grid).fullmatch(folder.name) or folder.is_symlink() or not folder.is_dir():
             continue
         with suppress(InputError, OSError):
-            place = Path(root) / record_name(folder.name)
+            path = Path(root) / record_name(folder.name)
             manifest = Layout(folder).manifest
-            if _is_of_record(read_record(place.read_bytes(), place), manifest.read_bytes()):
+            if _is_of_record(read_record(path.read_bytes(), path), manifest.read_bytes()):
                 yield folder.name
 
 

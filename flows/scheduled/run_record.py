@@ -90,7 +90,7 @@ class RunRecord:
     bytes: int | None = None
 
 
-class RecordPlace:
+class RecordFiles:
     """Where a schedule keeps the record of a run, and its metrics.
 
     Parameters
@@ -150,17 +150,17 @@ def keep_record(grid: str, root: str, dataset: str, at: datetime) -> Iterator[Ru
         began=now,
         updated=now,
     )
-    place = RecordPlace(root, record)
-    place.write()
+    files = RecordFiles(root, record)
+    files.write()
     try:
-        with watch_progress(place.note_progress):
+        with watch_progress(files.note_progress):
             yield record
     except BaseException as error:
         record.error = f"{type(error).__name__}: {error}".removesuffix(": ")
         raise
     finally:
         record.ended = format_now()
-        place.write()
+        files.write()
 
 
 def record_name(dataset: str) -> str:
@@ -168,18 +168,18 @@ def record_name(dataset: str) -> str:
     return f"{RUNS}/{dataset}.json"
 
 
-def read_record(content: bytes | None, place: object) -> RunRecord | None:
+def read_record(content: bytes | None, origin: object) -> RunRecord | None:
     """The record in a file; None where there is none, or something else.
 
     Parameters
     ----------
     content : of the file
-    place : what messages call it
+    origin : what messages call it
     """
     if content is None:
         return None
     try:
-        value = parse_json(content, place, "record of a run")
+        value = parse_json(content, origin, "record of a run")
         if not isinstance(value, dict) or value.pop("format", None) != FORMAT:
             return None
         record = TypeAdapter(RunRecord).validate_python(value)
@@ -190,16 +190,16 @@ def read_record(content: bytes | None, place: object) -> RunRecord | None:
     return record
 
 
-def find_run_id(content: bytes, place: object) -> str | None:
+def find_run_id(content: bytes, origin: object) -> str | None:
     """The run id in a plan or manifest; None where it is damaged.
 
     Parameters
     ----------
     content : of the file
-    place : what messages call it
+    origin : what messages call it
     """
     try:
-        value = parse_json(content, place, "record of a dataset")
+        value = parse_json(content, origin, "record of a dataset")
     except InputError:
         return None
     run_id = value.get("run_id") if isinstance(value, dict) else None

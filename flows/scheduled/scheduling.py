@@ -1,4 +1,4 @@
-"""Datasets made again and again: a dated place a run, an unfinished one resumed, parameters checked beforehand."""
+"""Datasets made again and again: a dated folder a run, an unfinished one resumed, parameters checked beforehand."""
 
 import os
 import re
@@ -26,10 +26,10 @@ from flows.store.staging import BEGUN
 from tasks.errors import InputError
 
 NO_PLAN = ""
-"""In place of a run's id: a run that stopped so early that nothing binds its place to a grid."""
+"""In place of a run's id: a run that stopped so early that nothing binds its folder to a grid."""
 
 
-def dataset_place(grid: str, root: str, backend: str, at: datetime) -> str:
+def choose_dataset(grid: str, root: str, backend: str, at: datetime) -> str:
     """Where a run at that time writes: the latest unfinished dataset of the same plan, or a new dated one.
 
     An unfinished dataset of another plan (the grid, the catalogue or the code has changed since) is left alone: its
@@ -47,9 +47,9 @@ def dataset_place(grid: str, root: str, backend: str, at: datetime) -> str:
     plan, _ = make_plan(grid, select_backend(backend).name)
     name = plan.settings.name
     begun = _begun_in_store if is_address(root) else _begun_in_folder
-    for place, run_id in begun(root, dated(name)):
+    for dataset, run_id in begun(root, dated(name)):
         if run_id in {plan.run_id, NO_PLAN}:
-            return place
+            return dataset
     return f"{root}/{name}-{format_stamp(at)}"
 
 
@@ -85,32 +85,32 @@ def scheduled_run(
 
     Parameters
     ----------
-    grid, root, at, backend : as for `dataset_place`
+    grid, root, at, backend : as for `choose_dataset`
     execution : ``runner``, ``workers`` and ``scheduler``, as for generating
 
     Returns
     -------
     ``dataset``, ``run_id``, ``clips``, ``made``, ``contact_sheet``, ``cpu_s`` [s], ``bytes`` [B] and ``verdicts[]``.
     """
-    return _make_at(dataset_place(grid, root, backend, at), grid, backend=backend, **execution)
+    return _make_at(choose_dataset(grid, root, backend, at), grid, backend=backend, **execution)
 
 
 def recorded_run(
     grid: str, root: str, *, at: datetime, backend: str = "auto", **execution: Any
 ) -> dict[str, Any]:
     """`scheduled_run` with a record of how far it is and how it ended (see `flows.scheduled.run_record`)."""
-    place = dataset_place(grid, root, backend, at)
-    with keep_record(PurePosixPath(place).name.rpartition("-")[0], root, place, at) as record:
-        result = _make_at(place, grid, backend=backend, **execution)
+    dataset = choose_dataset(grid, root, backend, at)
+    with keep_record(PurePosixPath(dataset).name.rpartition("-")[0], root, dataset, at) as record:
+        result = _make_at(dataset, grid, backend=backend, **execution)
         record.run_id, record.clips = result["run_id"], result["clips"]
         record.quarantined = sum(not row["passed"] for row in result["verdicts"] if row["passed"] is not None)
         record.cpu_s, record.bytes = result["cpu_s"], result["bytes"]
     return result
 
 
-def _make_at(place: str, grid: str, *, runner: RunnerName = "dask", **execution: Any) -> dict[str, Any]:
+def _make_at(dataset: str, grid: str, *, runner: RunnerName = "dask", **execution: Any) -> dict[str, Any]:
     started = process_time()
-    report = generate_dataset(grid, place, runner=runner, **execution)
+    report = generate_dataset(grid, dataset, runner=runner, **execution)
     # clips that threads make side by side each count the whole process
     workers_s = 0.0 if runner == "threads" else report.cost.cpu_s
     clips = read_manifest(report.layout)["clips"]
@@ -165,7 +165,7 @@ def checked_parameters(
     except InputError as error:
         problems += error.problems
     root = out.rstrip("/") if is_address(out) else str(Path(out).resolve())
-    problems += _find_place_problems(out)
+    problems += _find_folder_problems(out)
     problems += list_runner_problems(runner, scheduler)
     if scheduler is not None and not re.fullmatch(r"(tcp|tls)://[^/]+:\d+", scheduler):
         problems.append(f"--scheduler must be like tcp://host:8786 or tls://host:8786; it is {scheduler!r}")
@@ -190,7 +190,7 @@ def checked_parameters(
     }
 
 
-def _find_place_problems(out: str) -> list[str]:
+def _find_folder_problems(out: str) -> list[str]:
     if is_address(out):
         try:
             Objects(out).folders()

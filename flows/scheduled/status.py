@@ -172,12 +172,12 @@ def _find_renewed(objects: Objects, names: list[str]) -> set[str]:
     return renewed
 
 
-def _read_plan(content: bytes | None, place: object) -> dict[str, str] | None:
+def _read_plan(content: bytes | None, origin: object) -> dict[str, str] | None:
     """Label of each planned clip by its id; None where there is no plan, or a damaged one."""
     if content is None:
         return None
     try:
-        plan = check_record(PlanRecord, parse_json(content, place, "plan"), place)
+        plan = check_record(PlanRecord, parse_json(content, origin, "plan"), origin)
     except InputError:
         return None
     return {clip["clip_id"]: clip["label"] for clip in plan["clips"]}

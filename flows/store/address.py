@@ -89,8 +89,8 @@ def open_for_reading(address: str | Path, wanted: Wanted = want_everything) -> L
     if content is None:
         raise InputError(_describe_unfinished(objects))
     layout = Layout(_find_mirrors() / sha256_of([content])[:32], objects.address)
-    place = f"{layout}/manifest.json"
-    manifest = check_manifest(parse_json(content, place, "manifest"), place)
+    origin = f"{layout}/manifest.json"
+    manifest = check_manifest(parse_json(content, origin, "manifest"), origin)
     recorded = {name: digest for name, (digest, _) in recorded_files(manifest).items() if wanted(name)}
     missing = {name for name in recorded if not (layout.root / name).is_file()}
     absent = objects.fetch(missing, layout.root)

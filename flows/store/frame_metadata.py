@@ -46,7 +46,7 @@ def read_local_metadata(folder: Path) -> ReadMetadata:
 
 
 def check_frames(
-    read: ReadMetadata, members: Collection[str], place: object, clips: int, frames: int
+    read: ReadMetadata, members: Collection[str], origin: object, clips: int, frames: int
 ) -> dict[str, tuple[int, ...]]:
     """Check the metadata of the group and of all its arrays; returns each array's shape.
 
@@ -54,7 +54,7 @@ def check_frames(
     ----------
     read : gives the bytes of a ``zarr.json``
     members : names of what lies in the group, such as folders
-    place : what messages call the group
+    origin : what messages call the group
     clips, frames : of the dataset, and frames of each clip, as its manifest says [1]
 
     Raises
@@ -62,44 +62,44 @@ def check_frames(
     InputError
         Listing what breaks a rule.
     """
-    problems = _find_group_problems(read, members, place)
+    problems = _find_group_problems(read, members, origin)
     shapes = {}
     for name in sorted(members):
         if name not in EVERY_ARRAY:
-            problems.append(f"{place}/{shorten_value(name)}: no array that muSync writes; remove it")
+            problems.append(f"{origin}/{shorten_value(name)}: no array that muSync writes; remove it")
             continue
         try:
-            shapes[name] = check_array(read, name, place)
+            shapes[name] = check_array(read, name, origin)
         except InputError as error:
             problems += error.problems
             continue
         if shapes[name][:2] != (clips, frames):
             problems.append(
-                f"{place}/{name}: must have the manifest's {clips} clips of {frames} frames; its shape is"
+                f"{origin}/{name}: must have the manifest's {clips} clips of {frames} frames; its shape is"
                 f" {shorten_value(list(shapes[name]))}"
             )
     if len({shape[2:4] for shape in shapes.values()}) > 1:
-        problems.append(f"{place}: all arrays must have pictures of one size; they have several")
+        problems.append(f"{origin}: all arrays must have pictures of one size; they have several")
     if problems:
         raise InputError(cap_problems(problems))
     return shapes
 
 
-def check_array(read: ReadMetadata, name: str, place: object) -> tuple[int, ...]:
+def check_array(read: ReadMetadata, name: str, origin: object) -> tuple[int, ...]:
     """Check the metadata of one array; returns its shape.
 
     Parameters
     ----------
     read : gives the bytes of a ``zarr.json``
     name : of the array: rgb, depth, class or a label
-    place : what messages call the group
+    origin : what messages call the group
 
     Raises
     ------
     InputError
         Listing what breaks a rule.
     """
-    where = f"{place}/{name}/{METADATA}"
+    where = f"{origin}/{name}/{METADATA}"
     content = read(f"{name}/{METADATA}")
     if content is None:
         raise InputError(f"{where}: missing: musync lab repair makes it again")
@@ -116,8 +116,8 @@ def check_array(read: ReadMetadata, name: str, place: object) -> tuple[int, ...]
     return tuple(shape)
 
 
-def _find_group_problems(read: ReadMetadata, members: Collection[str], place: object) -> list[str]:
-    where, content = f"{place}/{METADATA}", read(METADATA)
+def _find_group_problems(read: ReadMetadata, members: Collection[str], origin: object) -> list[str]:
+    where, content = f"{origin}/{METADATA}", read(METADATA)
     if content is None:
         return [f"{where}: missing: musync lab repair makes it again"]
     try:

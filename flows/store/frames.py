@@ -184,7 +184,7 @@ def read_frames(path: Path, name: str, shape: tuple[int, ...], index: int, span:
         raise ValueError(f"there are {shape[0]} clips of {shape[1]} frames; asked for clip {index}, {span}")
     array = EVERY_ARRAY[name]
     pictures = np.empty((span.stop - span.start, *shape[2:]), array.dtype)
-    shard = path / name / "c" / "/".join(str(place) for place in (index, *(0 for _ in shape[1:])))
+    shard = path / name / "c" / "/".join(str(number) for number in (index, *(0 for _ in shape[1:])))
     read_chunks(shard, shape[1], span.start, pictures, _choose_fill_value(array.dtype))
     return pictures
 
@@ -218,7 +218,7 @@ def read_chunks(path: Path, chunks: int, first: int, pictures: np.ndarray, fill_
     ----------
     path : of the shard
     chunks : in the shard [1]
-    first : place of the first chunk [1]
+    first : number of the first chunk [1]
     pictures : contiguous [frame, y, x(, channel)]
     fill_value : of pixels that are not stored
 
@@ -232,8 +232,8 @@ def read_chunks(path: Path, chunks: int, first: int, pictures: np.ndarray, fill_
     except FileNotFoundError:
         raise ValueError("the shard is missing") from None
     try:
-        places = _read_index(shard, chunks)[first : first + len(pictures)]
-        for picture, (offset, length) in zip(pictures, places, strict=True):
+        ranges = _read_index(shard, chunks)[first : first + len(pictures)]
+        for picture, (offset, length) in zip(pictures, ranges, strict=True):
             if offset == _NO_CHUNK:
                 picture[...] = fill_value
             else:
@@ -272,7 +272,7 @@ def _strip_checksum(content: bytes) -> bytes:
 def _decode(content: bytes, picture: np.ndarray) -> None:
     """Decompress a chunk; its header must have the sizes that are there, because Blosc trusts it."""
     body = _strip_checksum(content)
-    sizes = [int.from_bytes(body[place : place + 4], "little") for place in (4, 12)]
+    sizes = [int.from_bytes(body[start : start + 4], "little") for start in (4, 12)]
     if len(body) < _HEADER or sizes != [picture.nbytes, len(body)]:
         raise ValueError(
             f"a chunk of {len(body)} bytes must hold a picture of {picture.nbytes}; its header says {sizes}"

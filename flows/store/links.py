@@ -55,15 +55,15 @@ def refuse_foreign_entries(root: Path, wanted: Callable[[str], bool] = lambda na
 
 
 def _describe_link(root: Path, path: str) -> str:
-    place = root / path
-    if place.is_symlink():
+    target = root / path
+    if target.is_symlink():
         kind = "a link"
-    elif path in KINDS and (place.is_dir() or place.is_file()):
-        kind = "a folder where a file belongs" if place.is_dir() else "a file where a folder belongs"
+    elif path in KINDS and (target.is_dir() or target.is_file()):
+        kind = "a folder where a file belongs" if target.is_dir() else "a file where a folder belongs"
     else:
         kind = "neither a file nor a folder"
     return (
-        f"{shorten(place)}: a dataset must hold nothing but its folders and regular files; this is {kind}:"
+        f"{shorten(target)}: a dataset must hold nothing but its folders and regular files; this is {kind}:"
         " remove it, or put back what belongs there"
     )
 

@@ -21,9 +21,9 @@ CREDENTIALS = {"InvalidAccessKeyId", "SignatureDoesNotMatch", "AccessDenied", "E
                "InvalidClientTokenId"}  # fmt: skip
 
 
-def is_address(place: object) -> bool:
-    """Whether a place is an address of an object store, and not a folder."""
-    return isinstance(place, str) and "://" in place
+def is_address(location: object) -> bool:
+    """Whether a location is an address of an object store, and not a folder."""
+    return isinstance(location, str) and "://" in location
 
 
 class Objects:

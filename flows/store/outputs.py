@@ -118,8 +118,8 @@ class Outputs:
     def _clear_halves(self, folder: Path) -> None:
         for name, command in read_marker(folder).items():
             if command == self.command and _no_folder_above(folder, name) is None:
-                place = folder / name
-                for half in place.parent.glob(f"{escape(place.name)}.*{PARTIAL}"):
+                path = folder / name
+                for half in path.parent.glob(f"{escape(path.name)}.*{PARTIAL}"):
                     if stat.S_ISREG(half.lstat().st_mode):
                         half.unlink()
 
@@ -128,8 +128,8 @@ class Outputs:
         by_folder: dict[Path, set[str]] = {folder: {MARKER}}
         for name in self.names:
             by_folder.setdefault((folder / name).parent, set()).add(PurePosixPath(name).name)
-        for place, names in by_folder.items():
-            for half in list_abandoned(place, names):
+        for parent, names in by_folder.items():
+            for half in list_abandoned(parent, names):
                 if stat.S_ISREG(half.lstat().st_mode):
                     half.unlink()
 
@@ -138,7 +138,7 @@ class Outputs:
 
     def _refuse_strangers(self, folder: Path) -> None:
         problems = [f"{folder}: {problem}" for problem in map(find_name_problem, self.names) if problem]
-        nearest = next(place for place in (folder, *folder.absolute().parents) if os.path.lexists(place))
+        nearest = next(parent for parent in (folder, *folder.absolute().parents) if os.path.lexists(parent))
         if not nearest.is_dir():
             problems.append(f"{nearest}: must be a folder; name another one for the files of {self._title}")
         elif not os.access(nearest, os.W_OK | os.X_OK):
@@ -169,10 +169,10 @@ def find_dataset_problems(out: object, folder: Path) -> list[str]:
     out : what is to be written, as messages call it
     folder : that must neither be a dataset nor lie in one; it need not exist
     """
-    place = folder.resolve()
+    resolved = folder.resolve()
     return [
         f"{out}: must lie outside the dataset {around.name}, whose files are all recorded; name another folder"
-        for around in (place, *place.parents)
+        for around in (resolved, *resolved.parents)
         if (around / "inputs").is_dir()
         and ((around / "plan.json").is_file() or (around / "manifest.json").is_file())
     ][:1]
@@ -230,27 +230,25 @@ def refuse_link(path: Path) -> None:
 
 def _in_the_way(folder: Path, name: str, known: dict[str, str], command: str) -> str | None:
     """The reason why a command must not write a file; None for a free name and for its own earlier file."""
-    problem, place = _no_folder_above(folder, name), folder / name
-    if problem is not None or not os.path.lexists(place):
+    problem, path = _no_folder_above(folder, name), folder / name
+    if problem is not None or not os.path.lexists(path):
         return problem
-    if not stat.S_ISREG(place.lstat().st_mode):
-        return f"{place}: must be a file and no link or folder; move it away or name another folder"
+    if not stat.S_ISREG(path.lstat().st_mode):
+        return f"{path}: must be a file and no link or folder; move it away or name another folder"
     if known.get(name) != command:
         return (
-            f"{place} is not a file that musync {command} wrote, or an earlier version wrote it, which kept no list:"
+            f"{path} is not a file that musync {command} wrote, or an earlier version wrote it, which kept no list:"
             " move it away or name another folder"
         )
     return None
 
 
 def _no_folder_above(folder: Path, name: str) -> str | None:
-    """Return the link or file at the place of a parent folder; None if there is none."""
+    """Return the link or file where a parent folder belongs; None if there is none."""
     above = [
         folder.joinpath(*PurePosixPath(name).parts[:k]) for k in range(1, len(PurePosixPath(name).parts))
     ]
-    wrong = next(
-        (place for place in above if place.is_symlink() or (place.exists() and not place.is_dir())), None
-    )
+    wrong = next((path for path in above if path.is_symlink() or (path.exists() and not path.is_dir())), None)
     return (
         None
         if wrong is None

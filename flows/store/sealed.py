@@ -61,18 +61,24 @@ def read_manifest_head(layout: Layout) -> ManifestHead:
     return record
 
 
-def require_frames(manifest: Mapping[str, Any], place: object) -> None:
+def require_frames(manifest: Mapping[str, Any], origin: object, *, stored: bool = False) -> None:
     """Raise `InputError` for a dataset of telemetry alone.
 
     Parameters
     ----------
     manifest : of the dataset
-    place : what messages call it
+    origin : what messages call it
+    stored : refuse one whose frames are made when they are read, too
     """
+    if stored and manifest["grid"].get("pictures", True) == "later":
+        raise InputError(
+            f"{origin}: the dataset makes its frames when they are read (--frames later), and this needs them stored:"
+            " generate its grid with --frames stored into another folder"
+        )
     if not manifest["grid"].get("pictures", True):
         raise InputError(
-            f"{place}: the dataset was made without frames (--no-frames), which this needs: generate its grid with them"
-            " into another folder"
+            f"{origin}: the dataset was made without frames (--no-frames), which this needs:"
+            " generate its grid with them into another folder"
         )
 
 
@@ -167,29 +173,29 @@ def _refuse_without_manifest(layout: Layout) -> None:
     )
 
 
-def check_manifest(content: Any, place: object) -> Manifest:
+def check_manifest(content: Any, origin: object) -> Manifest:
     """A parsed manifest, typed.
 
     Parameters
     ----------
     content : parsed JSON
-    place : what messages call it
+    origin : what messages call it
 
     Raises
     ------
     InputError
         If it is of another format, or breaks a rule.
     """
-    manifest = check_record(Manifest, _of_format(content, MANIFEST_FORMAT, place), place)
-    recorded_grid(manifest["grid"], place)
+    manifest = check_record(Manifest, _of_format(content, MANIFEST_FORMAT, origin), origin)
+    recorded_grid(manifest["grid"], origin)
     return manifest
 
 
-def _check_content(content: bytes, place: Path, *, sealed: bool) -> Manifest:
-    manifest = check_manifest(parse_json(content, place, RECORD), place)
+def _check_content(content: bytes, origin: Path, *, sealed: bool) -> Manifest:
+    manifest = check_manifest(parse_json(content, origin, RECORD), origin)
     if sealed and not is_sealed(content):
         raise InputError(
-            f"{place}: must be as it was sealed; it was changed, so that nothing it records can be relied on:"
+            f"{origin}: must be as it was sealed; it was changed, so that nothing it records can be relied on:"
             " put back a copy of it, or generate the grid again into another folder"
         )
     return manifest
@@ -214,14 +220,14 @@ def read_receipt(layout: Layout, clip_id: str) -> Receipt:
     InputError
         If it is missing, breaks a rule, or is that of another clip.
     """
-    place = layout.receipt(clip_id)
-    receipt = check_record(Receipt, read_json(place), place)
+    path = layout.receipt(clip_id)
+    receipt = check_record(Receipt, read_json(path), path)
     arrays = EVERY_ARRAY.keys() & receipt["content"].keys()
     files = [layout.frame_shard(name, receipt["index"]) for name in arrays]
     files += [layout.object_table(receipt["index"])] if OBJECTS in receipt["content"] else []
     if receipt["clip_id"] != clip_id or receipt["artifacts"].keys() != set(map(layout.relative, files)):
         raise InputError(
-            f"{place}: must be the receipt of clip {clip_id} and name its files; it is another: remove it"
+            f"{path}: must be the receipt of clip {clip_id} and name its files; it is another: remove it"
         )
     return receipt
 
@@ -278,7 +284,7 @@ def _is_table_of(path: Path, table: str, receipt: Receipt, rows: int) -> bool:
     )
 
 
-def recorded_grid(content: Mapping[str, Any], place: object) -> GridFile:
+def recorded_grid(content: Mapping[str, Any], origin: object) -> GridFile:
     """The settings that a plan, manifest or frozen run records; a setting that it does not know is as it was before.
 
     Raises
@@ -289,14 +295,14 @@ def recorded_grid(content: Mapping[str, Any], place: object) -> GridFile:
     try:
         return GridFile.model_validate({**BEFORE, **content})
     except ValidationError as error:
-        raise InputError(cap_problems(describe_rules(error, f"{place}: grid"))) from None
+        raise InputError(cap_problems(describe_rules(error, f"{origin}: grid"))) from None
 
 
-def _of_format(content: Any, wanted: str, place: object) -> Any:
+def _of_format(content: Any, wanted: str, origin: object) -> Any:
     found = content.get("format") if isinstance(content, dict) else None
     if found != wanted:
         raise InputError(
-            f"{place}: must be of format {wanted}; it is {shorten_value(found)}:"
+            f"{origin}: must be of format {wanted}; it is {shorten_value(found)}:"
             " read the dataset with the version of muSync that wrote it, or make it again"
         )
     return content

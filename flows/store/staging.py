@@ -116,7 +116,7 @@ def scratch_dataset(layout: Layout) -> Iterator[Layout]:
         ):  # without a lock it is left over from a killed run, or its maker is about to lock it
             yield scratch
     except InputError as error:
-        raise InputError([said.replace(str(folder), str(layout)) for said in error.problems]) from error
+        raise InputError([problem.replace(str(folder), str(layout)) for problem in error.problems]) from error
     finally:
         shutil.rmtree(folder, ignore_errors=True)
         with suppress(OSError):

@@ -172,8 +172,8 @@ def read_parts(paths: Iterable[Path], most: int) -> Iterator[pa.Table]:
         refuse_columns(table, path)
         for name, empty in common.items():
             chunks = pa.chunked_array([empty, *table[name].chunks]).unify_dictionaries().chunks[1:]
-            place = table.schema.get_field_index(name)
-            table = table.set_column(place, table.schema.field(place), pa.chunked_array(chunks))
+            index = table.schema.get_field_index(name)
+            table = table.set_column(index, table.schema.field(index), pa.chunked_array(chunks))
         yield table
 
 

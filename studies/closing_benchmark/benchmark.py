@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from catalogs.effects.truths import Truth
 from catalogs.entries import load
 from flows.measured.closing_error_rates import engine_hash
 from flows.store.journal import append_line, read_lines
@@ -20,6 +19,7 @@ from studies.closing_benchmark.summary import (
 )
 from studies.closing_benchmark.synthetic import RICH, make_synthetic_campaign
 from studies.closing_benchmark.tables import benchmark_tables
+from studies.closing_benchmark.truths import Truth, load_sizes, load_truths
 from tasks.campaign.planned_runs import RunPlan
 from tasks.identification.decision.answer import Verdict
 from tasks.identification.decision.verdict import judge_runs
@@ -147,7 +147,7 @@ def _outcome(verdict: Verdict, truths: tuple[Truth, ...]) -> str:
 
 def _plan(seeds: int, first_seed: int, nulls: int, harder: int) -> Iterator[Planned]:
     """Every campaign, round by round over all truths, nulls and sizes spread over them; then the harder ones."""
-    truths, sizes, study = load("list of truths"), load("list of sizes"), load_harder()
+    truths, sizes, study = load_truths(), load_sizes(), load_harder()
     library = tuple(truth for truth in truths if truth.in_library)
     rounds = max(seeds, 1)
     for i in range(rounds):

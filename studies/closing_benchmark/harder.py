@@ -5,10 +5,10 @@ from typing import Annotated
 
 from pydantic import Field
 
-from catalogs.effects.truths import Truth
 from catalogs.names import WeatherName
 from catalogs.quantities import CatalogueEntry, Number
 from studies.closing_benchmark.synthetic import TRAINING
+from studies.closing_benchmark.truths import Truth
 from studies.plans import load_plan
 from tasks.campaign.planned_runs import RunPlan
 from tasks.surface.weather import DRY

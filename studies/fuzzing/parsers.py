@@ -4,17 +4,13 @@ from functools import partial
 
 from catalogs.campaigns import read_campaign
 from catalogs.entries import load
-from catalogs.learned_judges import load_judges
 from catalogs.references import read_reference
 from catalogs.scenes.folder import read_scene
 from catalogs.scenes.gaussian_files import read_gaussians
 from catalogs.scenes.route_files import read_route
 from catalogs.scenes.stereo_folder import read_stereo_folder
 from catalogs.scenes.street import load_street_layout
-from flows.judging.foreign import read_claim
-from flows.judging.foreign_sources import read_camera, read_footage
-from flows.judging.physics_constants import read_constants
-from flows.judging.trajectories import read_trajectory
+from flows.auditing.physics_constants import read_constants
 from flows.making.plan import read_plan
 from flows.making.seal import seal_dataset
 from flows.reading.describe import validate_grid
@@ -22,6 +18,11 @@ from flows.store.layout import Layout
 from flows.store.outputs import read_marker
 from flows.store.sealed import read_manifest
 from manifests.frozen_run import read_frozen
+from studies.closing_benchmark.truths import load_sizes, load_truths
+from studies.evaluation.learned_judges import load_judges
+from studies.foreign_video.judge import read_claim
+from studies.foreign_video.sources import read_camera, read_footage
+from studies.foreign_video.trajectories import read_trajectory
 from studies.fuzzing import recorded, seals, sound
 from studies.fuzzing.parser import Parser, parse_entries
 from studies.fuzzing.readers import (
@@ -57,6 +58,7 @@ NUMBERS_OF_A_GRID = (
 )
 RECORDED_FILES = r"(clips\|\d+\|)?artifacts\|[^|]+"
 PLANS = "../studies/measured_drives"
+TRUTHS = "../studies/closing_benchmark/truths.yaml"
 PLANNED = (
     ids_keep_their_form(r"clips\|\d+\|clip_id|run_id"),
     hashes_keep_their_form(r"inputs\|[^|]+|scene\|sha256"),
@@ -94,8 +96,8 @@ PARSERS: tuple[Parser, ...] = (
     parse_entries("sensitivity study", "studies/surface-sensitivity.yaml", partial(load, "sensitivity study"), share=1),
     parse_entries("street", "scenes/street.yaml", load_street_layout, share=2),
     parse_entries("effects library", "effects/library.yaml", partial(load, "library of effects"), share=0.5),
-    parse_entries("truths", "effects/truths.yaml", partial(load, "list of truths"), share=0.5),
-    parse_entries("sizes", "effects/truths.yaml", partial(load, "list of sizes"), share=0.5),
+    parse_entries("truths", TRUTHS, load_truths, share=0.5),
+    parse_entries("sizes", TRUTHS, load_sizes, share=0.5),
     parse_entries(
         "channel map", "channel_maps/*.yaml", partial(load, "channel map"), share=3,
         rules=(files_inside(r"runs\|\d+\|file"),),

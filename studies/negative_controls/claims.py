@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from studies.evaluation.metrics.video_motion import geometry_error, reference_progress
 from studies.negative_controls.false_rigs import show_rig
 from tasks.errors import InputError
 from tasks.eval.body_agreement import BodyClaim, compare_body, rms
 from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.poses.rigid import Floats, invert_pose
-from tasks.eval.video_motion import geometry_error, reference_progress
 
 SEES, PARTLY = 0.9, 0.5
 """Least detection rates without a false alarm at which a metric detects a fault, and detects it partly [1]."""

@@ -10,13 +10,11 @@ from catalogs.entries import load
 from catalogs.grids.form import TICK_RATE_HZ
 from catalogs.studies.ablation import cut_coupling
 from catalogs.variants import VARIANTS, Variant
-from flows.judging.evaluation_rows import find_control
-from flows.judging.judged_clip import METHODS, JudgedClip, View, judge_clip
-from flows.judging.physics import clip_facts
+from flows.auditing.physics import clip_facts
 from flows.making.catalogue import Catalogue, catalogue_of
 from flows.making.driven import refuse_driven
 from flows.making.driving import simulate_drive
-from flows.making.places import refuse_changed_scene
+from flows.making.locations import refuse_changed_scene
 from flows.making.plan import Plan, read_plan
 from flows.making.traced import refuse_traced
 from flows.pages.static import as_svg
@@ -25,6 +23,9 @@ from flows.store.address import open_for_reading
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest, refuse_changed_content, require_frames
 from manifests.manifest import list_scenes
+from studies.evaluation.judged_clip import METHODS, JudgedClip, View, judge_clip
+from studies.evaluation.metrics.video_motion import path_error, weather_error
+from studies.evaluation.rows import find_control
 from studies.negative_controls.claims import (
     Claim,
     claims_differ,
@@ -39,7 +40,6 @@ from studies.negative_controls.figure import draw_roc
 from tasks.errors import InputError
 from tasks.eval.body_agreement import BodyClaim
 from tasks.eval.motion_agreement import PoseThresholds
-from tasks.eval.video_motion import path_error, weather_error
 
 CUTS: tuple[Variant, ...] = ("appearance-only", "vertical-only", "fixed-mu")
 """The paper's ablations, as false claims."""
@@ -91,7 +91,7 @@ def run_controls(dataset: str, *, out: str | None = None) -> dict[str, Any]:
     inputs = read_plan(root).inputs
     refuse_traced(inputs, dataset, "lab controls")
     refuse_driven(inputs, dataset, "lab controls")
-    require_frames(manifest, dataset)
+    require_frames(manifest, dataset, stored=True)
     refuse_changed_content(layout, manifest, manifest["clips"])
     for scene in list_scenes(manifest):
         refuse_changed_scene(scene)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from catalogs.entries import find_entry, load
 from catalogs.scenario import Scenario, find_scenario_problems
 from catalogs.tyres import tyre_entries
-from flows.judging.physics_constants import make_constants
+from flows.auditing.physics_constants import make_constants
 from flows.making.clip import collect_motion_figures
 from flows.making.driving import collect_surface_figures, simulate_drive
 from tasks.eval.physics.constants import Constants

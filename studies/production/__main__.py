@@ -1,4 +1,4 @@
-"""``python -m studies.production [--clips N] [--workers N] [--measure]``: what a large production takes.
+"""``python -m studies.production [--clips N] [--workers N] [--frames later] [--measure]``: what a production takes.
 
 With ``--measure`` the scheduler's share is measured (three minutes), and the requests are counted on a server here;
 else the constants of docs/how-to/plan-a-million-clips.md stand.
@@ -13,6 +13,7 @@ from flows.cli import run_to_end
 from flows.store.layout import Layout
 from studies.production.plan import (
     CALLS,
+    RECIPES,
     WORKERS,
     ClipCosts,
     count_requests,
@@ -26,10 +27,13 @@ def print_plan() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--clips", type=int, default=1_000_000)
     parser.add_argument("--workers", type=int, default=500)
-    parser.add_argument("--cpu-s", type=float, default=ClipCosts().cpu_s)
+    parser.add_argument("--frames", choices=("stored", "later"), default="stored")
+    parser.add_argument("--cpu-s", type=float, help="of a clip [s]")
     parser.add_argument("--measure", action="store_true")
     asked = parser.parse_args()
-    costs = ClipCosts(cpu_s=asked.cpu_s)
+    costs = RECIPES if asked.frames == "later" else ClipCosts()
+    if asked.cpu_s is not None:
+        costs = replace(costs, cpu_s=asked.cpu_s)
     if asked.measure:
         found = measure_scheduling(Layout(Path("/shared/sets/million")), WORKERS, CALLS)
         print(found, count_requests(), sep="\n")

@@ -73,6 +73,10 @@ class ClipCosts:
     gets: float = 3.0
 
 
+RECIPES = ClipCosts(cpu_s=0.1, frames_bytes=0.0, manifest_bytes=1500, files=0.02, puts=3.02)
+"""Of clips whose frames are made when they are read."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Prices:
     """List prices in dollars.

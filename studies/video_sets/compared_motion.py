@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from studies.video_sets.files import SOURCE
 from studies.video_sets.motion import JudgedSet, SetMotion, check_motion
 from tasks.errors import InputError
-from tasks.eval.video_motion import resample_onto_grid
 
 Floats = NDArray[np.float64]
 
@@ -63,6 +62,26 @@ def require_control_clip(judged: JudgedSet, seen: SetMotion) -> SetMotion:
         raise InputError(f"not run: {_name_control(judged)} is missing, of the model and of the source")
     check_motion(control)
     return control
+
+
+def resample_onto_grid(times: Floats, values: Floats, grid: Floats) -> Floats:
+    """Return a recovered coordinate at the times of the common grid, linear between frames.
+
+    Parameters
+    ----------
+    times : [F] rising from 0 [s]
+    values : [F] [any]
+    grid : [N] rising from 0 [s]
+
+    Raises
+    ------
+    InputError
+        If the video ends before the grid does, by more than half a frame.
+    """
+    slack = 0.5 * float(np.median(np.diff(times)))
+    if times[-1] < grid[-1] - slack:
+        raise InputError(f"The video ends at {times[-1]:.2f} s; the protocol judges it to {grid[-1]:.2f} s.")
+    return np.interp(grid, times, values)
 
 
 def pair_with_control(judged: JudgedSet, seen: SetMotion) -> WeatherPair:

@@ -21,10 +21,10 @@ from catalogs.entries import load
 from catalogs.scenario import Scenario
 from flows.making.driving import simulate_drive
 from flows.store.layout import write_json
+from studies.evaluation.metrics.video_motion import PAPER_OPENING, geometry_error
 from studies.synthetic_street import camera_matrix, make_mount, render_clip, rig_poses
 from studies.video_sets.judge_set import format_cell, judge_video_set
 from tasks.eval.body_agreement import rms
-from tasks.eval.video_motion import PAPER_OPENING, geometry_error
 
 WIDTH, HEIGHT, FOCAL = 480, 320, 400.0
 FRAMES, WEATHER_HZ, GEOMETRY_HZ = 81, 10.0, 16.0

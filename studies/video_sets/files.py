@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from catalogs.sentences import cap_problems
-from flows.judging.trajectories import SUFFIXES
+from studies.foreign_video.trajectories import SUFFIXES
 from studies.video_sets.protocol import VideoProtocol
 from tasks.errors import InputError
 

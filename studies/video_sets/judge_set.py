@@ -6,17 +6,19 @@ from typing import Any
 
 import numpy as np
 
-from catalogs.learned_judges import load_judges
 from catalogs.sentences import cap_problems
-from flows.judging.evaluation_means import average_within_seeds
-from flows.judging.foreign import read_claim
-from flows.judging.foreign_sources import read_camera
-from flows.judging.judged_clip import Row
-from flows.judging.motion_curves import draw_motion
 from flows.pages.static import as_svg
 from flows.running.orchestration import run_as_stage
 from flows.running.progress import progress_bar
 from flows.store.outputs import Outputs
+from studies.evaluation.judged_clip import Row
+from studies.evaluation.learned_judges import load_judges
+from studies.evaluation.means import average_within_seeds
+from studies.evaluation.metrics.foreign_video import VideoClaim
+from studies.evaluation.metrics.video_motion import WINDOWS
+from studies.evaluation.motion_curves import draw_motion
+from studies.foreign_video.judge import read_claim
+from studies.foreign_video.sources import read_camera
 from studies.video_sets.files import VideoSet, find_set
 from studies.video_sets.motion import JudgedSet, Key, SetMotion, look_at_clip
 from studies.video_sets.motion_panels import list_set_panels
@@ -24,8 +26,6 @@ from studies.video_sets.picture_rows import PIXELS
 from studies.video_sets.protocol import VideoProtocol, load_protocol
 from studies.video_sets.rows import set_rows
 from tasks.errors import InputError
-from tasks.eval.foreign_video import VideoClaim
-from tasks.eval.video_motion import WINDOWS
 
 COLUMNS = (
     "e_weather", "e_geometry_hump", "e_geometry_depression", "motion_retention", "e_path",

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from catalogs.learned_judges import LoadedJudge
-from flows.judging.foreign_sources import ForeignCamera, read_footage
-from flows.judging.learned_rows import score_pictures
+from studies.evaluation.learned_judges import LoadedJudge
+from studies.evaluation.learned_rows import score_pictures
+from studies.evaluation.metrics.foreign_video import VideoClaim
+from studies.foreign_video.sources import ForeignCamera, read_footage
 from studies.video_sets.files import SetClip, VideoSet
 from studies.video_sets.protocol import VideoProtocol
 from tasks.errors import InputError
-from tasks.eval.foreign_video import VideoClaim
 from tasks.eval.poses.motion import RecoveredMotion
 
 Key = tuple[str, str, str, str]

@@ -4,17 +4,17 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flows.judging.motion_curves import PITCH, PROGRESS, Floats, MotionPanel, make_event_panel
-from studies.video_sets.compared_motion import pair_with_control, sample_claimed_pitch
-from studies.video_sets.motion import JudgedSet, SetMotion
-from tasks.errors import InputError
-from tasks.eval.video_motion import (
+from studies.evaluation.metrics.video_motion import (
     MotionProtocol,
     compare_progress,
     isolate_event,
     reference_progress,
     smooth_signal,
 )
+from studies.evaluation.motion_curves import PITCH, PROGRESS, Floats, MotionPanel, make_event_panel
+from studies.video_sets.compared_motion import pair_with_control, sample_claimed_pitch
+from studies.video_sets.motion import JudgedSet, SetMotion
+from tasks.errors import InputError
 
 Curves = tuple[Floats, Floats, Floats]
 """Times [s], what the claim means, and what was recovered."""

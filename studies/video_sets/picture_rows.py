@@ -6,14 +6,14 @@ from typing import Any
 
 import cv2
 
-from flows.judging.evaluation_rows import figure_row
-from flows.judging.foreign_sources import read_video
-from flows.judging.judged_clip import Row
-from flows.judging.learned_rows import rank_weathers
+from studies.evaluation.judged_clip import Row
+from studies.evaluation.learned_rows import rank_weathers
+from studies.evaluation.metrics.road_edit import score_road_edit
+from studies.evaluation.rows import figure_row
+from studies.foreign_video.sources import read_video
 from studies.video_sets.files import VIDEO_METHOD
 from studies.video_sets.motion import JudgedSet
 from tasks.errors import InputError
-from tasks.eval.road_edit import score_road_edit
 
 PIXELS = "pixels"
 """Method of figures that need no pose."""

@@ -6,8 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catalogs.entries import load
-from flows.judging.evaluation_rows import Scored, figure_row, windowed_rows
-from flows.judging.judged_clip import Row
+from studies.evaluation.judged_clip import Row
+from studies.evaluation.metrics.foreign_video import judge_motion, sample_claim
+from studies.evaluation.metrics.video_motion import (
+    geometry_error,
+    motion_retention,
+    path_error,
+    weather_error,
+)
+from studies.evaluation.rows import Scored, figure_row, windowed_rows
 from studies.video_sets.compared_motion import (
     find_control_clip,
     pair_with_control,
@@ -18,14 +25,7 @@ from studies.video_sets.files import SOURCE
 from studies.video_sets.motion import JudgedSet, SetMotion
 from studies.video_sets.picture_rows import edit_rows, learned_rows_of
 from tasks.errors import InputError
-from tasks.eval.foreign_video import judge_motion, sample_claim
 from tasks.eval.poses.motion import RecoveredMotion
-from tasks.eval.video_motion import (
-    geometry_error,
-    motion_retention,
-    path_error,
-    weather_error,
-)
 
 JUDGED = ("pitch_rmse_deg", "pitch_relative_error", "normalised_progress_rmse")
 

@@ -6,15 +6,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.campaign import Campaign
-from tasks.campaign.channels import BRAKE_SIGNALS, GRAVITY
+from tasks.campaign.campaign import BRAKING_PRESSURE, Campaign
+from tasks.campaign.channels import BRAKE_SIGNALS
 from tasks.campaign.segments import find_brake_rule
 from tasks.campaign.signals import ChannelRule, Signal, average_sources
 from tasks.campaign.slow_channels import take_samples
+from tasks.conventions import GRAVITY
 from tasks.vehicle.effects.brake_line import DISC_CAPACITY_F, DISC_CAPACITY_R, DISC_COOLING
 
-RELEASED_PRESSURE = 0.1
-"""Brake pressure, or what stands for it, up to which the brake is released [MPa]: it gives 0.2 m/s^2."""
 APPLIED = 0.05
 """Share of the range of a brake signal, above its rest, from which the brake is applied [1]."""
 RESTING = 0.05
@@ -92,7 +91,7 @@ def compute_braking_heat(
     """
     time, v = speed.time, speed.values
     rest, hardest = float(np.quantile(pressure, RESTING)), float(np.max(pressure))
-    applied = pressure > rest + max(APPLIED * (hardest - rest), RELEASED_PRESSURE)
+    applied = pressure > rest + max(APPLIED * (hardest - rest), BRAKING_PRESSURE)
     edges = np.flatnonzero(np.diff(applied.astype(np.int8), prepend=0, append=0))
     before, last = np.maximum(edges[::2] - 1, 0), edges[1::2] - 1
     energy = 0.5 * v**2 + GRAVITY * _integrate(v * np.sin(slope), time)

@@ -20,6 +20,8 @@ FILE_NUMBERS = (*SESSION, "friction")
 
 LEAST_SAMPLES = 20
 """A shorter run holds no stop: 20 samples are a second at 20 Hz."""
+BRAKING_PRESSURE = 0.1
+"""Brake pressure, or what stands for it, from which a car brakes [MPa]: it gives 0.2 m/s^2."""
 MASKED_SPEED = 2.0
 """Speed below which a run is not used: the floor of the slip's denominator distorts slip there [m/s]."""
 
@@ -214,6 +216,7 @@ class Campaign:
     brake_signal : signal or unit that stands for the brake pressure
     brake_rest : what that signal says at rest in all runs alike, taken off it, as a pressure [MPa]
     throttle_rest : what the throttle reads while the brake is applied, taken off it [1]
+    resting_gauge : sentence of the check of a brake pressure that rests above 0 and is not taken off; else empty
     """
 
     name: str
@@ -226,6 +229,7 @@ class Campaign:
     brake_signal: str = "brake_pressure"
     brake_rest: float = 0.0
     throttle_rest: float = 0.0
+    resting_gauge: str = ""
 
     @property
     def is_measured(self) -> NDArray[np.bool_]:

@@ -4,12 +4,11 @@ from dataclasses import dataclass
 from math import log, pi
 from typing import Literal
 
+from tasks.conventions import GRAVITY
 from tasks.errors import InputError
 
 SpeedSource = Literal["ground", "wheels"]
 """Where the channel ``speed`` was measured: over ground, or at the wheels, whose slip it then has."""
-GRAVITY = 9.80665
-"""Standard gravity [m/s^2]."""
 UNITS: dict[str, tuple[str, float]] = {
     "s": ("time", 1.0), "ms": ("time", 1e-3), "us": ("time", 1e-6), "ns": ("time", 1e-9),
     "ks": ("time", 1e3), "min": ("time", 60.0), "h": ("time", 3600.0), "d": ("time", 86400.0),

@@ -26,8 +26,6 @@ STEADY = 0.02
 """Interquartile range of a pressure that rests at most; a foot on the pedal varies more [MPa]."""
 ROLLING = 1.0
 """Deceleration of a car that rolls, in gear or on a slope, at most; 0.4 MPa of brake pressure give as much [m/s^2]."""
-DRIFT = 0.04
-"""Pressure at rest from which a gauge counts as drifting [MPa]: the model brakes by 0.1 m/s^2; gauges resolve 0.03."""
 FEWEST_RUNS = 2
 """Runs that rest at one level from which it is the gauge's and not the driver's [1]."""
 BRAKED = 0.5
@@ -36,11 +34,6 @@ LEAST_RANGE = 0.1
 """Range of pressure from which a run brakes at all [MPa]."""
 LEAST_THROTTLE, MOST_THROTTLE = 0.02, 0.3
 """Throttle from which and up to which it may rest: sensors are off by less, a foot on both pedals reads more [1]."""
-HIGHEST_REST = (
-    "channel brake_pressure rests at {level:.3f} ({low}) to {value:.3f} MPa ({high}) while the car does not brake: the"
-    " model brakes with it; set the gauge to zero before every run"
-)
-"""As of the check ``highest_rest``, for a verdict."""
 
 
 def measure_resting_levels(
@@ -71,19 +64,6 @@ def find_brake_rest(levels: Mapping[str, float]) -> float:
     values = np.array(list(levels.values()))
     level = float(np.median(values))
     return level if level > RESTING_PRESSURE and float(np.ptp(values)) <= RESTING_PRESSURE else 0.0
-
-
-def describe_rest(levels: Mapping[str, float]) -> str | None:
-    """Return the sentence of a gauge that rests above 0 in some run; None if it does not.
-
-    Parameters
-    ----------
-    levels : pressure at rest by run [MPa]
-    """
-    if not levels or max(levels.values()) < DRIFT:
-        return None
-    low, high = min(levels, key=lambda run: levels[run]), max(levels, key=lambda run: levels[run])
-    return HIGHEST_REST.format(value=levels[high], level=levels[low], low=low, high=high)
 
 
 def _measure_level(columns: Mapping[str, NDArray[np.float64]], interval: float) -> float | None:

@@ -13,7 +13,6 @@ from tasks.campaign.campaign import LEAST_SAMPLES, MASKED_SPEED, find_motion
 from tasks.campaign.channels import (
     BRAKE_SIGNALS,
     CHANNELS_BY_NAME,
-    GRAVITY,
     SPEED_UNITS,
     UNITS,
     WHEELS,
@@ -22,6 +21,7 @@ from tasks.campaign.channels import (
 from tasks.campaign.checks import Figure, Measure
 from tasks.campaign.clocks import measure_fall
 from tasks.campaign.measured import BRAKES, STAND_IN, MeasuredRun
+from tasks.conventions import GRAVITY
 
 TURN_OVER = "turn its sign over"
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.campaign import CHANNELS
-from tasks.campaign.channels import GRAVITY, guess_unit
+from tasks.campaign.channels import guess_unit
 from tasks.campaign.checks import Figure, Measure
 from tasks.campaign.clocks import measure_fall
 from tasks.campaign.measured import BRAKES, Clock, MeasuredRun, Recordings, Session, smooth_channel
@@ -20,6 +20,7 @@ from tasks.campaign.segments import find_brake_rule
 from tasks.campaign.signals import average_sources
 from tasks.campaign.slow_channels import take_input_updates
 from tasks.campaign.speed_by_acceleration import estimate_slopes, measure_apart
+from tasks.conventions import GRAVITY
 
 
 def _count_restarts(clock: Clock, *, step_back: float) -> Iterator[Figure]:
@@ -115,7 +116,7 @@ class Braking:
         """Return the deceleration per pressure, less what the car loses without its brake [m/s^2 per MPa]."""
         return (float(np.mean(self.deceleration)) - without_brake) / float(np.mean(self.pressure))
 
-    def tell(self, value: float) -> Figure:
+    def make_figure(self, value: float) -> Figure:
         """Return a bound of the gain as the figure of a check."""
         return Figure(value=value, channel="brake_pressure", places=self.runs, words={"gain": self.gain()})
 
@@ -141,13 +142,13 @@ def _measure_largest_gain(session: Session, **conditions: float) -> Iterator[Fig
     A driver who stands on the pedal on snow puts 15 MPa into the master cylinder and slows by 2 m/s^2: slippery runs do
     not tell that the pressure is too large.
     """
-    yield from (part.tell(part.gain()) for part in _collect_braking(session, True, **conditions))
+    yield from (part.make_figure(part.gain()) for part in _collect_braking(session, True, **conditions))
 
 
 def _measure_least_gain(session: Session, *, without_brake: float, **conditions: float) -> Iterator[Figure]:
     """Return the least gain of the brake of each run, which leaves all it may to engine and drag [m/s^2 per MPa]."""
     yield from (
-        part.tell(part.gain(without_brake)) for part in _collect_braking(session, False, **conditions)
+        part.make_figure(part.gain(without_brake)) for part in _collect_braking(session, False, **conditions)
     )
 
 
@@ -176,7 +177,7 @@ def _measure_common_gain(
         intercept, _, per_torque = np.linalg.lstsq(terms, together.deceleration, rcond=None)[0]
         of_motor = float(np.mean(torque)) * min(float(per_torque), 0.0)
         least = min(together.gain(of_motor + float(np.clip(intercept, 0.0, without_brake))), least)
-    yield together.tell(least)
+    yield together.make_figure(least)
 
 
 def _measure_km_h(session: Session, **conditions: float) -> Iterator[Figure]:

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.campaign.campaign import MASKED_SPEED
-from tasks.campaign.channels import GRAVITY
 from tasks.campaign.measured import MeasuredRun
+from tasks.conventions import GRAVITY
 
 FEWEST_SAMPLES = 5
 """Samples of the speed that a run needs beside its own two numbers [1]."""
@@ -44,23 +44,18 @@ class SpeedByAcceleration:
 
 
 def pair_samples(
-    speed: NDArray[np.float64],
-    felt: NDArray[np.float64],
-    interval: float,
-    at: NDArray[np.int64] | None = None,
+    speed: NDArray[np.float64], felt: NDArray[np.float64], interval: float
 ) -> NDArray[np.float64]:
-    """Return time, speed, integral of the acceleration, and acceleration at the samples of a speed, float64 [M, 4].
+    """Return time, speed, integral of the acceleration, and acceleration, float64 [N, 4].
 
     Parameters
     ----------
     speed, felt : of one run, the acceleration without gaps, float64 [N] [m/s, m/s2]
     interval : between the instants [s]
-    at : int64 [M] instants at which the speed has a sample; None for all
     """
     time = np.arange(len(felt)) * interval
     gained = np.concatenate(([0.0], np.cumsum(0.5 * (felt[1:] + felt[:-1]) * interval)))
-    columns = np.column_stack((time, speed, gained, felt))
-    return columns if at is None else columns[at]
+    return np.column_stack((time, speed, gained, felt))
 
 
 def relate_speed_to_acceleration(runs: Sequence[NDArray[np.float64]]) -> SpeedByAcceleration | None:

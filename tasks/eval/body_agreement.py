@@ -1,6 +1,7 @@
 """Agreement of the recovered with the claimed rig in what pitch and progress leave open: roll, yaw, place, heave."""
 
 from dataclasses import dataclass
+from math import nan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +32,7 @@ class BodyClaim:
 
 @dataclass(frozen=True, kw_only=True)
 class BodyErrors:
-    """Recovered against claimed rig, both counted from frame 0.
+    """Recovered against claimed rig, both counted from frame 0; NaN where nothing is said of the rig.
 
     Parameters
     ----------
@@ -42,12 +43,12 @@ class BodyErrors:
     heave_gain_std : standard uncertainty of the gain, from the residuals [1]
     """
 
-    roll_rmse_deg: float
-    yaw_rmse_deg: float
-    lateral_rmse_m: float
-    rise_rmse_m: float
-    heave_gain: float
-    heave_gain_std: float
+    roll_rmse_deg: float = nan
+    yaw_rmse_deg: float = nan
+    lateral_rmse_m: float = nan
+    rise_rmse_m: float = nan
+    heave_gain: float = nan
+    heave_gain_std: float = nan
 
 
 def pose_body(heave: Floats, pitch: Floats, cg_behind_front_axle: float, cg_height: float) -> Floats:

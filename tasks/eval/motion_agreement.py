@@ -1,6 +1,7 @@
 """Agreement of the motion recovered from the pixels with the motion that the telemetry claims."""
 
 from dataclasses import dataclass
+from math import nan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,7 @@ class PoseThresholds:
     lateral_rmse_m, rise_rmse_m : largest RMSE of the rig's place to the side and upward [m]
     heave_gain_error : largest difference of the heave gain from 1 [1]
     heave_gain_std : standard uncertainty of that gain above which there is too little heave to judge it by [1]
+    halved_from_px : height of pictures from which on a clip is judged by pictures of half the size [px]
     """
 
     pitch_rmse_deg: float
@@ -51,6 +53,7 @@ class PoseThresholds:
     rise_rmse_m: float | None = None
     heave_gain_error: float | None = None
     heave_gain_std: float | None = None
+    halved_from_px: float = float("inf")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,32 +80,21 @@ class PoseVerdict:
 
     method: str
     passed: bool | None
-    pitch_rmse_deg: float
-    pitch_relative_error: float
-    pitch_correlation: float
-    claimed_pitch_rms_deg: float
-    progress_rmse_m: float
-    normalised_progress_rmse: float
+    pitch_rmse_deg: float = nan
+    pitch_relative_error: float = nan
+    pitch_correlation: float = nan
+    claimed_pitch_rms_deg: float = nan
+    progress_rmse_m: float = nan
+    normalised_progress_rmse: float = nan
     failed_frames: int
     judged_frames: int
-    roll_rmse_deg: float
-    yaw_rmse_deg: float
-    lateral_rmse_m: float
-    rise_rmse_m: float
-    heave_gain: float
-    heave_gain_std: float
+    roll_rmse_deg: float = nan
+    yaw_rmse_deg: float = nan
+    lateral_rmse_m: float = nan
+    rise_rmse_m: float = nan
+    heave_gain: float = nan
+    heave_gain_std: float = nan
     reasons: tuple[str, ...]
-
-
-UNKNOWN_BODY = BodyErrors(
-    roll_rmse_deg=float("nan"),
-    yaw_rmse_deg=float("nan"),
-    lateral_rmse_m=float("nan"),
-    rise_rmse_m=float("nan"),
-    heave_gain=float("nan"),
-    heave_gain_std=float("nan"),
-)
-"""Of a claim, or of pictures, that say nothing of the rig."""
 
 
 def judge_pose(
@@ -142,19 +134,23 @@ def judge_pose(
         reasons.append(f"{failed} of {frames} frames have no pose: {recovered.failures[0]}")
     if judged_frames == 0:
         reasons.append("no frame after the first has a pose")
-        return _refuse_to_judge(recovered, failed, reasons)
+        blindness = [TOO_LITTLE] if recovered.blind else []
+        return PoseVerdict(
+            method=recovered.method, passed=None if blindness else False, failed_frames=failed, judged_frames=0,
+            reasons=(*blindness, *reasons),
+        )  # fmt: skip
     claimed = np.rad2deg(claimed_pitch - claimed_pitch[0])[seen]
     pitch = np.rad2deg(recovered.pitch)[seen]
     way = (claimed_station - claimed_station[0])[seen]
     pitch_rmse, response = rms(pitch - claimed), rms(claimed)
     judged = response >= thresholds.response_deg
-    relative = pitch_rmse / response if judged else float("nan")
+    relative = pitch_rmse / response if judged else nan
     varies = bool(np.ptp(pitch) > 0 and np.ptp(claimed) > 0)
-    correlation = float(np.corrcoef(pitch, claimed)[0, 1]) if varies else float("nan")
+    correlation = float(np.corrcoef(pitch, claimed)[0, 1]) if varies else nan
     progress_rmse = rms(recovered.progress[seen] - way)
     moved = way[-1] > 0
-    normalised = rms(recovered.normalised_path[seen, 0] - way / way[-1]) if moved else float("nan")
-    errors = UNKNOWN_BODY if body is None else compare_body(recovered, body)
+    normalised = rms(recovered.normalised_path[seen, 0] - way / way[-1]) if moved else nan
+    errors = BodyErrors() if body is None else compare_body(recovered, body)
 
     limits: list[tuple[str, float, float | None, str]] = [
         ("pitch RMSE", pitch_rmse, thresholds.pitch_rmse_deg, "deg"),
@@ -240,22 +236,3 @@ def _list_body_limits(
         gain = f"recovered heave is {errors.heave_gain:.3g} of the claimed, and their difference"
         limits.append((gain, abs(errors.heave_gain - 1), thresholds.heave_gain_error, ""))
     return limits
-
-
-def _refuse_to_judge(recovered: RecoveredMotion, failed: int, reasons: list[str]) -> PoseVerdict:
-    """Return the verdict on a clip of which no frame can be compared with the first."""
-    nan = float("nan")
-    return PoseVerdict(
-        method=recovered.method,
-        passed=None if recovered.blind else False,
-        pitch_rmse_deg=nan,
-        pitch_relative_error=nan,
-        pitch_correlation=nan,
-        claimed_pitch_rms_deg=nan,
-        progress_rmse_m=nan,
-        normalised_progress_rmse=nan,
-        failed_frames=failed,
-        judged_frames=0,
-        **vars(UNKNOWN_BODY),
-        reasons=(*([TOO_LITTLE] if recovered.blind else []), *reasons),
-    )

@@ -1,32 +1,20 @@
 """Agreement of a stop's duration and of the way that it slides: the paper's development MAEs (Appendix C.2)."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from tasks.eval.state_agreement import STOP_SPEED, WHEELS, CaseFacts, Floats, find_brake_onset, find_stop
 
-
-@dataclass(frozen=True, kw_only=True)
-class StopAgreement:
-    """Errors of one stop.
-
-    Parameters
-    ----------
-    braking_time_error_s : of the time from brake onset to the stop [s]
-    slip_distance_error_m : of the way that the wheels slide, the mean over wheels of the integral of slip times speed
-        from brake onset to the stop: declared, the paper does not define its slip distance [m]
-    """
-
-    braking_time_error_s: float
-    slip_distance_error_m: float
+STOP_FIGURES = ("braking_time_error_s", "slip_distance_error_m")
+"""Errors of a stop: of the time from brake onset to it [s]; of the way that the wheels slide [m], the mean over wheels
+of the integral of slip times speed over that time: declared, the paper does not define its slip distance."""
 
 
 def stop_agreement(
     reference: Mapping[str, Floats], model: Mapping[str, Floats], facts: CaseFacts
-) -> StopAgreement | None:
-    """Return the errors of a stop; None for a case that is no flat-road stop or a trace in which nothing stops.
+) -> dict[str, float] | None:
+    """Return `STOP_FIGURES` by name; None for a case that is no flat-road stop or a trace in which nothing stops.
 
     A reference whose last sample is as slow as twice the stopping speed has stopped at its end.
 
@@ -43,10 +31,8 @@ def stop_agreement(
     computed = _describe_stop(model["t_ns"] * 1e-9, model, axles, facts, ends=False)
     if measured is None or computed is None:
         return None
-    return StopAgreement(
-        braking_time_error_s=abs(computed[0] - measured[0]),
-        slip_distance_error_m=abs(computed[1] - measured[1]),
-    )
+    errors = (abs(ours - theirs) for ours, theirs in zip(computed, measured, strict=True))
+    return dict(zip(STOP_FIGURES, errors, strict=True))
 
 
 def _describe_stop(

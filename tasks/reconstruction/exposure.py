@@ -7,10 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.reconstruction.camera import pixel_rays
+from tasks.reconstruction.pose_correction import FRAME_GAPS
 from tasks.render.composition import to_display, to_linear
 
-FRAME_GAPS = (1, 2, 4)
-"""Training frames this far apart are compared."""
 STRIDE = 6
 """Distance between compared pixels [px]."""
 DARKEST, BRIGHTEST = 12, 245

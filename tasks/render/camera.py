@@ -1,6 +1,6 @@
 """The camera: intrinsics, mount, and its pose under heave and pitch (paper, Eq. camera_pose)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -33,6 +33,8 @@ class Camera:
     line_delay_s : from one row's exposure to the next one's, top to bottom; 0 for one shutter for all rows. A
         frame's time is that of the middle of the picture, in the middle of its exposure [s]
     motion_blur : what moves in the picture is averaged over the exposure; streaks always are
+    spread : bounds of what each clip draws for itself: ``focal_length`` [px], ``height_above_road`` [m], ``pitch_down``
+        and ``roll_right`` [deg]
     """
 
     name: str
@@ -45,6 +47,12 @@ class Camera:
     lens: Lens | None = None
     line_delay_s: float = 0.0
     motion_blur: bool = False
+    spread: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    @property
+    def varies(self) -> bool:
+        """Whether the clips of a dataset draw their own focal length or mount."""
+        return bool(self.spread)
 
     @property
     def plain(self) -> bool:
@@ -67,6 +75,22 @@ class Camera:
         middle = (np.arange(self.height) + 0.5 - self.height / 2) * self.line_delay_s
         half = 0.5 * self.exposure_s if self.motion_blur else 0.0
         return np.stack((middle - half, middle, middle + half))
+
+
+def measure_mount(camera: Camera) -> dict[str, float]:
+    """Return focal length, height above the road, pitch nose-down and roll to the right of a camera, by column.
+
+    Parameters
+    ----------
+    camera : on the vehicle
+    """
+    right, down, ahead = camera.T_rig_camera[:3, :3].T
+    return {
+        "focal_length_px": float(camera.K[0, 0]),
+        "camera_height": float(camera.T_rig_camera[2, 3]),
+        "camera_pitch": float(np.arcsin(0.0 - ahead[2])),
+        "camera_roll": float(np.arctan2(0.0 - right[2], -down[2])),
+    }
 
 
 def body_poses(

@@ -1,7 +1,7 @@
 """A clip's frames, one after the other, from rig poses to finished pictures in their weather."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -37,6 +37,8 @@ class RigMotion:
     rig_at : rig poses about each frame; a camera that `moves` during a frame needs them
     bodies : road users; during a frame they stand still, as in its middle
     first_frame : number of the first frame, from which particles and noise count [1]
+    shown : places of the frames that are rendered, with the bytes that they have among all; with labels, which follow
+        from two frames, None. None renders all
     """
 
     T_world_rig: NDArray[np.float64]
@@ -44,6 +46,7 @@ class RigMotion:
     rig_at: RigAt | None = None
     bodies: Sequence[MovingBody] = ()
     first_frame: int = 0
+    shown: range | None = None
 
 
 def render_clip(
@@ -57,7 +60,7 @@ def render_clip(
     labels: bool = False,
     composition: Literal["linear", "paper"] = "linear",
 ) -> dict[str, NDArray[np.generic]]:
-    """Render every frame of a clip.
+    """Render the frames of a clip.
 
     Parameters
     ----------
@@ -97,8 +100,12 @@ def render_clip(
     T_world_rows = pose_rows(camera, T_world_camera, motion.rig_at)
     moving = BodiesInClip(motion.bodies, scene, weathered, weather, backend, T_world_camera)
     velocity = np.gradient(T_world_camera[:, :3, 3], 1 / motion.frame_rate_hz, axis=0)
+    shows_sky = scene.gaussians.display_encoded or not weather.replaces_sky
+    black = np.zeros((field.height, field.width, 3), np.float32)
     clip: dict[str, NDArray[Any]] = {}
-    for frame, pose in enumerate(T_world_camera):
+    chosen = range(len(T_world_camera)) if motion.shown is None else motion.shown
+    for place, frame in enumerate(chosen):
+        pose = T_world_camera[frame]
         view = world_to_camera(pose)
         gbuffer = backend.rasterise_view(
             prepared, view, field.K, field.width, field.height,
@@ -107,7 +114,6 @@ def render_clip(
         )  # fmt: skip
         if scene.daylight is not None:
             gbuffer = add_grain(gbuffer, pose, field.K)
-        sky = environment_view(scene.environment, view, field.K, field.width, field.height)
         shutter = Shutter(
             T_world_camera=pose,
             K=field.K,
@@ -117,8 +123,14 @@ def render_clip(
             time_s=(motion.first_frame + frame) / motion.frame_rate_hz,
             exposure_s=camera.exposure_s,
         )
-        clear = compose_over_sky(gbuffer, sky, scene.gaussians.display_encoded)
-        finished = apply_weather(weather, clear, sky, gbuffer, shutter, particles=camera.plain)
+        clear = gbuffer.rgb
+        if labels or shows_sky:
+            sky = environment_view(scene.environment, view, field.K, field.width, field.height)
+            clear = compose_over_sky(gbuffer, sky, scene.gaussians.display_encoded)
+        before = (clear, sky) if shows_sky else (gbuffer.rgb, black)
+        finished = replace(
+            apply_weather(weather, *before, gbuffer, shutter, particles=camera.plain), base=clear
+        )
         drawn = (weather, finished, gbuffer, shutter)
         if T_world_rows is None:
             seen = take_drawn_frame(*drawn, labels)
@@ -144,9 +156,9 @@ def render_clip(
                 seen.normal, seen.class_id, seen.points, seen.changes, scene.route, elevation
             )
         for name, values in buffers.items():
-            if not frame:
-                clip[name] = np.empty((len(T_world_camera), *values.shape), values.dtype)
-            clip[name][frame] = values
+            if not place:
+                clip[name] = np.empty((len(chosen), *values.shape), values.dtype)
+            clip[name][place] = values
     if labels:
         clip["flow"], occluded = _label_flow(clip, motion.bodies, camera, field, T_world_camera, T_world_rows)
         clip["marks"] |= occluded

@@ -124,17 +124,14 @@ def _view_panorama(panorama, rotation, across, down, seen):  # type: ignore[no-u
             blend_panorama(panorama, row[j], column[j], seen[i, j])
 
 
-def plain_sky(rows: int = 64) -> NDArray[np.float32]:
+def plain_sky() -> NDArray[np.float32]:
     """Return a cloudless gradient from blue zenith to pale horizon over grey ground, for scenes without a sky.
-
-    Parameters
-    ----------
-    rows : height of the panorama [px]
 
     Returns
     -------
-    float32 [rows, 2 rows, 3] linear [1]
+    float32 [64, 128, 3] linear [1]
     """
+    rows = 64
     elevation = np.linspace(np.pi / 2, -np.pi / 2, rows)[:, None]
     horizon, zenith, ground = np.array([[0.70, 0.76, 0.82], [0.16, 0.30, 0.60], [0.18, 0.18, 0.17]])
     above = horizon + (zenith - horizon) * np.sin(np.clip(elevation, 0, None)) ** 0.5

@@ -123,11 +123,12 @@ class BodiesInClip:
         return _colour_cloud(self._clouds[place], radiance, self._scene.gaussians.display_encoded)
 
     def _prepare(self, place: int, frame: int) -> Any:
-        """Return a body's cloud in the light of a frame; under cloud that is the same wherever it stands."""
+        """Return a body's cloud in the light of a frame; under cloud that of the first frame with the same lamps."""
         braking = bool(self._bodies[place].braking[frame])
+        first = int(np.argmax(self._bodies[place].braking == braking))
         if (place, braking) not in self._kept:
-            self._kept[place, braking] = self._backend.prepare_gaussians(self.wrap(place, frame))
-        elif self._light.sun_share:
+            self._kept[place, braking] = self._backend.prepare_gaussians(self.wrap(place, first))
+        if self._light.sun_share and frame != first:
             return self._backend.recolour(self._kept[place, braking], self.wrap(place, frame).sh)
         return self._kept[place, braking]
 

@@ -16,6 +16,8 @@ SAMPLING = 0.25
 """Step of the samples from which a point's projection onto the route is found [m]."""
 
 
+STANDSTILL = 0.01
+"""A point closer than this to the last kept one is dropped [m]."""
 LONGEST_ROUTE = 1e5
 """Greatest length of a route [m]: its samples take 50 MB, and no clip is a hundredth of it long."""
 FARTHEST = 1e8
@@ -178,13 +180,12 @@ class _Samples:
     turn: NDArray[np.float64]
 
 
-def route_from_poses(T_world_rig: NDArray[np.float64], standstill: float = 0.01) -> Route:
+def route_from_poses(T_world_rig: NDArray[np.float64]) -> Route:
     """Return a route through poses, with stations by chord length; poses at a standstill are dropped.
 
     Parameters
     ----------
     T_world_rig : float64 [M, 4, 4]
-    standstill : a pose closer than this to the last kept one is dropped [m]
 
     Raises
     ------
@@ -193,18 +194,17 @@ def route_from_poses(T_world_rig: NDArray[np.float64], standstill: float = 0.01)
     """
     if problems := _find_range_problems(T_world_rig[:, :3, 3]):
         raise InputError(problems)
-    poses = T_world_rig[_drop_standstill(T_world_rig[:, :3, 3], standstill)]
+    poses = T_world_rig[_drop_standstill(T_world_rig[:, :3, 3])]
     steps = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)
     return Route(station=np.concatenate([[0.0], np.cumsum(steps)]), T_world_rig=poses)
 
 
-def route_from_positions(positions: NDArray[np.float64], standstill: float = 0.01) -> Route:
+def route_from_positions(positions: NDArray[np.float64]) -> Route:
     """Return a route through points on the road, with x along its tangent and z up.
 
     Parameters
     ----------
     positions : float64 [M, 3] world frame, z up [m]
-    standstill : a point closer than this to the last kept one is dropped [m]
 
     Raises
     ------
@@ -213,9 +213,9 @@ def route_from_positions(positions: NDArray[np.float64], standstill: float = 0.0
     """
     if problems := _find_range_problems(positions):
         raise InputError(problems)
-    kept = positions[_drop_standstill(positions, standstill)]
+    kept = positions[_drop_standstill(positions)]
     if len(kept) < 2:
-        raise InputError(f"a route needs two points {standstill:g} m apart or more; it has {len(kept)}")
+        raise InputError(f"a route needs two points {STANDSTILL:g} m apart or more; it has {len(kept)}")
     steps = np.linalg.norm(np.diff(kept, axis=0), axis=1)
     station = np.concatenate([[0.0], np.cumsum(steps)])
     forward = np.gradient(kept, station, axis=0, edge_order=2 if len(kept) > 2 else 1)
@@ -241,11 +241,11 @@ def _find_range_problems(positions: NDArray[np.float64]) -> list[str]:
     ]
 
 
-def _drop_standstill(positions: NDArray[np.float64], standstill: float) -> list[int]:
-    """Return the numbers of the positions farther than ``standstill`` from the last one kept, NaN included."""
+def _drop_standstill(positions: NDArray[np.float64]) -> list[int]:
+    """Return the numbers of the positions farther than `STANDSTILL` from the last one kept, NaN included."""
     kept: list[int] = []
     for i, position in enumerate(positions):
-        if not kept or not np.linalg.norm(position - positions[kept[-1]]) <= standstill:
+        if not kept or not np.linalg.norm(position - positions[kept[-1]]) <= STANDSTILL:
             kept.append(i)
     return kept
 

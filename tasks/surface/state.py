@@ -80,7 +80,7 @@ class SurfaceState:
     Parameters
     ----------
     kind : kind of weather, a row of ``tasks.surface.weather.WEATHERS``
-    precipitation_mm_h : what falls, water equivalent [mm/h]
+    precipitation_mm_h : what falls, water equivalent; 0 where it has ended [mm/h]
     film_depth_mm : total depth of the film from the bottom of the texture, h_t [mm]
     snow_depth_mm : h_s [mm]
     snow_coverage : share of the road that snow covers, c_s; friction takes it for that of the tyres' contact [1]

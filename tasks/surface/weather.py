@@ -24,6 +24,7 @@ class Weather:
     kind : name of a row of ``WEATHERS``; also the name of the telemetry's family and of the tyre family
     precipitation_mm_h : rain rate, or water-equivalent snow rate [mm/h]
     snow_accumulation_h : time over which the snow has fallen [h]
+    falling : whether it still falls; where it has just ended, the road is as it left it
 
     Raises
     ------
@@ -34,6 +35,7 @@ class Weather:
     kind: str
     precipitation_mm_h: float = 0.0
     snow_accumulation_h: float = 0.0
+    falling: bool = True
 
     def __post_init__(self) -> None:
         find_weather(self.kind)
@@ -234,7 +236,7 @@ class WeatherKind:
     derive : how those follow, for people
     rate_limit : name of the physical limit of its precipitation rate; None where nothing falls
     accumulates : it lies as deep as the hours make it
-    overcast : there is cloud in place of the sun, and an entry in ``catalogs/weather/`` that says how it looks
+    overcast : it comes with closed cloud, and has an entry in ``catalogs/weather/`` that says how it looks
     wet : liquid water lies under the wheels
     grips_as : kind whose tyre family it takes; None has a family of its own
     """
@@ -292,6 +294,17 @@ def find_weather_problem(name: str) -> str | None:
     return f"must be {', '.join(others)} or {last}; it is {str(name)[:60]!r}"
 
 
+def has_closed_cloud(state: SurfaceState) -> bool:
+    """Whether cloud closes the sky over a road: as long as it falls, and over what never falls, such as ice.
+
+    Parameters
+    ----------
+    state : of the road
+    """
+    kind = find_weather(state.kind)
+    return kind.overcast and (kind.rate_limit is None or state.precipitation_mm_h > 0)
+
+
 def find_weather(name: str) -> WeatherKind:
     """The row of a kind of weather.
 
@@ -331,7 +344,7 @@ def surface_state(weather: Weather, parameters: SurfaceParameters) -> SurfaceSta
     coverage = min(1.0, snow / parameters.full_cover_depth_mm)
     return SurfaceState(
         kind=kind.name,
-        precipitation_mm_h=weather.precipitation_mm_h if kind.rate_limit else 0.0,
+        precipitation_mm_h=weather.precipitation_mm_h if kind.rate_limit and weather.falling else 0.0,
         film_depth_mm=film,
         snow_depth_mm=snow,
         snow_coverage=coverage,

@@ -78,10 +78,10 @@ def compute_climb(station: float, climb: Climb) -> float:
     last = len(known) - 1
     if last < 0:
         return 0.0
-    place = min(max(station / climb.spacing, 0.0), float(last))
-    before = min(int(place), max(last - 1, 0))
+    position = min(max(station / climb.spacing, 0.0), float(last))
+    before = min(int(position), max(last - 1, 0))
     after = min(before + 1, last)
-    return float(known[before] + (place - before) * (known[after] - known[before]))
+    return float(known[before] + (position - before) * (known[after] - known[before]))
 
 
 def make_road_feature(hazard: RoadHazard) -> RoadFeature:

@@ -16,14 +16,13 @@ from tasks.vehicle.brake import BrakeCommand
 from tasks.vehicle.history import History
 from tasks.vehicle.model.brake_input import make_command_input
 from tasks.vehicle.model.chassis import Conditions
-from tasks.vehicle.model.simulation import COLUMNS, Recording, Simulation, simulate
+from tasks.vehicle.model.simulation import COLUMNS, INTERNAL_STEP_S, Recording, Simulation, simulate
 from tasks.vehicle.paper.low_speed import SteadyStop
 from tasks.vehicle.paper.paper_mode import StepGrid, run_paper_mode, sample_history
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle, compute_surface_response
 
 Mode = Literal["paper", "coupled"]
 MODES: tuple[Mode, ...] = ("paper", "coupled")
-INTERNAL_STEP_S = 0.0005
 TICK_NS = 1_000_000
 
 
@@ -242,7 +241,8 @@ def compute_peaks(columns: Mapping[str, NDArray[Any]]) -> dict[str, float]:
     scale = np.minimum(columns["abs_scale_f"], columns["abs_scale_r"])
     acts = np.where(np.isnan(scale), np.nan, scale < 1)
     return {
-        "peak_deceleration": float(np.maximum(0.0, np.max(-acceleration))),
+        # 0 has no sign: a car that never slows down has the same figure in every file
+        "peak_deceleration": 0.0 + float(np.maximum(0.0, np.max(-acceleration))),
         "peak_pitch_rate": float(np.max(np.abs(pitch_rate))),
         "abs_time": float(np.sum(acts)) * TICK_NS / 1e9,
         "peak_slip": float(np.max(slip)),

@@ -10,10 +10,11 @@ import pytest
 import yaml
 
 from catalogs.entries import CATALOGUE, find_entry, load
-from catalogs.learned_judges import load_judges
 from catalogs.vehicles.frozen import frozen_text
 from catalogs.weather.grip import WEATHER, WeatherFolder
 from catalogs.weather.look import load_weather
+from studies.closing_benchmark.truths import load_sizes, load_truths
+from studies.evaluation.learned_judges import load_judges
 from tasks.errors import InputError
 
 Change = Callable[[Any], None]
@@ -32,19 +33,6 @@ Change = Callable[[Any], None]
         ),
         ("library of effects", None, lambda c: c[7].update(matters=0), "7.matters"),
         ("set of decision rules", None, lambda c: c["spike_width"].update(value=2), "spike_width"),
-        ("list of truths", None, lambda c: c["library"].update(magic={"a": 1}), "magic: the library"),
-        (
-            "list of truths",
-            None,
-            lambda c: c["outside"]["strut_step"].update(at=[0, 1]),
-            "outside.strut_step: value must have one number for each of at",
-        ),
-        (
-            "list of truths",
-            None,
-            lambda c: c["outside"]["strut_step"].update(at=[0, 0, 1, 2, 4]),
-            "outside.strut_step: at must ascend in equal steps",
-        ),
         (
             "calibration procedure",
             "coupled-grown",
@@ -78,8 +66,8 @@ def test_a_broken_rule_is_named_with_its_place(
     "read",
     [
         partial(load, "library of effects"),
-        partial(load, "list of truths"),
-        partial(load, "list of sizes"),
+        load_truths,
+        load_sizes,
         partial(load, "vehicle"),
         partial(load, "channel map"),
         load_judges,

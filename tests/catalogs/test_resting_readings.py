@@ -16,16 +16,25 @@ def folder(tmp_path: Path) -> Path:
 
 def test_what_a_gauge_reads_at_rest_in_all_runs_alike_is_its_zero(folder: Path) -> None:
     before = read_campaign(folder)
-    assert before.brake_rest == 0.0
+    assert before.brake_rest == 0.0 and not before.resting_gauge
     for number, name in enumerate(NAMES):
         columns = braking_columns(number)
         write_run(folder, name, columns | {"brake_pressure": columns["brake_pressure"] + 0.08})
     after = read_campaign(folder)
-    assert after.brake_rest == pytest.approx(0.08, abs=0.005)
+    assert after.brake_rest == pytest.approx(0.08, abs=0.005) and not after.resting_gauge
     for one, other in zip(before.runs, after.runs, strict=True):
         assert other.pressure[200:] == pytest.approx(one.pressure[200:], abs=0.01)
     change_header(folder, lambda h: h.update(brake_stands_for="a signal in N m"))
     assert read_campaign(folder).brake_rest == 0.0
+
+
+def test_a_gauge_that_drifts_from_run_to_run_has_no_zero_and_the_sentence_of_its_check(folder: Path) -> None:
+    for number, name in enumerate(NAMES):
+        columns = braking_columns(number)
+        write_run(folder, name, columns | {"brake_pressure": columns["brake_pressure"] + 0.02 * number})
+    drifting = read_campaign(folder)
+    assert drifting.brake_rest == 0.0
+    assert "MPa (run-06) while the car does not brake" in drifting.resting_gauge
 
 
 def test_a_command_that_idles_above_0_is_counted_from_there(folder: Path) -> None:

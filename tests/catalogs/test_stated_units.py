@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from catalogs.references import TRACE_UNITS, read_reference
-from flows.judging.foreign import read_claim
+from studies.foreign_video.judge import read_claim
 from studies.measured_drives.drives import read_drives
 from tasks.campaign.channels import COLUMN_UNITS
 from tasks.errors import InputError

@@ -9,10 +9,10 @@ import pytest
 
 import musync
 from flows.auditing.explain import explain_frame
+from flows.auditing.physics import audit_physics
 from flows.driving import policy as policies
 from flows.driving.drive import drive_grid
 from flows.driving.simulator import Simulator
-from flows.judging.physics import audit_physics
 from flows.store.layout import Layout
 from flows.store.sealed import read_manifest
 from tasks.driving.targets import TargetTrack

@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
+from studies.evaluation.metrics.no_reference import piqe, temporal_error
 from studies.synthetic_street import Clip
-from tasks.eval.no_reference import piqe, temporal_error
 
 
 def make_noise(frames: np.ndarray, deviation: float) -> np.ndarray:

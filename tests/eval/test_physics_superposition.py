@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flows.judging.physics import clip_columns, clip_facts
-from flows.judging.physics_constants import read_constants
+from flows.auditing.physics import clip_columns, clip_facts
+from flows.auditing.physics_constants import read_constants
 from flows.making.generate import generate_dataset
 from tasks.eval.physics import body
 from tasks.eval.physics.audit import audit_clip

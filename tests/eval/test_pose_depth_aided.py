@@ -13,7 +13,7 @@ from tasks.eval.poses.motion import RecoveredMotion
 from tasks.eval.poses.photometric import recover_motion_photometric
 from tasks.eval.poses.pnp import recover_motion_pnp
 from tests.eval.scoring import pitch_rmse_deg, progress_rmse
-from tests.eval.weathering import add_flakes, add_noise, code_as_jpeg, fade_pictures
+from tests.eval.weathering import add_flakes, add_noise, add_veil, code_as_jpeg, fade_pictures
 
 Check = Callable[..., RecoveredMotion]
 CLEAR_DEG = {"pnp": 0.02, "photometric": 0.01}
@@ -93,6 +93,12 @@ def test_weather_and_codec_at_most_double_the_allowance(
     assert not seen.failed.any()
     assert pitch_rmse_deg(seen, cut) < 2 * SMALL_DEG[method]
     assert progress_rmse(seen, cut) < 0.02
+
+
+def test_a_veil_that_thins_as_things_come_nearer_is_no_motion(full_clip: Clip) -> None:
+    veiled = add_veil(full_clip.frames, full_clip.depth, full_clip.K, 0.01, 0.88)
+    seen = recover_motion(recover_motion_pnp, full_clip, frames=veiled)
+    assert pitch_rmse_deg(seen, full_clip) < 0.004
 
 
 def test_one_picture_repeated_is_a_car_that_stands_with_particles_or_without(

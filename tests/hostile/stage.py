@@ -15,17 +15,17 @@ import musync
 from flows.auditing.audit import audit_dataset
 from flows.auditing.dataset_diff import compare_datasets
 from flows.auditing.explain import explain_frame
+from flows.auditing.physics import audit_physics
 from flows.auditing.repair import repair_dataset
 from flows.auditing.signing import sign_dataset
 from flows.auditing.verify import collect_garbage, verify_dataset
-from flows.judging.physics import audit_physics
 from flows.making.generate import generate_dataset
 from flows.reading.describe import describe_dataset
 from flows.reading.previews import make_films
 from flows.reading.query import query_dataset
 from flows.reading.report import make_report
-from flows.reading.sheets import draw_sheets
 from flows.store.layout import Layout
+from studies.paper.sheets import draw_sheets
 from tasks.errors import InputError
 
 SECONDS = 60

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from catalogs.learned_judges import load_judges
+from studies.evaluation.learned_judges import load_judges
 from tasks.errors import InputError
 
 torch = pytest.importorskip("torch")

@@ -23,7 +23,6 @@ import psutil
 import pytest
 
 from flows.running.prefect_server import set_up_prefect
-from flows.scheduled.serving import OPTIONS, read_options
 from manifests.provenance import SOURCE_ROOT
 from tasks.errors import InputError
 from tests.hostile.other_user import run_as_other
@@ -169,13 +168,3 @@ def test_a_home_of_somebody_else_is_refused(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="must be a folder of your own"):
         set_up_prefect()
     assert not any((tmp_path / "theirs").iterdir())
-
-
-@pytest.mark.parametrize(
-    "given", [{"notify": "touch pwned"}, {"notify_on": "done"}, {"scheduler": "tcp://evil:1"}]
-)
-def test_what_a_run_says_of_its_own_sets_no_command(monkeypatch, given):
-    monkeypatch.delenv(OPTIONS, raising=False)
-    assert read_options(given)["notify"] is None
-    monkeypatch.setenv(OPTIONS, json.dumps({"notify": "true", "notify_on": "failed", "scheduler": None}))
-    assert read_options(given) == {"notify": "true", "notify_on": "failed", "scheduler": None}

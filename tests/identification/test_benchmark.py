@@ -21,6 +21,7 @@ from studies.closing_benchmark.summary import (
     summarise_benchmark,
 )
 from studies.closing_benchmark.synthetic import TRAINING, make_synthetic_campaign
+from studies.closing_benchmark.truths import load_sizes, load_truths
 
 ROOT = Path(closing_benchmark.__file__).parents[2]
 VEHICLE, SURFACE = load("vehicle", "paper-reference"), load("surface", "dense-asphalt")
@@ -84,12 +85,12 @@ def test_a_benchmark_goes_on_where_it_was_stopped_and_starts_anew_with_another_e
     result = closing_benchmark.close_loop_benchmark(out=str(tmp_path), seeds=2, nulls=4, harder=1)
     seeds = [row["seed"] for row in result["campaigns"]]
     assert len(judged) == len(seeds) + 1 and len(set(seeds)) == len(seeds)
-    library = [truth for truth in load("list of truths") if truth.in_library]
+    library = [truth for truth in load_truths() if truth.in_library]
     harder = 3 * len(library)  # as many pairs as truths, and each truth and a null on the poor design
-    assert len(seeds) == 4 + 2 * len(load("list of truths")) + 2 * len(load("list of sizes")) + harder
+    assert len(seeds) == 4 + 2 * len(load_truths()) + 2 * len(load_sizes()) + harder
     # round by round: no truth has its second campaign before all have their first
     order = [row["truth"] for row in result["campaigns"] if row["kind"] in ("library", "outside")]
-    assert order[: len(load("list of truths"))] == [t.name for t in load("list of truths")]
+    assert order[: len(load_truths())] == [t.name for t in load_truths()]
     tables = (tmp_path / "closing-benchmark.md").read_text()
     assert "| false discoveries on nulls | 0 | 4 of 4 |" in tables
     assert "| brake_fade | fade 0.005 | 2 of 2 | 1.00 |" in tables

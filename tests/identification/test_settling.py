@@ -76,31 +76,36 @@ def test_values_are_known_as_well_as_the_signature_where_runs_disagree_with_the_
 
 
 @pytest.mark.parametrize(
-    ("fall", "names"),
+    ("name", "port", "fall", "names"),
     [
-        (0.0, [{"retuned_friction_level"}]),
-        (12.0, [{"retuned_friction_level"}, {"form friction(speed)"}]),
-        (60.0, [{"form friction(speed)"}]),
+        ("retuned_friction_level", "friction", 0.0, [{"retuned_friction_level"}]),
+        ("retuned_friction_level", "friction", 12.0, [{"retuned_friction_level"}, {"form friction(speed)"}]),
+        ("retuned_friction_level", "friction", 60.0, [{"form friction(speed)"}]),
+        ("retuned_pitch_gain", "pitch_moment", 60.0, [{"form pitch_moment(speed)"}]),
+        ("retuned_pressure_gain", "brake_torque", 60.0, [{"retuned_pressure_gain"}]),
     ],
 )
 def test_a_number_of_the_file_is_held_against_a_form_of_its_port_through_the_simulation(
-    monkeypatch, fall, names
+    monkeypatch, name, port, fall, names
 ):
-    """The runs show 3 and 2.2 where the number says one value; the last fit with the form has a misfit less by fall."""
-    level = effect_of("retuned_friction_level", 0)
-    form = form_of("friction", "speed", (1, 2), log_prior=-5.0)
+    """The runs show 3 and 2.2 where the number says one value; the last fit with the form has a misfit less by fall.
+
+    No run has a disturbance of its own at the brake.
+    """
+    level = effect_of(name, 0)
+    form = form_of(port, "speed", (1, 2), log_prior=-5.0)
     designs = [np.array([[3.0, 3.0, 0.0], [3.0, 0.0, 3.0]])] * 4
     grams = grams_of([level, form], designs, [np.array([9.0, 6.6])] * 4)
 
     def fit(finding, opened):
         varies = opened.named[0] is form
         part = SimpleNamespace(
-            name=opened.named[0].name, effect_class="form" if varies else "retune", port="friction", names=("a",),
+            name=opened.named[0].name, effect_class="form" if varies else "retune", port=port, names=("a",),
             lower=(-9.0,), upper=(9.0,), units=("1",),
         )  # fmt: skip
         return SimpleNamespace(
             parts=(part,), values=np.array([2.8]), covariance=np.array([[0.01]]), scatter=np.zeros(9),
-            session=np.zeros(8), session_sigma=np.full(8, 0.01), session_error=np.zeros(8), pulls=np.zeros(8),
+            session=np.full(8, 2.8), session_sigma=np.full(8, 0.01), session_error=np.zeros(8), pulls=np.zeros(8),
             objective=-fall if varies else 0.0,
         )  # fmt: skip
 

@@ -5,7 +5,7 @@ from math import isnan
 
 import pytest
 
-from catalogs.scenario import SCENARIO_FIELDS, Scenario
+from catalogs.scenario import OPTIONAL_FIELDS, SCENARIO_FIELDS, Scenario
 from manifests.siblings import ALL_PAIRS_UP_TO, CONTROLS, iterate_pairs
 from tasks.conventions import PAIR_CHANNELS
 
@@ -21,7 +21,7 @@ RAIN = {"weather": "rain", "precipitation_mm_h": 50.0}
 
 def test_every_field_of_a_scenario_belongs_to_exactly_one_control():
     held = sorted(name for names in CONTROLS.values() for name in names)
-    assert held == sorted((*SCENARIO_FIELDS, "scene", "objects"))
+    assert held == sorted((*SCENARIO_FIELDS, *OPTIONAL_FIELDS, "objects"))
 
 
 def test_a_pair_differs_in_one_control_and_carries_b_minus_a():

@@ -42,12 +42,6 @@ def test_vehicles_stand_side_by_side_to_the_last_digit_the_papers_first() -> Non
             assert float(rows[number][column]) == entry.value, f"{name} {number}"
 
 
-def test_every_grid_has_its_section() -> None:
-    assert re.findall(r"^## (\S+)$", PAGES["grids.md"], flags=re.M) == list(entry_names("grid"))
-    assert "15 clips of 8 s, 81 frames at 10 Hz" in PAGES["grids.md"]
-    assert "| `initial_speed_km_h` | 60, 40 | km h-1 |" in PAGES["grids.md"]
-
-
 def test_what_a_source_says_is_text_and_its_doi_leads_to_the_work() -> None:
     doi = "doi:10.1175/1520-0469(1948)005<0165:TDORWS>2.0.CO;2"
     cell = format_cell(f"a_b *c* [d] | <e>, {doi}, 1 % `x_y|z`")

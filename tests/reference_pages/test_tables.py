@@ -6,11 +6,10 @@ import yaml
 
 from catalogs.entries import find_entry
 from catalogs.grids import GridFile
-from catalogs.scenario import SCENARIO_FIELDS, Scenario, find_range_problems, list_ranges
+from catalogs.scenario import OPTIONAL_FIELDS, SCENARIO_FIELDS, Scenario, find_range_problems, list_ranges
 from flows.registry import COMMANDS
-from reference_pages import commands, effects, fmu, grids
+from reference_pages import commands, effects, grids
 from tasks.vehicle.effects.table import PARAMETERS
-from tasks.vehicle.model.embedded_variables import INPUTS
 
 
 def rows_of(table: str) -> dict[str, list[str]]:
@@ -52,13 +51,9 @@ def test_every_key_of_a_grid_has_its_row_with_the_default_that_the_reader_takes(
 
 def test_a_number_of_a_scenario_may_reach_the_ends_of_its_range_and_go_no_further() -> None:
     rows = rows_of(grids.write_field_table())
-    assert {*rows} == {*SCENARIO_FIELDS, "scene", "objects"}
+    assert {*rows} == {*SCENARIO_FIELDS, *OPTIONAL_FIELDS, "objects"}
     assert rows["precipitation_mm_h"][:3] == ["0", "mm h-1", "rain: 0 to 1872, snow: 0 to 50"]
     for name, (least, most) in list_ranges().items():
         beyond = {most: most * 1.001} | ({} if least is None else {least: least - 0.001})
         assert [find_range_problems(Scenario(**{name: end})) for end in beyond] == [[]] * len(beyond), name
         assert all(find_range_problems(Scenario(**{name: value})) for value in beyond.values()), name
-
-
-def test_every_input_of_an_fmu_has_its_row() -> None:
-    assert list(rows_of(fmu.write_input_table())) == [row.name for row in INPUTS]

@@ -36,14 +36,6 @@ def test_every_number_of_a_decision_stands_on_the_page_with_meaning_and_reason()
         assert reason == format_cell(entry["source"])
 
 
-def test_every_effect_has_the_size_that_matters_and_why() -> None:
-    rows = rows_of("Sizes that matter")
-    for effect in yaml.safe_load(find_entry("library of effects").read_text()):
-        number, size, _, reason = rows[effect["name"]]
-        assert [number, size] == [f"`{effect['parameters'][0]}`", format_cell(effect["matters"])]
-        assert reason == format_cell(effect["because"])
-
-
 def test_every_table_is_asked_for_once_and_none_that_is_not_there() -> None:
     asked = [name for page in DOCS.rglob("*.md") for name in ASKED.findall(page.read_text())]
     assert sorted(asked) == sorted(TABLES)

@@ -95,6 +95,21 @@ def test_sky_share_in_mid_street_is_the_closed_form() -> None:
     assert share[0] == pytest.approx(np.cos(np.arctan(2 * 12.0 / width)), rel=1e-9)
 
 
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_facade_sees_the_sky_above_the_row_across_the_street(side: int) -> None:
+    # view factor of a half plane above an angle, for a wall that faces it: (1 - sin) / 2
+    width = LAYOUT.front_position(1) - LAYOUT.front_position(-1)
+    wall = np.array([[50.0, LAYOUT.front_position(side), 3.0]])
+    share = sky_share(wall, np.array([[0.0, -side, 0.0]]), LAYOUT)
+    assert share[0] == pytest.approx((1 - np.sin(np.arctan((12.0 - 3.0) / width))) / 2, rel=1e-9)
+
+
+def test_a_row_of_houses_hides_no_sky_from_open_ground_behind_it() -> None:
+    field = np.array([[50.0, LAYOUT.front_position(1) + 40.0, 0.0]])
+    behind = sky_share(field, np.array([[0.0, 0.0, 1.0]]), LAYOUT)
+    assert behind[0] > 0.9
+
+
 def test_sky_share_above_the_roofs_is_whole_and_half() -> None:
     high = np.array([[50.0, 0.0, 30.0]] * 3)
     normals = np.array([[0.0, 0, 1], [0, 1, 0], [0, 0, -1]])

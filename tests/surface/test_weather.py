@@ -104,3 +104,27 @@ def test_no_number_of_the_pavement_is_left_out():
     whole = load("wet friction").apply(ASPHALT)
     assert all(value == value for name, value in vars(whole).items() if name != "bounds")
     assert set(ASPHALT.bounds) <= {field.name for field in fields(SurfaceParameters)}
+
+
+@pytest.mark.parametrize("kind", ["rain", "snow"])
+def test_precipitation_that_has_ended_leaves_the_road_and_its_grip_as_they_were(kind):
+    falling = weather_of(sound(kind))
+    during, after = (surface_state(replace(falling, falling=now), ASPHALT) for now in (True, False))
+    assert during.precipitation_mm_h > after.precipitation_mm_h == 0
+    assert replace(during, precipitation_mm_h=0.0) == after
+
+
+def test_what_never_fell_cannot_have_ended_and_skies_must_fit_what_falls():
+    def problems(kind, **given):
+        return find_scenario_problems(replace(sound(kind), **given))
+
+    assert len(problems("dry", falling=False)) == len(problems("ice", falling=False)) == 1
+    assert len(problems("rain", sky="clear")) == 1
+    assert problems("rain", sky="overcast") == problems("rain", sky="clear", falling=False) == []
+    assert (
+        len(problems("dry", sun_azimuth_deg=90.0))
+        == len(problems("dry", sky="overcast", sun_azimuth_deg=9.0))
+        == 1
+    )
+    assert problems("dry", sky="haze", sun_azimuth_deg=90.0, sun_elevation_deg=5.0) == []
+    assert len(problems("dry", sky="haze", sun_azimuth_deg=361.0, sun_elevation_deg=0.5)) == 2

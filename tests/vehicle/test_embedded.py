@@ -7,8 +7,9 @@ import pytest
 
 from tasks.surface.road_profile import RoadHazard
 from tasks.vehicle.model.brake_input import compute_input_pressure, make_trace_input
-from tasks.vehicle.model.embedded import STEP, count_held_samples
+from tasks.vehicle.model.embedded import count_held_samples
 from tasks.vehicle.model.embedded_variables import INPUTS, OUTPUTS
+from tasks.vehicle.model.simulation import INTERNAL_STEP_S
 from tasks.vehicle.parameters import interpolate_knots
 from tasks.vehicle.road import RoadLine, compute_road_height, compute_road_slope, make_road_feature
 
@@ -50,7 +51,7 @@ def test_every_variable_has_a_place_of_its_own_and_parameters_come_first():
 @pytest.mark.parametrize("dead_time", [0.0, 0.0004, 0.0005, 0.0337])
 def test_the_samples_that_are_held_reach_back_to_the_dead_time(vehicle, dead_time):
     held = count_held_samples(replace(vehicle, effects={"dead_time": dead_time}))
-    assert dead_time <= (held - 2) * STEP <= dead_time + 2 * STEP
+    assert dead_time <= (held - 2) * INTERNAL_STEP_S <= dead_time + 2 * INTERNAL_STEP_S
 
 
 def test_a_weather_without_a_tyre_family_is_none_of_a_vehicles(vehicle):

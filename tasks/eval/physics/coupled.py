@@ -216,7 +216,7 @@ def _compute_axle(
         vertical=load - tilt * force * slope,
         tyre_force=np.where(moves, grip(kappa), rest),
         torque=np.where(moves, torque, radius * force),
-        torque_error=_doubt_line(line, facts, constants) * gain,
+        torque_error=_bound_line_error(line, facts, constants) * gain,
         spin=spin, hidden=hidden, linked=linked + bound_lateral_hold(load, travel, v, curve.peak, constants.effects),
         strut=strut - links if axle == "f" else strut + links,
         strut_error=(damper * (1.0 + abs(e("damper_asymmetry", 0.0))) + dry) * rate_error,
@@ -229,8 +229,8 @@ def _compare_with_reference(v: Floats, facts: Mapping[str, Any], constants: Cons
     if facts["weather"] not in WET or not grips_by_speed(surface):
         return np.ones(len(v))
     film = facts["film_depth_mm"]
-    told = compute_wet_friction(surface["wet_reference_speed"], film, surface)
-    return compute_wet_friction(v, film, surface) / told
+    reference = compute_wet_friction(surface["wet_reference_speed"], film, surface)
+    return compute_wet_friction(v, film, surface) / reference
 
 
 def _drag_shaft(ticks: Mapping[str, Floats], moves: NDArray[np.bool_], constants: Constants) -> Floats:
@@ -240,7 +240,7 @@ def _drag_shaft(ticks: Mapping[str, Floats], moves: NDArray[np.bool_], constants
     return np.where(moves, torque, 0.0)
 
 
-def _doubt_line(line: Floats, facts: Mapping[str, Any], constants: Constants) -> Floats:
+def _bound_line_error(line: Floats, facts: Mapping[str, Any], constants: Constants) -> Floats:
     """Error of the pressure at the pads: none where it is recorded, else an inner step's where the onset is a place."""
     if not (constants.effects.get("dead_time") or constants.effects.get("lag")):
         return np.zeros(len(line))
@@ -258,8 +258,8 @@ def _act_on_pads(ticks: Mapping[str, Floats], facts: Mapping[str, Any], constant
         return ticks["brake_pressure_mpa"]
     time = INNER_STEP * np.arange(2 * len(ticks["speed"]) - 1, dtype=np.float64)
     if constants.policy:
-        told = ticks["brake_pressure_mpa"]
-        commanded = np.interp(time - dead, DT * np.arange(len(told)), told)
+        recorded = ticks["brake_pressure_mpa"]
+        commanded = np.interp(time - dead, DT * np.arange(len(recorded)), recorded)
         return delay_pressure(commanded, INNER_STEP, constants.effects)[::2]
     commanded = pressure_at(time - find_brake_onset(ticks, facts) - dead, *pressure_shape(facts))
     return delay_pressure(commanded, INNER_STEP, constants.effects)[::2]

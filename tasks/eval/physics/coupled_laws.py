@@ -28,7 +28,7 @@ FEWEST = 20
 AROUND = 20
 """Ticks about a row whose largest force an error of second order of the inner step follows: a quarter of a hop [1]."""
 SLIGHT = 5e-4
-"""Share of the clip's largest force that is always in doubt [1]."""
+"""Share of the clip's largest force that is always unknown [1]."""
 EDGE = 4
 """Ticks at either end where differences know the axle's rate less well [1]."""
 STATES = "heave pitch heave_rate pitch_rate unsprung_heave_f unsprung_heave_r"
@@ -57,7 +57,7 @@ def coupled_laws(
 
 def integral_law(
     name: str, columns: str, values: Floats, rate: Floats, hits: NDArray[np.bool_], *,
-    rows: NDArray[np.bool_] | None = None, doubt: Floats | float = 0.0, floor: float = 0.0,
+    rows: NDArray[np.bool_] | None = None, uncertainty: Floats | float = 0.0, floor: float = 0.0,
 ) -> Law | None:  # fmt: skip
     """Return the law that a column changes over each tick by the integral of its rate.
 
@@ -67,13 +67,13 @@ def integral_law(
     values, rate : [N] the column and its rate at the ticks [any, any/s]
     hits : [N] ticks about which the rate may jump to and fro
     rows : [N - 1] intervals that are judged; None for all
-    doubt : [N] largest error of the rate itself [any/s]
+    uncertainty : [N] largest error of the rate itself [any/s]
     floor : rounding of the column [any]
     """
     inner, gained = np.concatenate([rate[:1], rate, rate[-1:]]), _integrate(rate)
     bend = spread(np.abs(np.diff(inner, 2)), 2)
     bend = bend + np.where(hits, spread(np.abs(np.diff(rate, prepend=rate[:1])), 3), 0.0)
-    unsure = HIDDEN * bend + spread(np.broadcast_to(doubt, rate.shape), 1)
+    unsure = HIDDEN * bend + spread(np.broadcast_to(uncertainty, rate.shape), 1)
     unsure = np.where(hits, 4.0, 1.0) * unsure
     tolerance = DT * np.maximum(unsure[1:], unsure[:-1]) + floor
     tolerance = tolerance + 1e-9 * DT * np.abs(rate).max() + 1e-12 * np.abs(values).max()
@@ -157,7 +157,7 @@ def _axle_laws(
     ]  # fmt: skip
 
 
-def _doubt_rate(acceleration: Floats, unsure: Floats) -> Floats:
+def _bound_rate_change(acceleration: Floats, unsure: Floats) -> Floats:
     """Largest change of a rate that a tick can hide, where its own rate jumps or is unsure, [N]."""
     return DT * (0.5 * spread(np.abs(np.diff(acceleration, prepend=acceleration[:1])), 1) + unsure)
 
@@ -202,10 +202,10 @@ def _motion_laws(
         evaluate_law("station starts at zero", "station", s[:1], 1e-9),
         evaluate_law("speed starts as commanded", "speed clips.initial_speed_km_h", v[:1] - start, 1e-9),
         integral_law("station is the integral of speed", "station speed", s, v, forces.hits, rows=rolls,
-            doubt=_doubt_rate(a, forces.hidden / constants.mass), floor=1e-10),
+            uncertainty=_bound_rate_change(a, forces.hidden / constants.mass), floor=1e-10),
         evaluate_law("station rests with the car", "station speed", np.diff(s)[~moves[:-1]], 1e-9),
         integral_law("speed is the integral of acceleration", "speed longitudinal_acceleration", v, a, forces.hits,
-            rows=rolls, doubt=forces.hidden / constants.mass),
+            rows=rolls, uncertainty=forces.hidden / constants.mass),
         evaluate_law(SUM, "longitudinal_acceleration tyre_force_f tyre_force_r road_force speed",
             a - forces.acceleration, rounding_tolerance(a, force / constants.mass, road / constants.mass)),
         evaluate_law("road force of load and slope", "road_force tyre_load_f tyre_load_r station"
@@ -230,11 +230,11 @@ def _body_laws(ticks: Mapping[str, Floats], forces: Forces, constants: Constants
     z, theta, dz, dtheta = (ticks[name] for name in ("heave", "pitch", "heave_rate", "pitch_rate"))
     laws = [
         integral_law("heave is the integral of its rate", "heave heave_rate", z, dz, hits,
-            doubt=_doubt_rate(forces.heave, unsure_heave), floor=1e-12),
+            uncertainty=_bound_rate_change(forces.heave, unsure_heave), floor=1e-12),
         integral_law("pitch is the integral of its rate", "pitch pitch_rate", theta, dtheta, hits,
-            doubt=_doubt_rate(forces.pitch, unsure_pitch), floor=1e-12),
-        integral_law(HEAVE, f"heave_rate {STATES}", dz, forces.heave, hits, doubt=unsure_heave, floor=1e-11),
-        integral_law(PITCH, f"pitch_rate {STATES} {loads}", dtheta, forces.pitch, hits, doubt=unsure_pitch,
+            uncertainty=_bound_rate_change(forces.pitch, unsure_pitch), floor=1e-12),
+        integral_law(HEAVE, f"heave_rate {STATES}", dz, forces.heave, hits, uncertainty=unsure_heave, floor=1e-11),
+        integral_law(PITCH, f"pitch_rate {STATES} {loads}", dtheta, forces.pitch, hits, uncertainty=unsure_pitch,
             floor=1e-11),
         evaluate_law("body starts at rest", "heave pitch heave_rate pitch_rate",
             np.array([ticks[name][0] for name in ("heave", "pitch", "heave_rate", "pitch_rate")]), 1e-12),
@@ -247,7 +247,7 @@ def _body_laws(ticks: Mapping[str, Floats], forces: Forces, constants: Constants
         laws.append(
             integral_law(f"{AXLE}, {axle}", f"heave_rate unsprung_heave_{axle} axle_load_{axle} {STATES}", at.rate,
                 push, hits, rows=inner, floor=1e-9,
-                doubt=(at.strut_error + at.linked) / mass + 2 * at.rate_error / DT
+                uncertainty=(at.strut_error + at.linked) / mass + 2 * at.rate_error / DT
                 + hops * spread(np.abs(push), AROUND) + SLIGHT * np.abs(push).max())
         )  # fmt: skip
     return laws

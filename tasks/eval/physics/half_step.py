@@ -64,7 +64,7 @@ def follow_half_step(ticks: Mapping[str, Floats], facts: Mapping[str, Any], cons
     pressure = pressure_at(time - find_brake_onset(ticks, facts), *pressure_shape(facts))
     hump = facts["hazard_center_m"], facts["hazard_length_m"], facts["hazard_height_m"]
     analytic = constants.mode == "paper" and hump[2] == 0.0
-    forward, rates, changes, doubts = np.zeros(len(speed)), {}, {}, {}
+    forward, rates, changes, uncertainties = np.zeros(len(speed)), {}, {}, {}
     climb, later_climb, open_climb = find_climb(ticks, constants)
     slowest = find_slowest_explicit_speed(facts, constants, INNER_STEP)
     first, second = (np.flatnonzero((at < slowest) & (v[1:] > 0) & (v[:-1] > 0)) for at in (speed, v[1:]))
@@ -80,7 +80,9 @@ def follow_half_step(ticks: Mapping[str, Floats], facts: Mapping[str, Any], cons
         load = ticks[f"tyre_load_{axle}"]
         between = 0.5 * (load[1:] + load[:-1])
         bend = np.abs(np.diff(load, 2, prepend=load[:1], append=load[-1:]))
-        doubts[axle] = m * car["cg_height"] / L * open_climb if analytic else np.maximum(bend[1:], bend[:-1])
+        uncertainties[axle] = (
+            m * car["cg_height"] / L * open_climb if analytic else np.maximum(bend[1:], bend[:-1])
+        )
         if analytic:
             lever = car["cg_to_rear_axle" if axle == "f" else "cg_to_front_axle"]
             between = m / L * (car["gravity"] * lever + sign * (a + climb)[:-1] * car["cg_height"])
@@ -98,7 +100,7 @@ def follow_half_step(ticks: Mapping[str, Floats], facts: Mapping[str, Any], cons
         acceleration=np.where(held, 0.0, forward / m - car["coast_deceleration"] - later_climb),
         rate=rates,
         change=changes,
-        load_uncertainty=doubts,
+        load_uncertainty=uncertainties,
     )
 
 

@@ -1,7 +1,8 @@
 """Pose check by points: track corners from frame to frame, place each camera by their rendered depth.
 
 The earlier frame is first warped to the place where the later one is expected, so that the tracker meets small
-shifts and no change of scale. The tracker measures the pixels, not the expectation.
+shifts and no change of scale. The tracker measures the pixels, not the expectation. It reads pictures of even contrast,
+since a surface that comes nearer loses veil.
 """
 
 from dataclasses import dataclass, replace
@@ -15,6 +16,7 @@ from tasks.eval.poses.corners import (
     Tracks,
     cell_size,
     corner_strength,
+    even_contrast,
     grid_corners,
     least_strength,
     merge_tracks,
@@ -58,6 +60,7 @@ class PnpSettings:
     followed : share of corners that come back below which a failure says that too little can be followed: .02 to .08
         under flakes that tear the points apart, .3 and more with the depth of other pictures [1]
     noise_floor, noise_ceiling : smallest assumed tracking error, and largest error of a valid track [px]
+    least_contrast : standard deviation of a patch that noise alone may have, 8-bit [1]
     depth_error : relative standard error of the rendered depth [1]
     link_span : frames that the longer steps beside the chain span [1]
     link_stride : frames between their starts [1]
@@ -80,6 +83,7 @@ class PnpSettings:
     followed: float = 0.2
     noise_floor: float = 0.01
     noise_ceiling: float = 2.0
+    least_contrast: float = 2.0
     depth_error: float = 0.01
     link_span: int = 4
     link_stride: int = 2
@@ -87,9 +91,11 @@ class PnpSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class _Frame:
-    """One frame: grey levels [H, W] [1], inverse depth [H, W] [1/m] and its corners on smooth surfaces [N, 2] [px]."""
+    """One frame: grey levels [H, W] and the same of even contrast [1], inverse depth [H, W] [1/m] and its corners on
+    smooth surfaces [N, 2] [px]."""
 
     grey: NDArray[np.uint8]
+    evened: NDArray[np.uint8]
     inverse_depth: NDArray[np.float32]
     corners: NDArray[np.int64]
 
@@ -102,12 +108,13 @@ class _WarpedAnchor:
     ----------
     T_anchor_frame : float64 [4, 4] that place [m]
     source : float32 [H, W, 2] where each pixel lies in the anchor's picture [px]
-    grey : uint8 [H, W] its grey levels [1]
+    grey, evened : uint8 [H, W] its grey levels, and the same of even contrast [1]
     """
 
     T_anchor_frame: Floats
     source: NDArray[np.float32]
     grey: NDArray[np.uint8]
+    evened: NDArray[np.uint8]
 
 
 def recover_motion_pnp(
@@ -146,7 +153,8 @@ def recover_motion_pnp(
         inverse_depth = invert_depth(depth[k], None if unusable is None else unusable[k])
         if k not in corners:
             corners[k] = _find_smooth_corners(grey, inverse_depth, chosen)
-        return _Frame(grey=grey, inverse_depth=inverse_depth, corners=corners[k])
+        evened = even_contrast(grey, chosen.window, chosen.least_contrast)
+        return _Frame(grey=grey, evened=evened, inverse_depth=inverse_depth, corners=corners[k])
 
     prepared = prepare_on_demand(prepare_frame)
 
@@ -230,7 +238,7 @@ def _follow_prediction(
     Returns the view it ended with, the tracks of the corners in it, and the step.
     """
     for _ in range(levels + 1):
-        view = _warp_anchor(anchor, frame, predicted, K)
+        view = _warp_anchor(anchor, frame, predicted, K, settings)
         tracks = _track_into_frame(view, frame, corners, levels, settings)
         step = _solve_tracks(anchor, frame, corners, tracks, view, K, settings)
         if (
@@ -239,13 +247,17 @@ def _follow_prediction(
         ):
             return view, tracks, step
         predicted = step.T_earlier_later
-    view = _warp_anchor(anchor, frame, predicted, K)
+    view = _warp_anchor(anchor, frame, predicted, K, settings)
     return view, _track_into_frame(view, frame, corners, levels, settings), step
 
 
-def _warp_anchor(anchor: _Frame, frame: _Frame, predicted: Floats, K: Floats) -> _WarpedAnchor:
+def _warp_anchor(
+    anchor: _Frame, frame: _Frame, predicted: Floats, K: Floats, settings: PnpSettings
+) -> _WarpedAnchor:
     source = warp_map(frame.inverse_depth, predicted, K)
-    return _WarpedAnchor(T_anchor_frame=predicted, source=source, grey=view_from(anchor.grey, source))
+    grey = view_from(anchor.grey, source)
+    evened = even_contrast(grey, settings.window, settings.least_contrast)
+    return _WarpedAnchor(T_anchor_frame=predicted, source=source, grey=grey, evened=evened)
 
 
 def _mean_shift(
@@ -261,7 +273,12 @@ def _track_into_frame(
     view: _WarpedAnchor, frame: _Frame, corners: NDArray[np.int64], levels: int, settings: PnpSettings
 ) -> Tracks:
     return track_corners(
-        view.grey, frame.grey, corners.astype(np.float32), settings.window, levels, settings.forward_backward
+        view.evened,
+        frame.evened,
+        corners.astype(np.float32),
+        settings.window,
+        levels,
+        settings.forward_backward,
     )
 
 

@@ -117,8 +117,8 @@ def build_smoothness_rows(scalars: Sequence[CalibrationScalar], procedure: Proce
     rows = []
     for i, (one, other) in enumerate(pairwise(scalars)):
         spread = procedure.bounds[one.group].smooth
-        neighbours = one.group == other.group and len(one.places) == len(other.places) == 1
-        if isfinite(spread) and neighbours and one.places[0][0] == other.places[0][0]:
+        neighbours = one.group == other.group and len(one.knots) == len(other.knots) == 1
+        if isfinite(spread) and neighbours and one.knots[0][0] == other.knots[0][0]:
             row = np.zeros(len(scalars))
             row[i], row[i + 1] = 1 / spread, -1 / spread
             rows.append(row)

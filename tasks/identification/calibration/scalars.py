@@ -21,12 +21,12 @@ class CalibrationScalar:
     ----------
     name : unique name; a knot's name holds its family and surface friction
     group : name of its group, which stages and bounds use
-    places : (family, knot) pairs that share the value; empty for a field of the vehicle itself
+    knots : (family, knot) pairs that share the value; empty for a field of the vehicle itself
     """
 
     name: str
     group: str
-    places: tuple[tuple[str, int], ...] = ()
+    knots: tuple[tuple[str, int], ...] = ()
 
 
 def list_calibration_scalars(vehicle: Vehicle, groups: Sequence[str]) -> tuple[CalibrationScalar, ...]:
@@ -73,9 +73,9 @@ def read_scalar(vehicle: Vehicle, scalar: CalibrationScalar) -> float:
     """
     if scalar.group in EFFECT_UNITS:
         return float(vehicle.effects.get(scalar.group, 0.0))
-    if not scalar.places:
+    if not scalar.knots:
         return float(getattr(vehicle, scalar.group))
-    family, knot = scalar.places[0]
+    family, knot = scalar.knots[0]
     return float(getattr(vehicle.families[family], scalar.group)[knot])
 
 
@@ -93,9 +93,9 @@ def set_scalars(vehicle: Vehicle, values: Mapping[CalibrationScalar, float]) -> 
     for scalar, value in values.items():
         if scalar.group in EFFECT_UNITS:
             effects[scalar.group] = value
-        elif not scalar.places:
+        elif not scalar.knots:
             fields[scalar.group] = value
-        for family, knot in scalar.places:
+        for family, knot in scalar.knots:
             table = list(getattr(families[family], scalar.group))
             table[knot] = value
             families[family] = replace(families[family], **{scalar.group: tuple(table)})  # type: ignore[arg-type]
@@ -119,10 +119,10 @@ def _list_knots(vehicle: Vehicle, group: str) -> list[CalibrationScalar]:
                 shared.append((family, knot))
             else:
                 name = f"{group} {family} {friction:g}"
-                scalars.append(CalibrationScalar(name=name, group=group, places=((family, knot),)))
+                scalars.append(CalibrationScalar(name=name, group=group, knots=((family, knot),)))
     if shared:
         scalars.insert(
             0,
-            CalibrationScalar(name=f"{group} {' and '.join(SHARED_HOLD)}", group=group, places=tuple(shared)),
+            CalibrationScalar(name=f"{group} {' and '.join(SHARED_HOLD)}", group=group, knots=tuple(shared)),
         )
     return scalars

@@ -30,8 +30,8 @@ def is_one_size(grams: RunGrams, explanation: Explanation, member: Candidate, sc
     size = grams.information[:, own[:, None], own] @ along @ along
     pull = grams.score[:, own] @ along - information @ (explanation.everything - grams.centre)[used]
     informed = size > INFORMED * max(float(size.max()), 1e-300)
-    weight, place = 1.0 / (1.0 / size[informed] + scatter**2), pull[informed] / size[informed]
-    left = place - float(weight @ place) / float(weight.sum())
+    weight, estimate = 1.0 / (1.0 / size[informed] + scatter**2), pull[informed] / size[informed]
+    left = estimate - float(weight @ estimate) / float(weight.sum())
     freedom = len(left) - 1
     return freedom < FEWEST - 1 or float(weight @ left**2) <= freedom + SURE * sqrt(2.0 * freedom)
 

@@ -44,7 +44,7 @@ class Candidate:
     name, effect_class, port, variable : as in the library, or of a form
     effect : of the library; None for a form
     second : value of the effect's second number; NaN where it has none, or its first value
-    columns : places in `Columns` of its derivatives
+    columns : indices in `Columns` of its derivatives
     base : place of its number among those of every explanation; -1 for a form
     slab : standard deviation of the sizes that a car may lack [unit of the number]
     lower, upper : bounds of the number [its unit]
@@ -160,13 +160,13 @@ def list_columns(
     session = splines + KNOTS * len(KEYS)
     ways: list[tuple[Effect, float, int, int]] = []
     for j, effect in enumerate(effects):
-        place = numbers.index(effect.parameters[0].name)
+        index = numbers.index(effect.parameters[0].name)
         if first[effect.parameters[0].name] == j:
-            ways.append((effect, nan, j, place))
-        ways += [(effect, value, len(effects) + i, place) for i, (at, value) in enumerate(seconds) if at == j]
+            ways.append((effect, nan, j, index))
+        ways += [(effect, value, len(effects) + i, index) for i, (at, value) in enumerate(seconds) if at == j]
     for effect in retuned:
-        place = SESSION.index(effect.parameters[0].name)
-        ways.append((effect, nan, session + place, len(numbers) + place))
+        index = SESSION.index(effect.parameters[0].name)
+        ways.append((effect, nan, session + index, len(numbers) + index))
     shares = {
         c: len({e.name for e, *_ in ways if e.effect_class == c}) for c in ("effect", "retune", "sensor")
     }
@@ -174,11 +174,11 @@ def list_columns(
     candidates = [
         Candidate(
             name=e.name, effect_class=e.effect_class, port=e.port, variable=e.variable, effect=e, second=second,
-            columns=(column,), base=place, slab=rules.slab_width * e.matters, lower=e.parameters[0].lower,
+            columns=(column,), base=index, slab=rules.slab_width * e.matters, lower=e.parameters[0].lower,
             upper=e.parameters[0].upper, matters=e.matters,
             log_prior=-log(CLASSES * shares[e.effect_class] * times[e.name]),
         )
-        for e, second, column, place in ways
+        for e, second, column, index in ways
     ]  # fmt: skip
     candidates += [
         Candidate(

@@ -40,8 +40,8 @@ def compare_explanations(
     informed = size > 0.0
     weight = np.zeros(len(size))
     weight[informed] = 1.0 / (1.0 / size[informed] + spread)
-    place = np.divide(pull, size, out=np.zeros(len(size)), where=informed)
-    by_run = weight * (0.5 - place)
+    estimate = np.divide(pull, size, out=np.zeros(len(size)), where=informed)
+    by_run = weight * (0.5 - estimate)
     total = float(by_run.sum())
     if len(by_run) >= FEWEST and total:
         # no comparison hangs on one run

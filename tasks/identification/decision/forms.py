@@ -157,8 +157,8 @@ def _find_first_samples(
 ) -> list[int | None]:
     """Return by knot the sample from which a run may feel it; None where it never does."""
     values = np.atleast_2d(read_variable(model, simulated, variable))
-    place = (values - low) / spacing
-    around = np.pad(place, ((0, 0), (AROUND, AROUND)), mode="edge")
+    position = (values - low) / spacing
+    around = np.pad(position, ((0, 0), (AROUND, AROUND)), mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(around, 2 * AROUND + 1, axis=1)
     least, most = windows.min(axis=(0, 2)) - WIDER, windows.max(axis=(0, 2)) + WIDER
     firsts: list[int | None] = []

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.campaign import CHANNEL_UNITS, CHANNELS
+from tasks.campaign.campaign import BRAKING_PRESSURE, CHANNEL_UNITS, CHANNELS
 from tasks.identification.decision.answer import ChannelError
 from tasks.identification.decision.search import Finding
 from tasks.identification.inference.fit import Fit, fit_hypotheses
@@ -17,8 +17,6 @@ from tasks.identification.inference.hypothesis import compose_parameters
 from tasks.identification.rules import DecisionRules
 from tasks.vehicle.effects.table import EFFECT_TABLE
 
-BRAKED = 0.1
-"""Brake pressure from which a run brakes [MPa]."""
 FELL = 2.0
 """Least decrease of speed of a braked run [m/s]."""
 SMOOTHED = 0.1
@@ -53,7 +51,7 @@ def measure_manoeuvre_errors(
     -------
     float64 [P, 2] errors of stopping distance [m] and peak pitch [deg]; None where the run does not brake.
     """
-    pressed = np.flatnonzero(pressure > BRAKED)
+    pressed = np.flatnonzero(pressure > BRAKING_PRESSURE)
     if not pressed.size:
         return None
     both = np.concatenate((measured[None], predictions))[:, pressed[0] :]

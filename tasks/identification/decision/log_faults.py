@@ -7,7 +7,6 @@ import numpy as np
 
 from tasks.campaign.campaign import Campaign
 from tasks.campaign.channels import BRAKE_SIGNALS, CHANNELS_BY_NAME, describe_brake
-from tasks.campaign.resting_pressure import describe_rest, measure_resting_levels
 from tasks.identification.decision.answer import NamedEffect
 from tasks.identification.inference.evidence import RunEvidence
 
@@ -53,10 +52,8 @@ def describe_log_faults(
             " while the car does not brake, in all training runs alike: taken for its zero; brakes that need as much to"
             " begin would look the same"
         )
-    elif campaign.brake_signal == "brake_pressure":
-        runs = {run.name: {"brake_pressure": run.pressure, "speed": run.speed} for run in campaign.train}
-        rest = describe_rest(measure_resting_levels(runs, campaign.runs[0].interval))
-        sentences += [] if rest is None else [rest]
+    elif campaign.resting_gauge:
+        sentences.append(campaign.resting_gauge)
     return sentences
 
 

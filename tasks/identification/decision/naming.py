@@ -111,8 +111,8 @@ def list_parameters(
     fitted : the last fit; None takes the explanation's values
     share : error of a value by the car's equations, over the value [1]
     """
-    places = explanation.find_places(member)
-    value, error = explanation.values[places], explanation.errors[places]
+    own = explanation.find_numbers(member)
+    value, error = explanation.values[own], explanation.errors[own]
     if member.effect is None:
         return _list_form_parameters(member, value, error, fitted, share)
     values, errors, scatter = value, error, np.zeros(len(value))
@@ -143,12 +143,12 @@ def find_first_number(
     explanation : with errors of its own
     fitted : the last fit
     """
-    error = float(explanation.errors[explanation.find_places(member)][0])
+    error = float(explanation.errors[explanation.find_numbers(member)][0])
     name = effect.parameters[0].name
     if name in SESSION:
-        place, last = SESSION.index(name), len(fitted.values)
-        own = fitted.session_error[place], fitted.scatter[last + place]
-        return float(fitted.session[place]), max(error, float(own[0])), float(own[1])
+        index, last = SESSION.index(name), len(fitted.values)
+        own = fitted.session_error[index], fitted.scatter[last + index]
+        return float(fitted.session[index]), max(error, float(own[0])), float(own[1])
     values, errors, scatter = _find_part(member.name, fitted)
     return float(values[0]), max(error, float(errors[0])), float(scatter[0])
 

@@ -105,7 +105,7 @@ class Explanation:
         """Return the names of the members."""
         return tuple(member.name for member in self.members)
 
-    def find_places(self, member: Candidate) -> slice:
+    def find_numbers(self, member: Candidate) -> slice:
         """Return where a member's numbers stand in ``values``.
 
         Parameters
@@ -122,12 +122,12 @@ class Explanation:
 
 @dataclass(frozen=True, kw_only=True)
 class _Prior:
-    """Columns of one explanation with their priors: float64 or int64 [K] each, and the members' places among them."""
+    """Columns of one explanation with their priors: float64 or int64 [K] each, and the members' indices among them."""
 
     columns: NDArray[np.int64]
     precision: NDArray[np.float64]
     centre: NDArray[np.float64]
-    places: tuple[NDArray[np.int64], ...]
+    indices: tuple[NDArray[np.int64], ...]
 
 
 def weigh_explanation(
@@ -150,21 +150,21 @@ def weigh_explanation(
     gain_with_spread = gain
     if spread and members:
         seen, pulls = [], []
-        for i, places in enumerate(prior.places):
-            own, along = prior.columns[places], mean[places] + prior.centre[places]
+        for i, indices in enumerate(prior.indices):
+            own, along = prior.columns[indices], mean[indices] + prior.centre[indices]
             information = along @ grams.information[:, own[:, None], prior.columns]
             pull = grams.score[:, own] @ along
-            size = information[:, places] @ along
+            size = information[:, indices] @ along
             spreads[i] = float(np.sqrt(estimate_spread(size, pull - information @ mean)))
             if spreads[i] > 0.0:
-                seen.append((places, along * spreads[i], information * spreads[i]))
+                seen.append((indices, along * spreads[i], information * spreads[i]))
                 pulls.append(pull * spreads[i])
         if seen:
             total, right = _admit_spread(total, right, seen, np.array(pulls).T)
             mean, factor, evidence = _integrate(total, right, prior)
             kept = len(nobody.columns)
             gain_with_spread = evidence - _integrate(total[:kept, :kept], right[:kept], nobody)[2]
-    at = np.concatenate([np.empty(0, dtype=np.int64), *prior.places]).astype(np.int64)
+    at = np.concatenate([np.empty(0, dtype=np.int64), *prior.indices]).astype(np.int64)
     values = (mean + prior.centre)[at]
     bounds = [(m.lower, m.upper) for m in members for _ in m.columns]
     if any(not low - 1e-12 <= x <= high + 1e-12 for x, (low, high) in zip(values, bounds, strict=True)):
@@ -263,10 +263,10 @@ def keep_members(explanation: Explanation, members: Sequence[Candidate]) -> Expl
     explanation : with all members
     members : those that are kept
     """
-    places = [explanation.find_places(m) for m in explanation.members]
+    indices = [explanation.find_numbers(m) for m in explanation.members]
     kept = [
         (m, s, c)
-        for m, s, c in zip(explanation.members, places, explanation.spreads, strict=True)
+        for m, s, c in zip(explanation.members, indices, explanation.spreads, strict=True)
         if m in members
     ]
     take = np.concatenate(
@@ -303,23 +303,23 @@ def _arrange(grams: RunGrams, members: Sequence[Candidate]) -> _Prior:
     columns, deviations, centre = base.base.copy(), base.spike.copy(), grams.centre[base.base].copy()
     further: list[int] = []
     wide: list[float] = []
-    places = []
+    indices = []
     for member in members:
         if member.base < 0:
             begin = len(columns) + len(further)
-            places.append(np.arange(begin, begin + len(member.columns)))
+            indices.append(np.arange(begin, begin + len(member.columns)))
             further += member.columns
             wide += [member.slab] * len(member.columns)
         else:
             (columns[member.base],), deviations[member.base] = member.columns, member.slab
             centre[member.base] = grams.centre[member.columns[0]]
-            places.append(np.array([member.base]))
+            indices.append(np.array([member.base]))
     columns = np.concatenate((columns, np.array(further, dtype=np.int64)))
     return _Prior(
         columns=columns,
         precision=np.concatenate((deviations, wide)) ** -2.0,
         centre=np.concatenate((centre, grams.centre[further])),
-        places=tuple(places),
+        indices=tuple(indices),
     )
 
 
@@ -349,11 +349,11 @@ def _admit_spread(
     Parameters
     ----------
     total, right : float64 [K, K] and [K] where none does
-    seen : of each direction its places, its values there, and what each run says along it, float64 [R, K]
+    seen : of each direction its indices, its values there, and what each run says along it, float64 [R, K]
     pulls : float64 [R, D] score of each run along it
     """
     along = np.stack([information for *_, information in seen], axis=1)  # [R, D, K]
-    inner = np.stack([along[:, :, places] @ values for places, values, _ in seen], axis=2)
+    inner = np.stack([along[:, :, indices] @ values for indices, values, _ in seen], axis=2)
     solved = np.linalg.solve(np.eye(len(seen)) + inner, np.concatenate((along, pulls[:, :, None]), axis=2))
     run, way, k = along.shape
     flat, solved = along.reshape(run * way, k), solved.reshape(run * way, k + 1)

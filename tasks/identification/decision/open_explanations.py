@@ -100,8 +100,8 @@ def is_surely_large(
     rules : the odds
     in_any_run : count what differs from run to run
     """
-    places = explanation.find_places(member)
-    values, errors = explanation.values[places], explanation.errors[places]
+    own = explanation.find_numbers(member)
+    values, errors = explanation.values[own], explanation.errors[own]
     if in_any_run:
         errors = np.hypot(errors, explanation.spreads[explanation.members.index(member)] * values)
     reach = float(ndtri(rules.named_odds / (1.0 + rules.named_odds)))

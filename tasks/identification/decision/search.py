@@ -86,8 +86,8 @@ class Finding:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Place:
-    """Where the search stands.
+class _SearchState:
+    """State of the search: the runs about a fit.
 
     Parameters
     ----------
@@ -137,26 +137,26 @@ def find_explanations(
     retuned = [effect for effect in shown if effect.parameters[0].name in SESSION]
     numbers = tuple(effect for effect in shown if effect.parameters[0].name not in SESSION)
     evidence, null = prepare_evidence(campaign, vehicle, surface, numbers, rules)
-    place = _settle_scales(
-        _Place(evidence=evidence, fitted=null, splines=differentiate_by_splines(evidence, null))
+    state = _settle_scales(
+        _SearchState(evidence=evidence, fitted=null, splines=differentiate_by_splines(evidence, null))
     )
     columns = list_columns(numbers, retuned, evidence.session_sigma, rules)
-    null = place.fitted
-    grams = gather_grams(place.evidence, place.fitted, place.splines, columns)
+    null = state.fitted
+    grams = gather_grams(state.evidence, state.fitted, state.splines, columns)
     singles = search_explanations(grams, most=1, width=1, spread=False, forms=False)
-    first = _refine_first(singles, place, null, rules)
+    first = _refine_first(singles, state, null, rules)
     if first is not None:
-        place = _settle_scales(_move_to(first, place, null))
+        state = _settle_scales(_move_to(first, state, null))
     # the shape of a form does not follow from a run or two
     for forms in (False, True) if len(models) >= FEWEST else (False,):
-        place, grams, found = _settle_explanation(place, null, columns, rules, forms=forms)
+        state, grams, found = _settle_explanation(state, null, columns, rules, forms=forms)
     return Finding(
-        evidence=place.evidence, null=null, fitted=place.fitted, grams=grams, explanations=tuple(found)
+        evidence=state.evidence, null=null, fitted=state.fitted, grams=grams, explanations=tuple(found)
     )
 
 
 def _refine_first(
-    found: list[Explanation], place: _Place, null: Fit, rules: DecisionRules
+    found: list[Explanation], state: _SearchState, null: Fit, rules: DecisionRules
 ) -> Explanation | None:
     """Return the single candidate that explains most through the simulation, of those that seem to; None without one.
 
@@ -165,8 +165,8 @@ def _refine_first(
     hopeful = [e for e in found if e.members and e.log_odds > 0.0][:REFINED]
     fits = [
         fit_hypotheses(
-            place.evidence.train, make_hypotheses(e, place.evidence),
-            widen_session(e, place.evidence.session_sigma), session=null.session, iterations=STEPS,
+            state.evidence.train, make_hypotheses(e, state.evidence),
+            widen_session(e, state.evidence.session_sigma), session=null.session, iterations=STEPS,
         )
         for e in hopeful
     ]  # fmt: skip
@@ -179,34 +179,34 @@ def _refine_first(
 
 
 def _settle_explanation(
-    place: _Place, null: Fit, columns: Columns, rules: DecisionRules, *, forms: bool
-) -> tuple[_Place, RunGrams, list[Explanation]]:
+    state: _SearchState, null: Fit, columns: Columns, rules: DecisionRules, *, forms: bool
+) -> tuple[_SearchState, RunGrams, list[Explanation]]:
     """Return where what the best explanation tells is fitted, what the runs say there, and all explanations.
 
     Forms come after the library: what an effect of the library explains is no form.
     """
     for turn in range(rules.most_turns):
-        if forms and place.splined is not place.fitted.parts:
-            splines = differentiate_by_splines(place.evidence, place.fitted)
-            place = replace(place, splines=splines, splined=place.fitted.parts)
-        grams = gather_grams(place.evidence, place.fitted, place.splines, columns)
+        if forms and state.splined is not state.fitted.parts:
+            splines = differentiate_by_splines(state.evidence, state.fitted)
+            state = replace(state, splines=splines, splined=state.fitted.parts)
+        grams = gather_grams(state.evidence, state.fitted, state.splines, columns)
         found = search_explanations(grams, most=rules.most_effects, width=rules.beam_width, forms=forms)
-        here = next((e for e in found if _is_fitted(e, place.fitted)), None)
-        if place.refuted and here is not None:
+        here = next((e for e in found if _is_fitted(e, state.fitted)), None)
+        if state.refuted and here is not None:
             # far from a fit without its effect, derivatives about that fit promise what no simulation keeps
             found = [e for e in found if e.log_odds <= here.log_odds or not _leaves_out(e, here)]
         named = keep_members(found[0], select_members(grams, found[0], rules))
-        if turn == rules.most_turns - 1 or _is_fitted(named, place.fitted):
+        if turn == rules.most_turns - 1 or _is_fitted(named, state.fitted):
             break
         if forms and here is not None and not _is_worth_it(found[0], here, grams, rules):
             break
-        moved = _move_to(named, place, null)
+        moved = _move_to(named, state, null)
         lost = _compute_cost(moved.fitted, named) - _compute_cost(
-            place.fitted, named if here is None else here
+            state.fitted, named if here is None else here
         )
         refuted = here is not None and lost > REFUTED * here.gain + log(rules.named_odds)
-        place = replace(place, refuted=True) if refuted else moved
-    return place, grams, found
+        state = replace(state, refuted=True) if refuted else moved
+    return state, grams, found
 
 
 def _compute_cost(fitted: Fit, explanation: Explanation) -> float:
@@ -246,7 +246,7 @@ def gather_grams(evidence: Evidence, fitted: Fit, splines: Splines, columns: Col
     centre = _find_centre(fitted, columns)
     # an explanation without a form has its values at 0, and not where it was fitted
     forms = np.zeros(columns.count)
-    own = [place for candidate in columns.candidates if candidate.base < 0 for place in candidate.columns]
+    own = [column for candidate in columns.candidates if candidate.base < 0 for column in candidate.columns]
     forms[own] = centre[own]
     known = np.array(information)
     return RunGrams(
@@ -301,7 +301,7 @@ def make_hypotheses(
     ranges = find_scanned_ranges(evidence.train)
     parts = []
     for member in explanation.members:
-        values = explanation.values[explanation.find_places(member)]
+        values = explanation.values[explanation.find_numbers(member)]
         if member.effect is None:
             grid = np.linspace(*ranges[member.variable], KNOTS)
             parts.append(make_spline_hypothesis(member.port, member.variable, grid, values))
@@ -338,13 +338,13 @@ def widen_session(explanation: Explanation, sigma: NDArray[np.float64]) -> NDArr
     return wide
 
 
-def _move_to(explanation: Explanation, place: _Place, null: Fit) -> _Place:
+def _move_to(explanation: Explanation, state: _SearchState, null: Fit) -> _SearchState:
     """Return the runs about the fit of an explanation."""
-    parts = make_hypotheses(explanation, place.evidence, place.fitted)
-    sigma = widen_session(explanation, place.evidence.session_sigma)
-    fitted = fit_hypotheses(place.evidence.train, parts, sigma, session=null.session, iterations=STEPS)
-    evidence = differentiate_at(place.evidence, fitted)
-    return replace(place, evidence=evidence, fitted=_refit(evidence, fitted), refuted=False)
+    parts = make_hypotheses(explanation, state.evidence, state.fitted)
+    sigma = widen_session(explanation, state.evidence.session_sigma)
+    fitted = fit_hypotheses(state.evidence.train, parts, sigma, session=null.session, iterations=STEPS)
+    evidence = differentiate_at(state.evidence, fitted)
+    return replace(state, evidence=evidence, fitted=_refit(evidence, fitted), refuted=False)
 
 
 def _refit(evidence: Evidence, fitted: Fit) -> Fit:
@@ -355,28 +355,28 @@ def _refit(evidence: Evidence, fitted: Fit) -> Fit:
     )  # fmt: skip
 
 
-def _settle_scales(place: _Place) -> _Place:
+def _settle_scales(state: _SearchState) -> _SearchState:
     """Return the same runs with the scales of disturbances and noise that they ask for, every candidate free."""
     for change in (_scale_disturbances, _scale_noise, _scale_disturbances):
-        place = change(place)
-    return place
+        state = change(state)
+    return state
 
 
-def _scale_noise(place: _Place) -> _Place:
-    evidence = set_run_noise(place.evidence, estimate_run_noise(place.evidence, place.fitted))
-    if all(run is before for run, before in zip(evidence.train, place.evidence.train, strict=True)):
-        return place
-    splines = rewhiten_splines(place.splines, place.evidence, evidence)
-    return replace(place, evidence=evidence, fitted=_refit(evidence, place.fitted), splines=splines)
+def _scale_noise(state: _SearchState) -> _SearchState:
+    evidence = set_run_noise(state.evidence, estimate_run_noise(state.evidence, state.fitted))
+    if all(run is before for run, before in zip(evidence.train, state.evidence.train, strict=True)):
+        return state
+    splines = rewhiten_splines(state.splines, state.evidence, evidence)
+    return replace(state, evidence=evidence, fitted=_refit(evidence, state.fitted), splines=splines)
 
 
-def _scale_disturbances(place: _Place) -> _Place:
-    here = place.evidence
-    residuals = compute_whitened_residuals(here, place.fitted)
+def _scale_disturbances(state: _SearchState) -> _SearchState:
+    here = state.evidence
+    residuals = compute_whitened_residuals(here, state.fitted)
     scales = fit_disturbance(
-        here.train, residuals, here.tolerances, here.effects, here.disturbance, place.splines, RIDGE
+        here.train, residuals, here.tolerances, here.effects, here.disturbance, state.splines, RIDGE
     )
     if scales == here.disturbance:
-        return place
+        return state
     evidence = rescale_disturbances(here, scales)
-    return replace(place, evidence=evidence, fitted=_refit(evidence, place.fitted))
+    return replace(state, evidence=evidence, fitted=_refit(evidence, state.fitted))

@@ -13,6 +13,7 @@ from tasks.identification.decision.comparison import compare_explanations, tempe
 from tasks.identification.decision.forms import KNOTS, find_scanned_ranges, make_form_hypotheses
 from tasks.identification.decision.naming import find_first_number, knows_brakes, list_parameters
 from tasks.identification.decision.odds import (
+    PORT_OF_NUMBER,
     can_stand_for,
     compute_likelihood,
     keep_members,
@@ -20,6 +21,7 @@ from tasks.identification.decision.odds import (
 )
 from tasks.identification.decision.open_explanations import OpenExplanation
 from tasks.identification.decision.search import Finding, make_hypotheses, widen_session
+from tasks.identification.inference.disturbance import DISTURBED
 from tasks.identification.inference.fit import SETTLED, Fit, fit_hypotheses
 from tasks.identification.inference.forward import predict_channels
 from tasks.identification.inference.hypothesis import Hypothesis, compose_parameters
@@ -27,8 +29,6 @@ from tasks.identification.inference.linearisation import differentiate_about_off
 from tasks.identification.rules import DecisionRules
 
 FELT = CHANNELS.index("longitudinal_acceleration")
-FRICTION_LEVEL = "retuned_friction_level"
-"""Number of the file that a form of friction with one value everywhere is too."""
 STEPS = 8
 """Gauss-Newton steps of a last fit [1]."""
 MOST_REFINED = 4
@@ -59,11 +59,9 @@ def fit_named(finding: Finding, opened: OpenExplanation) -> Fit:
     for i, part in enumerate(parts):
         if part.effect_class == "form":
             member = next(m for m in opened.named if m.name == part.name)
-            places = kept.find_places(member)
+            own = kept.find_numbers(member)
             grid = np.linspace(*ranges[part.variable], KNOTS)
-            shapes = make_form_hypotheses(
-                part.port, part.variable, grid, kept.values[places], kept.errors[places]
-            )
+            shapes = make_form_hypotheses(part.port, part.variable, grid, kept.values[own], kept.errors[own])
             trials = [(*parts[:i], shape, *parts[i + 1 :]) for shape in shapes]
     return min((fit(trial) for trial in trials), key=lambda fitted: fitted.objective)
 
@@ -116,16 +114,16 @@ def settle_named(
 
 
 def _find_varying(finding: Finding, first: OpenExplanation) -> OpenExplanation | None:
-    """Return what is named with the best form in place of a level; None where no level is named.
+    """Return what is named with the best form in place of a number of the file; None where no such number is named.
 
-    Derivatives about the fit of one value undervalue what varies at its port: a run's own friction decides when its
-    tyres let go.
+    At the ports where each run has a disturbance of its own, that disturbance takes up what varies: derivatives about
+    the fit of one value undervalue a form there. Nothing takes it up at the brake.
     """
     grams = finding.grams
     varying = [
         weigh_explanation(grams, [*(m for m in first.named if m is not level), form], spread=False)
         for level in first.named
-        if level.name == FRICTION_LEVEL
+        if PORT_OF_NUMBER.get(level.name) in DISTURBED
         for form in grams.columns.candidates
         if form.effect is None and can_stand_for(form, level)
     ]

@@ -18,12 +18,12 @@ MOST_WORDS = 30
 """Words of a first sentence [1]."""
 LATE = {"pressure_rate", "time"}
 """Variables of a late brake."""
-SAID_OF_PORTS = {
+COMMON_PHRASES = {
     frozenset({"friction"}): "the tyres grip otherwise than the model's",
     frozenset({"suspension_force", "pitch_moment"}): "the body moves otherwise than the model's",
     frozenset({"sensor"}): "an instrument reads otherwise than the car moves",
 }
-"""What is said of effects that act at the same ports."""
+"""What effects that act at the same ports have in common."""
 
 
 def describe_effect(effect: NamedEffect, library: Sequence[Effect]) -> str:
@@ -36,7 +36,7 @@ def describe_effect(effect: NamedEffect, library: Sequence[Effect]) -> str:
     """
     known = next((e for e in library if e.name == effect.name), None)
     if known is not None:
-        return known.say(
+        return known.describe(
             {p.name: p.value for p in effect.parameters},
             {p.name: (p.ci_low, p.ci_high) for p in effect.parameters if p.ci_low < p.ci_high},
         )
@@ -74,7 +74,7 @@ def describe_verdict(
                 "These runs prove nothing that the model lacks. They suggest that"
                 f" {describe_effect(suggested, library)}, at odds that are too small for a name"
             )
-        if not own or not is_lowered(error["speed"]) or not _is_told_apart(error["speed"]):
+        if not own or not is_lowered(error["speed"]) or not _prints_differently(error["speed"]):
             return f"{nothing}."
         return (
             f"{nothing}. Its own numbers, fitted to these runs ({own}), take the error"
@@ -125,17 +125,17 @@ def _describe_open(verdict: Verdict, library: Sequence[Effect], force: float) ->
     known = {_find_name(effect): effect for effect in (*rivals, *effects)}
     named = [[known[name] for name in other.names] for other in opened]
     # a form of another shape at the same port reads the same
-    said: dict[str, float] = {}
+    phrases: dict[str, float] = {}
     for own, other in zip(named, opened, strict=True):
         rest = [effect for effect in own if effect not in effects or effect in left]
         phrase = join_phrases(describe_effect(effect, library) for effect in rest) if rest else "nothing more"
-        said.setdefault(phrase, other.odds)
-    if len(said) < 2:
+        phrases.setdefault(phrase, other.odds)
+    if len(phrases) < 2:
         return _join_sentences([describe_effect(effect, library) for effect in effects])
     common = _describe_common([e for own in named for e in own if e not in effects or e in left], left, force)
-    nothing = f"These runs show something that the model lacks, and leave {len(said)} explanations open."
+    nothing = f"These runs show something that the model lacks, and leave {len(phrases)} explanations open."
     first = _join_sentences([*shared, *common]) or nothing
-    listed = "; or ".join(f"{phrase} ({format_number(odds)} : 1)" for phrase, odds in said.items())
+    listed = "; or ".join(f"{phrase} ({format_number(odds)} : 1)" for phrase, odds in phrases.items())
     return f"{first} They cannot tell apart: {listed}."
 
 
@@ -153,7 +153,7 @@ def _describe_common(rest: Sequence[NamedEffect], left: Sequence[NamedEffect], f
             interval = (ends[0], ends[1])
         return [f"a further {format_interval(abs(force), interval)} m/s2 on average {way}, whatever its law"]
     return [
-        f"{phrase}, whatever the law" for group, phrase in SAID_OF_PORTS.items() if ports and ports <= group
+        f"{phrase}, whatever the law" for group, phrase in COMMON_PHRASES.items() if ports and ports <= group
     ]
 
 
@@ -163,12 +163,12 @@ def _join_sentences(phrases: Sequence[str]) -> str:
     while len(first) > 1 and len(join_phrases(first).split()) > MOST_WORDS:
         first.pop()
     rest = phrases[len(first) :]
-    said = [join_phrases(part) for part in (first, rest) if part]
-    return " ".join(f"{text[0].upper()}{text[1:]}." for text in said)
+    texts = [join_phrases(part) for part in (first, rest) if part]
+    return " ".join(f"{text[0].upper()}{text[1:]}." for text in texts)
 
 
-def _is_told_apart(error: ChannelError) -> bool:
-    """Whether a sentence says another number after than before."""
+def _prints_differently(error: ChannelError) -> bool:
+    """Whether a sentence prints another number after than before."""
     return format_number(error.frozen) != format_number(error.after)
 
 

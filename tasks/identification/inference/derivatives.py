@@ -128,8 +128,8 @@ def differentiate_by_library(
             for parameter in effect.parameters[1:]:
                 theta[parameter.index] = parameter.start
         library.append(compute_quotient(_shift_parameter(theta, leading.index, leading.step), leading.step))
-    for place, value in list_second_values(effects):
-        leading, second = effects[place].parameters
+    for index, value in list_second_values(effects):
+        leading, second = effects[index].parameters
         theta = base.copy()
         theta[second.index] = value
         # an effect that the model has already is not screened
@@ -175,8 +175,8 @@ def list_second_values(effects: tuple[Effect, ...]) -> list[tuple[int, float]]:
     effects : library of effects
     """
     return [
-        (place, second.lower + share * (second.upper - second.lower))
-        for place, effect in enumerate(effects)
+        (index, second.lower + share * (second.upper - second.lower))
+        for index, effect in enumerate(effects)
         for second in effect.parameters[1:]
         for share in SECOND_SHARES
     ]

@@ -22,7 +22,7 @@ LIFT = 0.2
 """Time in which a driver lifts the throttle, centred on the brake where no throttle was measured [s]."""
 SPEED = CHANNELS.index("speed")
 FEWEST_SAMPLES, SURE = 5, 4.0
-"""Samples before the brake whose slope says something, and its standard errors, for noise that remembers [1]."""
+"""Samples before the brake, or under it, whose slope tells something, and its standard errors, for AR(1) noise [1]."""
 
 
 def find_brake_onset(model: RunModel, share: float) -> int:

@@ -108,7 +108,7 @@ class RunEvidence:
         y[:, CHANNELS.index("pitch")] += offsets[PITCH_OFFSET]
         return whiten_channels(self.model.measured - y, self.rho, self.sigma, self.model.sampled)
 
-    def place(
+    def apply_offsets(
         self, theta: NDArray[np.float64], slots: tuple[Slot, ...], offsets: NDArray[np.float64]
     ) -> tuple[RunModel, NDArray[np.float64], tuple[Slot, ...]]:
         """Return the run, the parameters and the forms that have its own offsets in them.

@@ -51,7 +51,6 @@ class Fit:
     session : float64 [8] session nuisances
     session_sigma : float64 [8] their prior sigmas
     objective : sum over runs of the marginalised misfit, plus the session's prior term
-    by_run : float64 [R] misfit of each run without the session's prior
     covariance : float64 [K, K] of the parameters, session marginalised
     session_error : float64 [8] standard deviations of the session's nuisances, parameters marginalised
     scatter : float64 [K + 8] standard deviations that the runs' scatter adds to those of noise
@@ -64,7 +63,6 @@ class Fit:
     session: NDArray[np.float64]
     session_sigma: NDArray[np.float64]
     objective: float
-    by_run: NDArray[np.float64]
     covariance: NDArray[np.float64]
     session_error: NDArray[np.float64]
     scatter: NDArray[np.float64]
@@ -166,7 +164,7 @@ def fit_hypotheses(
     scatter = _measure_scatter(_score_runs(evidence, here.points, slopes) @ inverse, slopes, inverse)
     return Fit(
         parts=parts, values=here.values, session=here.session, session_sigma=session_sigma, objective=here.misfit,
-        by_run=collect_misfits(here.points), covariance=inverse[:k, :k],
+        covariance=inverse[:k, :k],
         session_error=np.sqrt(np.diag(inverse)[k:]), scatter=scatter,
         residuals=tuple(
             run.add_offsets(point.residual, point.offsets)

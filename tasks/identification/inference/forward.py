@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.campaign import CHANNELS, Run, find_motion
+from tasks.campaign.campaign import BRAKING_PRESSURE, CHANNELS, Run, find_motion
 from tasks.campaign.gauge import zero_pressure_at_rest
 from tasks.identification.inference.recursion import filter_recursively
 from tasks.surface.road_profile import FLAT_ROAD, RoadGrade, RoadHazard
@@ -125,7 +125,7 @@ def prepare_run(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunMo
         )
     speed = run.speed
     samples = find_motion(speed)[1]
-    pressed = np.flatnonzero(run.pressure > 0.1)
+    pressed = np.flatnonzero(run.pressure > BRAKING_PRESSURE)
     lead = min(round(LEAD / run.interval), int(pressed[0]) if pressed.size else samples)
     before = run.speed_before if run.speed_before is not None else np.empty(0)
     before = before[-max(round(DRIVEN_LEAD / run.interval), LEAST_LEAD) :]

@@ -152,7 +152,7 @@ def differentiate_about_offsets(evidence: Evidence, at: Fit) -> tuple[RunEvidenc
     theta, slots = at.compose()
     runs = []
     for run, offsets in zip(evidence.train, at.offsets, strict=True):
-        model, moved, forms = run.place(theta, slots, offsets)
+        model, moved, forms = run.apply_offsets(theta, slots, offsets)
         fresh = differentiate_run(
             model, run.rho, run.sigma, moved, (), evidence.tolerances, evidence.disturbance, forms
         )

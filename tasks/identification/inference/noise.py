@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.campaign.campaign import CHANNELS, Campaign, Run
+from tasks.campaign.campaign import BRAKING_PRESSURE, CHANNELS, Campaign, Run
 from tasks.errors import InputError
 from tasks.identification.inference.recursion import filter_recursively
 
@@ -20,8 +20,6 @@ FEWEST_SAMPLES = 3 * LAGS[FEWEST_LAGS - 1]
 """Samples of a channel that some run must exceed for that [1]."""
 LEAST_NOISE = np.array([0.01, 0.02, 0.03, 0.03, 0.005, 0.03, 0.03])
 """Noise of a channel at the least: no model follows a car better, however quiet its sensors [unit of the channel]."""
-QUIET_PRESSURE = 0.1
-"""Pressure at which the quiet part of a run ends [MPa]."""
 BEFORE_BRAKE, ON_HAZARD = 0.05, 0.4
 """Time between the quiet part and the brake, and its longest time where the road is not flat [s]."""
 
@@ -133,7 +131,7 @@ def _compute_variogram(stretches: list[Stretch]) -> NDArray[np.float64]:
 
 def _count_quiet_samples(run: Run) -> int:
     """Return the number of samples of a run before the brake."""
-    pressed = np.flatnonzero(run.pressure > QUIET_PRESSURE)
+    pressed = np.flatnonzero(run.pressure > BRAKING_PRESSURE)
     end = int(pressed[0]) - round(BEFORE_BRAKE / run.interval) if pressed.size else len(run.pressure)
     if run.hazard_length > 0:
         end = min(end, round(ON_HAZARD / run.interval))

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from tasks.campaign.campaign import CHANNELS, FILE_NUMBERS, Campaign, Tolerances
 from tasks.campaign.channels import BRAKE_SIGNALS
-from tasks.identification.inference.driver import find_brake_onset
+from tasks.identification.inference.driver import FEWEST_SAMPLES, find_brake_onset
 from tasks.identification.inference.forward import RunModel, prepare_run
 from tasks.identification.inference.tyre_limit import reaches_limit, saturates_tyres
 from tasks.identification.rules import DecisionRules
@@ -20,8 +20,6 @@ GAIN = FILE_NUMBERS.index("pressure_gain")
 """Place of the brake's gain among the numbers of the session."""
 GRIP = FILE_NUMBERS[-1]
 """Name of the grip that all runs share."""
-FEWEST_SAMPLES = 5
-"""Samples under brake from which a run says something of the gain [1]."""
 
 
 def widen_tolerances(

@@ -5,7 +5,7 @@ a pixel closes before the splat that would bring its transmittance to 1e-4 or be
 
 Work goes by strips, one row of a tile, as wide as the widest vector register. For a batch of splats the
 strips that each one reaches are listed first; a second loop, free of unpredictable branches, blends them
-(`blending`) or sums over them (`transposed_blending`). All state of a tile lies in one flat array, so that the
+(`blending`) or sums over them (`splat_back`). All state of a tile lies in one flat array, so that the
 compiler can see that nothing overlaps. No fast-math flag is set: every operation of the kernels rounds as
 IEEE 754 says, whatever the processor.
 """

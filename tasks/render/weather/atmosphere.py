@@ -168,12 +168,13 @@ def _veil(depth, alpha, rays, cloudy, airlight, extinction, drawn, steps_per_m, 
     last = len(drawn) - 1
     for row in range(height):
         for column in range(width):
-            cover, ray = alpha[row, column], rays[row, column]
+            cover = alpha[row, column]
             if cover == zero:
                 gain[row, column, 0] = one
                 add[row, column, 0], add[row, column, 1], add[row, column, 2] = zero, zero, zero
                 continue
-            distance = depth[row, column] * np.sqrt(ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2])
+            x, y, z = rays[row, column, 0], rays[row, column, 1], rays[row, column, 2]
+            distance = depth[row, column] * np.sqrt(x * x + y * y + z * z)
             place = min(distance * steps_per_m, np.float32(last))
             k = min(int(place), last - 1)
             near = drawn[k] + (place - np.float32(k)) * (drawn[k + 1] - drawn[k])

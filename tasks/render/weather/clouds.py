@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.render.composition import LUMINANCE
-from tasks.render.weather.coverage_field import fractal_noise
+from tasks.render.weather.coverage_field import sum_waves
 from tasks.render.weather.random_streams import stream_key, unit_number
 from tasks.render.weather.skies import Daylight
 
@@ -134,13 +134,21 @@ def _fill(  # type: ignore[no-untyped-def]
     low = exp(-to_sun[2] / 0.15)
     flat_sun = sqrt(max(1 - to_sun[2] * to_sun[2], 1e-9))
     step = abs(elevation[0] - elevation[-1]) / max(len(elevation) - 1, 1)
+    width = len(azimuth)
+    places, field, toward = np.empty((2, width)), np.empty(width), np.empty(width)
     for i in range(len(elevation)):
         up, flat = sin(elevation[i]), cos(elevation[i])
         gradient = 1 - exp(-3.2 * up)
         slant = 1 / (up + LEAST_UP)
         seen = min(up / 0.08, 1.0)
-        footprint = slant * slant * step
-        for j in range(len(azimuth)):
+        footprint = np.full(width, slant * slant * step)
+        if level < 5:
+            for values, ahead in ((field, 0.0), (toward, 0.12)):
+                for j in range(width):
+                    places[0, j] = slant * flat * cos(azimuth[j]) + ahead * to_sun[0]
+                    places[1, j] = slant * flat * sin(azimuth[j]) + ahead * to_sun[1]
+                sum_waves(width, places, footprint, wave, OCTAVES, roughness, key, values)
+        for j in range(width):
             x, y = cos(azimuth[j]), sin(azimuth[j])
             along = x * to_sun[0] + y * to_sun[1]
             cosine = min(max(flat * along + up * to_sun[2], -1.0), 1.0)
@@ -149,18 +157,14 @@ def _fill(  # type: ignore[no-untyped-def]
             # a low sun colours the air along the horizon, below it more than elsewhere
             band = 0.5 * low * exp(-up / 0.12) * (0.35 + 0.65 * max(along / flat_sun, 0.0))
             disc = 30 * sharp * min(max((0.0105 / sharp - off) / 0.0026 + 0.5, 0.0), 1.0)
-            px, py = slant * flat * x, slant * flat * y
             cover, lightness = 0.0, 0.0
             if level < 5:
-                field = fractal_noise(px, py, footprint, wave, OCTAVES, roughness, key)
-                cover = min(max((field - level) / edge, 0.0), 1.0)
+                cover = min(max((field[j] - level) / edge, 0.0), 1.0)
                 cover = cover * cover * (3 - 2 * cover) * seen
-                if cover > 0:
-                    toward = fractal_noise(
-                        px + 0.12 * to_sun[0], py + 0.12 * to_sun[1], footprint, wave, OCTAVES, roughness, key
-                    )
-                    thick = max(field - level - edge, 0.0)
-                    lightness = min(max(0.6 + 0.8 * (field - toward) - 0.3 * thick + 0.5 * bright, 0.0), 1.3)
+                thick = max(field[j] - level - edge, 0.0)
+                lightness = min(
+                    max(0.6 + 0.8 * (field[j] - toward[j]) - 0.3 * thick + 0.5 * bright, 0.0), 1.3
+                )
             for c in range(3):
                 clear = horizon[c] + (zenith[c] - horizon[c]) * gradient + sun[c] * (bright + band)
                 cloud = shade[c] + (lit[c] - shade[c]) * lightness
@@ -171,17 +175,20 @@ def _fill(  # type: ignore[no-untyped-def]
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _close(elevation, azimuth, horizon, rise, fade, contrast, wave, roughness, key, out):  # type: ignore[no-untyped-def]
     step = abs(elevation[0] - elevation[-1]) / max(len(elevation) - 1, 1)
+    width = len(azimuth)
+    places, field = np.empty((2, width)), np.empty(width)
     for i in range(len(elevation)):
         up, flat = sin(elevation[i]), cos(elevation[i])
         slant = 1 / (up + LEAST_UP)
-        footprint = slant * slant * step
         strength = contrast * exp(-fade * slant)
         mean = (1 + rise * up) * exp(-0.5 * strength * strength)
-        for j in range(len(azimuth)):
-            x, y = slant * flat * cos(azimuth[j]), slant * flat * sin(azimuth[j])
+        footprint = np.full(width, slant * slant * step)
+        for j in range(width):
             # rolls: longer across the wind than along it
-            field = fractal_noise(0.6 * x, 1.3 * y, footprint, wave, OCTAVES, roughness, key)
-            field = min(max(field, -2.5), 2.5)
-            bright = mean * exp(strength * field)
+            places[0, j] = 0.6 * (slant * flat * cos(azimuth[j]))
+            places[1, j] = 1.3 * (slant * flat * sin(azimuth[j]))
+        sum_waves(width, places, footprint, wave, OCTAVES, roughness, key, field)
+        for j in range(width):
+            bright = mean * exp(strength * min(max(field[j], -2.5), 2.5))
             for c in range(3):
                 out[i, j, c] = horizon[c] * bright

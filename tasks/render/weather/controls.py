@@ -6,14 +6,12 @@ the road's look follows from the surface state alone, and the air's from the kin
 
 from dataclasses import dataclass
 
-from tasks.errors import InputError
 from tasks.render.weather.atmosphere import extinction_of_visual_range
 from tasks.render.weather.falling.precipitation import Population, make_population
 from tasks.render.weather.parameters import KindLook, WeatherParameters
 from tasks.render.weather.sky import cloud_transmittance
 from tasks.render.weather.wet.puddles import compute_wetness
 from tasks.surface.state import SurfaceState
-from tasks.surface.weather import DRY
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,19 +84,17 @@ def air_controls(
     Parameters
     ----------
     kind : kind of weather
-    rate_mm_h : precipitation rate, water equivalent [mm/h]
+    rate_mm_h : precipitation rate, water equivalent; 0 where it has ended [mm/h]
     parameters : the catalogue's values
     visual_range_m : meteorological optical range of the air without precipitation; None for the catalogue's [m]
 
     Raises
     ------
     InputError
-        The kind is unknown, or has precipitation without a rate.
+        The kind is unknown.
     """
-    look = parameters.find_look(kind)
-    if look.particles is not None and rate_mm_h == 0:
-        raise InputError(f"weather: {kind} needs precipitation_mm_h above 0; it is 0: use {DRY}")
-    falls = None if look.particles is None else make_population(look.particles, rate_mm_h)
+    particles = parameters.find_look(kind).particles
+    falls = None if particles is None or rate_mm_h == 0 else make_population(particles, rate_mm_h)
     haze = extinction_of_visual_range(visual_range_m or parameters.air.haze_visual_range_m)
     return AirControls(
         population=falls,

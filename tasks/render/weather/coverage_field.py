@@ -5,7 +5,7 @@ than a wave sees the wave's mean, so a wave fades as its length nears the footpr
 """
 
 from dataclasses import dataclass
-from math import floor, sqrt
+from math import sqrt
 
 import numba
 import numpy as np
@@ -52,14 +52,15 @@ def height_field(
     -------
     float32 [...] field [1]
     """
-    x = np.ascontiguousarray(x, dtype=np.float64)
-    prints = np.ascontiguousarray(np.broadcast_to(np.asarray(footprint, dtype=np.float64), x.shape))
-    out = np.empty(x.size, dtype=np.float32)
-    _field(
-        x.ravel(), np.ascontiguousarray(y, dtype=np.float64).ravel(), prints.ravel(), out,
-        parameters.coarsest_m, parameters.octaves, parameters.roughness, np.uint64(stream_key(seed, stream)),
+    shape = np.shape(x)
+    places = np.stack((np.ravel(x), np.ravel(y))).astype(np.float64)
+    prints = np.array(np.broadcast_to(footprint, shape), dtype=np.float64).ravel()
+    out = np.empty(len(prints))
+    sum_waves(
+        len(out), places, prints, parameters.coarsest_m, parameters.octaves, parameters.roughness,
+        np.uint64(stream_key(seed, stream)), out,
     )  # fmt: skip
-    return out.reshape(x.shape)
+    return out.astype(np.float32).reshape(shape)
 
 
 def rank_uniform(
@@ -84,23 +85,14 @@ def rank_uniform(
     return ranks
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def lattice_noise(x, y, key):  # type: ignore[no-untyped-def]
+@numba.njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _smooth_noise(x, y, key):  # type: ignore[no-untyped-def]
     """Smooth noise of unit wavelength: mean 0, variance 1 over all places and seeds.
 
     Corner values are blended with weights that keep the variance (their squares sum to 1), so the field has
     no grid of calm places.
-
-    Parameters
-    ----------
-    x, y : float64 place in wavelengths [1]
-    key : uint64 [1]
-
-    Returns
-    -------
-    float64 [1]
     """
-    fx, fy = floor(x), floor(y)
+    fx, fy = np.floor(x), np.floor(y)
     ix, iy = np.int64(fx), np.int64(fy)
     tx, ty = x - fx, y - fy
     tx, ty = tx * tx * (3 - 2 * tx), ty * ty * (3 - 2 * ty)
@@ -111,22 +103,33 @@ def lattice_noise(x, y, key):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def fractal_noise(x, y, footprint, coarsest, octaves, roughness, key):  # type: ignore[no-untyped-def]
-    """Sum of `lattice_noise` waves, each turned against the one before so that their grids do not align."""
-    total, power = 0.0, 0.0
+def sum_waves(count, places, footprint, coarsest, octaves, roughness, key, out):  # type: ignore[no-untyped-def]
+    """Write the field at the first places into ``out``, wave after wave in loops that the compiler turns into vectors.
+
+    Each wave is turned against the one before, so that their grids do not align.
+
+    Parameters
+    ----------
+    count : number of places [1]
+    places : float64 [2, N] world coordinates x and y, which are overwritten [m]
+    footprint : float64 [N] width of what looks at each place [m]
+    coarsest, octaves, roughness : as in `FieldParameters`
+    key : uint64 of the field's stream [1]
+    out : float64 [N], written [1]
+    """
+    power = 0.0
     wave, amplitude = coarsest, 1.0
+    for i in range(count):
+        out[i] = 0.0
     for k in range(octaves):
         power += amplitude * amplitude
-        seen = min(1.0, max(0.0, wave / (2 * footprint + 1e-9) - 1))
-        if seen > 0:
-            total += seen * amplitude * lattice_noise(x / wave, y / wave, key + np.uint64(k))
-        x, y = 0.8 * x - 0.6 * y, 0.6 * x + 0.8 * y
+        own = key + np.uint64(k)
+        for i in range(count):
+            seen = min(1.0, max(0.0, wave / (2 * footprint[i] + 1e-9) - 1))
+            x, y = places[0, i], places[1, i]
+            out[i] += seen * amplitude * _smooth_noise(x / wave, y / wave, own)
+            places[0, i], places[1, i] = 0.8 * x - 0.6 * y, 0.6 * x + 0.8 * y
         wave *= 0.5
         amplitude *= roughness
-    return total / sqrt(power)
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _field(x, y, footprint, out, coarsest, octaves, roughness, key):  # type: ignore[no-untyped-def]
-    for i in range(len(x)):
-        out[i] = fractal_noise(x[i], y[i], footprint[i], coarsest, octaves, roughness, key)
+    for i in range(count):
+        out[i] /= sqrt(power)

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,7 +15,7 @@ class Layer:
     Parameters
     ----------
     name : light, wet, air or particles
-    gain : float32 [H, W, 1] or [H, W, 3] share of the picture below that is left [1]
+    gain : float32 [H, W, 1] or [H, W, 3] share of the picture below that is left, or one number for all pixels: 0 [1]
     add : float32 [H, W, 3] light that the layer adds [1]
     """
 
@@ -37,5 +38,17 @@ def recompose_layers(base: NDArray[np.float32], layers: Iterable[Layer]) -> NDAr
     """
     picture = base
     for layer in layers:
-        picture = picture * layer.gain + layer.add
+        picture = layer.add if layer.gain.size == 1 else _cover(picture, layer.gain, layer.add)
     return picture
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _cover(picture, gain, add):  # type: ignore[no-untyped-def]
+    out = np.empty(add.shape, dtype=np.float32)
+    last = gain.shape[2] - 1
+    for row in range(add.shape[0]):
+        for column in range(add.shape[1]):
+            for c in range(3):
+                below = picture[row, column, c] * gain[row, column, min(c, last)]
+                out[row, column, c] = below + add[row, column, c]
+    return out

@@ -28,12 +28,13 @@ from tasks.render.weather.falling.particles import Shutter, visible_streaks
 from tasks.render.weather.falling.precipitation import Population
 from tasks.render.weather.falling.streaks import draw_streaks
 from tasks.render.weather.layer import Layer, recompose_layers
+from tasks.render.weather.named_sky import ANY_SKY, OVERCAST, NamedSky
 from tasks.render.weather.outside import LitScene, Outside, make_outside
 from tasks.render.weather.parameters import WeatherParameters
 from tasks.render.weather.rays import pixel_rays
 from tasks.render.weather.relief import clear_light, light_outside, relight_gaussians
 from tasks.render.weather.scene_light import ground_light, without_sun
-from tasks.render.weather.skies import OVERCAST, Daylight, draw_sky_kind, draw_sun, light_of_sky
+from tasks.render.weather.skies import Daylight, draw_sky_kind, draw_sun, light_of_sky
 from tasks.render.weather.sky import SkyLight, cloud_transmittance, light_from
 from tasks.render.weather.snow.field import LyingSnow, snow_field
 from tasks.render.weather.snow.layer import snow_layer, snowed_over, whiten_gaussians
@@ -41,7 +42,7 @@ from tasks.render.weather.wet.wet_road import LightOnRoad, RoadFilm, wet_layer
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.route import Route
 from tasks.surface.state import SurfaceParameters, SurfaceState
-from tasks.surface.weather import find_weather
+from tasks.surface.weather import find_weather, has_closed_cloud
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,6 +79,7 @@ class ClipConditions:
     pavement : the road itself, from whose numbers the state follows
     parameters : optical parameters of the weather, of the catalogue
     seed : visual seed; it moves particles and snow, and nothing else [1]
+    sky : what the scenario says of the sky; what it leaves open, the seed draws
     anchors : states of the two anchors that the paper's composition blends; none for a picture of its own rate
     refracts : whether films on the road refract, as in the paper's composition
     """
@@ -86,6 +88,7 @@ class ClipConditions:
     pavement: SurfaceParameters
     parameters: WeatherParameters
     seed: int
+    sky: NamedSky = ANY_SKY
     anchors: tuple[SurfaceState, ...] = ()
     refracts: bool = False
 
@@ -112,6 +115,11 @@ class ClipWeather:
     outside: Outside | None
     anchors: "tuple[ClipWeather, ...]" = ()
     refracts: bool = False
+
+    @property
+    def replaces_sky(self) -> bool:
+        """Whether `apply_weather` puts a sky of its own in place of that of the scene."""
+        return self.outside is not None
 
     @property
     def reads_normals(self) -> bool:
@@ -173,7 +181,7 @@ def weather_scene(
     Raises
     ------
     InputError
-        If there is no such kind of weather, it has precipitation without a rate, or the scene has no road.
+        If there is no such kind of weather, or the scene has no road.
     """
     gaussians, environment, relief = clear.gaussians, clear.environment, clear.relief
     state, p, seed = conditions.state, conditions.parameters, conditions.seed
@@ -244,16 +252,17 @@ def choose_light(clear: ClearScene, conditions: ClipConditions) -> Daylight | No
     Parameters
     ----------
     clear : the scene
-    conditions : the weather; in dry weather the visual seed draws the sky
+    conditions : the weather; under no closed cloud the visual seed draws a sky that is not named
     """
     if clear.gaussians.light is None or clear.daylight is None or clear.to_sun is None:
         return None
-    p, seed = conditions.parameters.sky, conditions.seed
-    name = OVERCAST if find_weather(conditions.state.kind).overcast else draw_sky_kind(p.skies, seed)
+    p, seed, named = conditions.parameters.sky, conditions.seed, conditions.sky
+    drawn = OVERCAST if has_closed_cloud(conditions.state) else draw_sky_kind(p.skies, seed)
+    name = named.kind or drawn
     kind = getattr(p.skies, name)
     through = cloud_transmittance(conditions.state.precipitation_mm_h, p)
     own = np.array(clear.daylight)
-    return light_of_sky(name, kind, draw_sun(kind, seed), own, clear.to_sun, p.sun, through)
+    return light_of_sky(name, kind, draw_sun(kind, seed, named), own, clear.to_sun, p.sun, through)
 
 
 def apply_weather(
@@ -270,8 +279,9 @@ def apply_weather(
     Parameters
     ----------
     weather : from `weather_scene`
-    picture : float32 [H, W, 3] linear picture of its scene before the clear environment [1]
-    clear_sky : float32 [H, W, 3] the clear environment in the same view, see `environment_view` [1]
+    picture : float32 [H, W, 3] linear picture of its scene before the clear environment, or before black if this
+        weather replaces it, see `ClipWeather.replaces_sky` [1]
+    clear_sky : float32 [H, W, 3] the clear environment in the same view, see `environment_view`, or black [1]
     gbuffer : the rasterisation it was made from
     shutter : pose, motion, time and exposure of the frame
     particles : False if `particle_layer` draws them afterwards, for a sensor with a lens or a rolling shutter, whose
@@ -289,6 +299,7 @@ def apply_weather(
     view = world_to_camera(shutter.T_world_camera)
     cloudy = environment_view(outside.environment, view, shutter.K, shutter.width, shutter.height)
     layers = [light_layer(picture, gbuffer, clear_sky, cloudy, sky)]
+    dry = recompose_layers(picture, layers)
     if film is not None:
         state = weather.state
         on_road = RoadFilm(
@@ -300,7 +311,6 @@ def apply_weather(
             refracts=weather.refracts,
         )
         light = LightOnRoad(environment=outside.environment, sky=sky, extinction=air.extinction)
-        dry = recompose_layers(picture, layers)
         layers.append(wet_layer(dry, gbuffer, shutter, rays, on_road, light))
     layers.append(air_layer(gbuffer, cloudy, air, sky, rays))
     if particles and outside.population is not None:
@@ -308,7 +318,7 @@ def apply_weather(
     return WeatherFrame(
         base=picture,
         layers=tuple(layers),
-        picture=recompose_layers(picture, layers),
+        picture=recompose_layers(dry, layers[1:]),
         blend=_blend_anchors(weather, outside, (picture, clear_sky, gbuffer, shutter)),
     )
 

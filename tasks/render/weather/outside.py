@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tasks.render.composition import LUMINANCE
 from tasks.render.weather.atmosphere import Air, precipitating_air
 from tasks.render.weather.clouds import draw_closed_sky, draw_sunny_sky
 from tasks.render.weather.controls import AirControls, RoadControls, air_controls, road_controls
@@ -100,11 +101,6 @@ def make_outside(
     scene : its light
     snow : coverage field of the scene; None where no snow lies
     focal_px : focal length of the camera [px]
-
-    Raises
-    ------
-    InputError
-        The weather has precipitation without a rate.
     """
     daylight, environment, white = scene.daylight, scene.environment, scene.white
     p = parameters
@@ -112,12 +108,14 @@ def make_outside(
     xi_road = road_controls(state, look)
     xi_atm = air_controls(state.kind, state.precipitation_mm_h, p, visual_range)
     covered, ground = xi_road.snow_coverage, p.sky.asphalt_albedo
+    brightest = ground
     if look.snow_cover is not None:
-        ground = (1 - covered) * ground + covered * float(np.mean(look.snow_cover.albedo))
+        brightest = float(np.mean(look.snow_cover.albedo))
+        ground = (1 - covered) * ground + covered * brightest
     elevation = row_elevations(len(environment))
     above = elevation[elevation > 0], environment.shape[1]
     strength = xi_atm.transmittance if daylight is None else scene.strength
-    opened = expose_light(strength, p.sky, seed)
+    opened = expose_light(strength, brightest * strength * float(LUMINANCE @ white), p.sky, seed)
     if daylight is not None and daylight.has_sun:
         rows = np.float32(opened) * draw_sunny_sky(daylight, p.sky.clouds, seed, *above)
         sky = sunny_light(white, strength * opened, rows, ground)

@@ -91,4 +91,6 @@ def lattice_unit(x, y, key):  # type: ignore[no-untyped-def]
     h = (h ^ (h >> _S30)) * _MIX_1
     h = (h ^ (h >> _S27)) * _MIX_2
     h = h ^ (h >> _S31)
-    return float(h >> _S11) * _TO_UNIT_53
+    return (
+        np.float64(np.int64(h >> _S11)) * _TO_UNIT_53
+    )  # signed: vector units of most processors convert no other

@@ -1,11 +1,12 @@
 """The sun and the kinds of sky that it shines from: which one a clip has, and what it gives a street."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tasks.render.composition import LUMINANCE
+from tasks.render.weather.named_sky import SKY_NAMES, NamedSky
 from tasks.render.weather.random_streams import unit_number
 
 
@@ -32,18 +33,13 @@ class SkyKind:
 
 @dataclass(frozen=True, kw_only=True)
 class Skies:
-    """The kinds of sky."""
+    """The kinds of sky, of ``SKY_NAMES``."""
 
     clear: SkyKind
     scattered: SkyKind
     overcast: SkyKind
     low_sun: SkyKind
     haze: SkyKind
-
-
-SKY_NAMES = tuple(field.name for field in fields(Skies))
-OVERCAST = "overcast"
-"""The sky from which rain and snow fall."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,18 +95,22 @@ def draw_sky_kind(skies: Skies, seed: int) -> str:
     return SKY_NAMES[int(np.searchsorted(shares, unit_number(seed, "sky") * shares[-1], side="right"))]
 
 
-def draw_sun(kind: SkyKind, seed: int) -> NDArray[np.float64]:
-    """Return the unit vector [3] to the sun that a visual seed gives a kind of sky.
+def draw_sun(kind: SkyKind, seed: int, named: NamedSky) -> NDArray[np.float64]:
+    """Return the unit vector [3] to the sun, of whose angles a visual seed draws those that are not named.
 
     Parameters
     ----------
     kind : gives the heights
     seed : visual seed of the clip [1]
+    named : what is said of the sky
     """
-    height = kind.lowest_sun_deg + (kind.highest_sun_deg - kind.lowest_sun_deg) * unit_number(
-        seed, "sun height"
-    )
-    return point_to_sun(360 * unit_number(seed, "sun azimuth"), height)
+    azimuth, height = named.sun_azimuth_deg, named.sun_elevation_deg
+    if azimuth is None:
+        azimuth = 360 * unit_number(seed, "sun azimuth")
+    if height is None:
+        span = kind.highest_sun_deg - kind.lowest_sun_deg
+        height = kind.lowest_sun_deg + span * unit_number(seed, "sun height")
+    return point_to_sun(azimuth, height)
 
 
 def point_to_sun(azimuth_deg: float, height_deg: float) -> NDArray[np.float64]:

@@ -29,6 +29,7 @@ class SkyParameters:
     clouds : how sky and cloud look
     exposure_compensation : share of the light's loss, in stops, by which the camera opens [1]
     least_vividness, largest_vividness : range of the saturation that a clip's camera gives, by that of the light [1]
+    brightest_ground : radiance of the ground beyond which the camera opens no further [1]
     exposure_spread_ev : largest error of the camera's metering, which a clip draws [EV]
     white_balance_spread : largest error of its red gain, which a clip draws; that of blue is its opposite [1]
     cloud_transmittance : light under full cloud by light under clear sky, where hardly anything falls [1]
@@ -50,6 +51,7 @@ class SkyParameters:
     sun: SunParameters
     clouds: CloudParameters
     exposure_compensation: float
+    brightest_ground: float
     exposure_spread_ev: float
     white_balance_spread: float
     least_vividness: float
@@ -205,17 +207,19 @@ def sunny_light(
     )
 
 
-def expose_light(strength: float, parameters: SkyParameters, seed: int) -> float:
+def expose_light(strength: float, ground: float, parameters: SkyParameters, seed: int) -> float:
     """Return how much further the camera opens under a light than in the scene's own [1].
 
     Parameters
     ----------
     strength : light on the road by that of the scene's own light [1]
+    ground : radiance of the brightest ground under it, before the camera opens; snow, where some lies [1]
     parameters : share of the loss that the camera makes up for, and the error of its metering
     seed : visual seed of the clip [1]
     """
     error = parameters.exposure_spread_ev * (2 * unit_number(seed, "exposure") - 1)
-    return float(strength**-parameters.exposure_compensation * 2**error)
+    opened = strength**-parameters.exposure_compensation * 2**error
+    return float(min(opened, parameters.brightest_ground / ground))
 
 
 def draw_camera_colours(parameters: SkyParameters, seed: int) -> NDArray[np.float64]:

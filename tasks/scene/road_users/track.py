@@ -6,8 +6,8 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-GRAVITY = 9.80665
-"""Standard acceleration of free fall [m/s2]."""
+from tasks.conventions import GRAVITY
+
 Floats = NDArray[np.float64]
 
 

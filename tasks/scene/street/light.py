@@ -88,6 +88,8 @@ def share_light(surfels: Surfels, layout: StreetLayout, line: Course, casters: C
 def sky_share(point: Floats, normal: Floats, layout: StreetLayout) -> Floats:
     """Return the view factor of the sky between two endless rows of houses, exact in the plane across the street.
 
+    A row hides the sky from the street alone, not from what lies behind it.
+
     Parameters
     ----------
     point : [N, 3] positions [m]
@@ -99,11 +101,12 @@ def sky_share(point: Floats, normal: Floats, layout: StreetLayout) -> Floats:
     float64 [N] in 0..1 [1]
     """
     height = np.maximum(layout.canyon_height - point[:, 2], 0.0)
-    right = np.arctan2(height, np.maximum(point[:, 1] - layout.front_position(-1), 0.05))
-    left = np.pi - np.arctan2(height, np.maximum(layout.front_position(1) - point[:, 1], 0.05))
-    tilt = np.arctan2(normal[:, 2], normal[:, 1])
-    cross = np.hypot(normal[:, 1], normal[:, 2])
+    away = np.stack([point[:, 1] - layout.front_position(-1), layout.front_position(1) - point[:, 1]])
+    row = np.where(away >= 0, np.arctan2(height, np.maximum(away, 0.05)), 0.0)
     # angles run from the right horizon over the zenith to the left one; a surface sees half a turn about its normal
+    right, left = row[0], np.pi - row[1]
+    tilt = np.arctan2(normal[:, 2], -normal[:, 1])
+    cross = np.hypot(normal[:, 1], normal[:, 2])
     low = np.maximum(right, tilt - np.pi / 2)
     high = np.minimum(left, tilt + np.pi / 2)
     low_behind = np.maximum(right, tilt + 2 * np.pi - np.pi / 2)

@@ -13,8 +13,10 @@ Floats = NDArray[np.float64]
 
 _RAIL_AWAY, _RAIL_TOP = 0.55, 0.75
 """Distance of a guard rail from the road's edge and height of its top [m]: RPS 2009."""
-_POST_AWAY, _POST_HEIGHT = 0.5, 1.0
-"""Of a delineator: sign 620, StVO."""
+_RAIL_WIDTH = 0.31
+"""Height of the beam's profile [m]: W-beam of EN 1317."""
+_POST_AWAY, _POST_HEIGHT, _POST_WIDTH = 0.5, 1.0, 0.12
+"""Of a delineator [m]: sign 620, StVO."""
 _SIGN_POLE = 0.9
 _UP = np.array([0.0, 0.0, 1.0])
 
@@ -110,16 +112,14 @@ def _build_rails(layout: StreetLayout, seed: int) -> list[Surfels]:
             if rng.random() >= layout.rail_share:
                 continue
             stop = min(start + 40.0, last)
-            s = np.arange(start + 0.2, stop, 0.4)
+            s = np.arange(start + 0.1, stop, 0.2)
             # the profile of the beam: two ridges, seen from the road
-            for z, shade in ((0.72, 1.0), (0.64, 0.75), (0.56, 0.5), (0.49, 1.0)):
-                centre = np.column_stack(
-                    [s, np.full(len(s), lateral), np.full(len(s), layout.kerb_height + z)]
-                )
-                tone = np.exp(0.05 * rng.standard_normal((len(s), 1)))
-                parts.append(
-                    tile_surface(centre, [side * 0.4, 0, 0], [0, 0, 0.085], kind, steel * shade * tone)
-                )
+            tone = np.exp(0.05 * rng.standard_normal((len(s), 1, 1)))
+            shade = np.interp(np.arange(8) / 7, [0, 0.25, 0.5, 0.75, 1], [0.9, 1.0, 0.5, 1.0, 0.6])
+            z = layout.kerb_height + _RAIL_TOP - _RAIL_WIDTH * (np.arange(8) + 0.5) / 8
+            centre = np.stack(np.broadcast_arrays(s[:, None], lateral, z[None]), axis=-1)
+            rise = [0, 0, _RAIL_WIDTH / 8]
+            parts.append(tile_surface(centre, [side * 0.2, 0, 0], rise, kind, steel * shade[:, None] * tone))
             posts = np.arange(start + 1.0, stop, 4.0)
             heights = layout.kerb_height + np.array([0.12, 0.36])
             upright = np.stack(
@@ -135,20 +135,24 @@ def _build_delineators(layout: StreetLayout) -> list[Surfels]:
         return []
     first, last = layout.station_range
     stations = np.arange(first + 5.0, last, layout.delineator_spacing)
-    colours = np.array([palette.WHITE_PAINT] * 7 + [palette.TYRE] * 2 + [palette.WHITE_PAINT])
-    z = (np.arange(10) + 0.5) / 10 * _POST_HEIGHT
+    rows, columns = 20, 4
+    colours = np.array([palette.WHITE_PAINT] * 14 + [palette.TYRE] * 4 + [palette.WHITE_PAINT] * 2)
+    z = (np.arange(rows) + 0.5) / rows * _POST_HEIGHT
+    across = ((np.arange(columns) + 0.5) / columns - 0.5) * _POST_WIDTH
     parts = []
     for side in (-1, 1):
         lateral = layout.pavement_end(side) + side * _POST_AWAY
         for outward in (-1.0, 1.0):
             centre = np.stack(
                 np.broadcast_arrays(
-                    stations[:, None] + 0.04 * outward, lateral, layout.kerb_height + z[None]
+                    stations[:, None, None] + 0.04 * outward,
+                    lateral + across[:, None],
+                    layout.kerb_height + z,
                 ),
                 axis=-1,
             )
-            across, up = [0, outward * 0.12, 0], [0, 0, _POST_HEIGHT / 10]
-            parts.append(tile_surface(centre, across, up, SemanticClass.POLE, colours[None]))
+            edge, up = [0, outward * _POST_WIDTH / columns, 0], [0, 0, _POST_HEIGHT / rows]
+            parts.append(tile_surface(centre, edge, up, SemanticClass.POLE, colours))
     return parts
 
 

@@ -185,8 +185,6 @@ def build_tube(
     around: int,
     class_id: SemanticClass,
     albedo: ArrayLike,
-    *,
-    glow: ArrayLike = 0.0,
 ) -> Surfels:
     """Build a round tube along a path, open at both ends.
 
@@ -196,7 +194,7 @@ def build_tube(
     radius : [n + 1] or scalar [m]
     around : cells around it [1]
     class_id : its class
-    albedo, glow : broadcast to [around, n, 3]; see `Surfels` [1]
+    albedo : broadcast to [around, n, 3]; see `Surfels` [1]
     """
     axis = np.asarray(path, dtype=np.float64)
     run = np.gradient(axis, axis=0)
@@ -208,7 +206,7 @@ def build_tube(
     angle = 2 * np.pi * np.arange(around + 1)[:, None, None] / around
     thickness = np.broadcast_to(np.asarray(radius, dtype=np.float64), len(axis))[:, None]
     corners = axis + thickness * (np.cos(angle) * side + np.sin(angle) * other)
-    return tile_surface(*sheet_cells(corners), class_id, albedo, glow=glow)
+    return tile_surface(*sheet_cells(corners), class_id, albedo)
 
 
 def build_panel(

@@ -147,20 +147,25 @@ def _build_twigs(tree: Tree, size: float, rng: np.random.Generator) -> Surfels:
         )
         for ball in tree.balls[:: 1 if is_near else 3]
     ]
-    which = np.repeat(np.arange(len(tree.balls)), 16 if is_near else 5)
-    out = rng.standard_normal((len(which), 3)) + np.array([0, 0, 0.5])
+    which = np.repeat(np.arange(len(tree.balls)), 30 if is_near else 5)
+    out = rng.standard_normal((len(which), 3))
     out /= np.linalg.norm(out, axis=1, keepdims=True)
-    begin, along = tree.balls[which, :3], out * tree.balls[which, 3:] * 1.3
-    side = np.cross(out, rng.standard_normal(out.shape))
+    radius = tree.balls[which, 3:]
+    begin = tree.balls[which, :3] + out * radius * rng.uniform(0.0, 0.8, (len(which), 1))
+    # a twig grows outward and up, and bends up as it goes
+    along = out + 0.5 * rng.standard_normal(out.shape) + np.array([0, 0, 0.4])
+    along *= radius * rng.uniform(0.4, 0.7, (len(which), 1)) / np.linalg.norm(along, axis=1, keepdims=True)
+    side = np.cross(along, rng.standard_normal(out.shape))
     side /= np.linalg.norm(side, axis=1, keepdims=True)
-    count, width = (3, 0.16 * size) if is_near else (1, 0.22 * size)
-    pieces = [
-        tile_surface(
-            begin + (k + 0.5) / count * along, along / count, side * max(0.02, width), kind, 0.94 * bark,
-            cover=Cover(0.55, 0.85),
+    count, width = (3, 0.08 * size) if is_near else (1, 0.22 * size)
+    pieces = []
+    for k in range(count):
+        step = along / count + np.array([0, 0, 0.15 * k / count]) * radius
+        thin = max(0.012, width) * (1 - 0.25 * k)
+        pieces.append(
+            tile_surface(begin + step / 2, step, side * thin, kind, 0.94 * bark, cover=Cover(0.5, 0.85))
         )
-        for k in range(count)
-    ]  # fmt: skip
+        begin = begin + step
     return join_surfels([*parts, *pieces])
 
 

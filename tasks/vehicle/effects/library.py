@@ -42,7 +42,7 @@ class Effect:
         """Return the reference for the effect's equation."""
         return self.parameters[0].source
 
-    def say(
+    def describe(
         self, values: Mapping[str, float], intervals: Mapping[str, tuple[float, float]] | None = None
     ) -> str:
         """Return the finding in plain words.
@@ -50,11 +50,11 @@ class Effect:
         Parameters
         ----------
         values : numbers of the effect by name; one that is not given has its first value [units of the table]
-        intervals : of numbers by name, said beside them [units of the table]
+        intervals : of numbers by name, written beside them [units of the table]
         """
         numbers = {p.name: p.start for p in self.parameters} | dict(values)
         return self.says.format_map(
-            {name: _Said(value, (intervals or {}).get(name)) for name, value in numbers.items()}
+            {name: _Number(value, (intervals or {}).get(name)) for name, value in numbers.items()}
         )
 
 
@@ -80,25 +80,25 @@ def format_interval(number: float, interval: tuple[float, float] | None) -> str:
     return f"{format_number(number)}{ends}"
 
 
-class _Said(float):
+class _Number(float):
     """A number in a sentence: alone, as ``percent``, as a ``share`` above or below another, or as a ``fall``."""
 
     interval: tuple[float, float] | None
 
-    def __new__(cls, value: float, interval: tuple[float, float] | None = None) -> "_Said":
-        said = super().__new__(cls, value)
-        said.interval = interval
-        return said
+    def __new__(cls, value: float, interval: tuple[float, float] | None = None) -> "_Number":
+        text = super().__new__(cls, value)
+        text.interval = interval
+        return text
 
     def __format__(self, spec: str) -> str:
         if not spec:
             return format_interval(float(self), self.interval)
-        # of what is below another the size is said, and its interval turns round
+        # of what is below another the size is written, and its interval turns round
         scale = -100.0 if spec != "percent" and self < 0.0 else 100.0
         low, high = sorted(scale * end for end in self.interval or (0.0, 0.0))
-        said = f"{format_number(scale * float(self))} %"
+        text = f"{format_number(scale * float(self))} %"
         if self.interval is not None:
-            said += f" [{format_number(low)}, {format_number(high)}]"
+            text += f" [{format_number(low)}, {format_number(high)}]"
         if spec == "share":
-            return f"{said} {'above' if scale > 0.0 else 'below'}"
-        return f"{'falls' if scale > 0.0 else 'grows'} by {said}" if spec == "fall" else said
+            return f"{text} {'above' if scale > 0.0 else 'below'}"
+        return f"{'falls' if scale > 0.0 else 'grows'} by {text}" if spec == "fall" else text

@@ -23,14 +23,12 @@ from tasks.vehicle.effects.slots import pack_slots
 from tasks.vehicle.model.brake_input import NO_COMMAND, BrakeInput
 from tasks.vehicle.model.chassis import Chassis, Conditions, build_chassis
 from tasks.vehicle.model.embedded_variables import INPUTS, OUTPUTS
-from tasks.vehicle.model.simulation import integrate_motion
+from tasks.vehicle.model.simulation import INTERNAL_STEP_S, integrate_motion
 from tasks.vehicle.model.states import STATE_WIDTH, make_rolling_state, unpack_state
 from tasks.vehicle.parameters import TyreFamily, Vehicle, compute_surface_response, compute_tyre_scale
 from tasks.vehicle.road import Climb, RoadFeature, RoadLine
 from tasks.vehicle.tyres.contract import Tyre, scale_curve
 
-STEP = 0.0005
-"""Internal step [s]."""
 START = -1
 """Number of steps that puts a drive to its start."""
 DONE, NO_TYRE = 1, 2
@@ -54,7 +52,7 @@ def count_held_samples(vehicle: Vehicle) -> int:
     ----------
     vehicle : the vehicle, whose dead time holds pressures back
     """
-    return ceil(vehicle.effects.get("dead_time", 0.0) / STEP) + 3
+    return ceil(vehicle.effects.get("dead_time", 0.0) / INTERNAL_STEP_S) + 3
 
 
 def measure_block(vehicle: Vehicle) -> int:
@@ -79,7 +77,7 @@ def compile_advance(vehicle: Vehicle, surface: SurfaceParameters) -> Any:
     -------
     Numba's C callback ``int64 advance(double *block, double *states, double *rows, int64 steps)``; ``states`` and
     ``rows`` are room for two states and two rows of outputs. `START` steps put the block to the start of a drive by its
-    parameters; then the function takes steps of `STEP`, fills the outputs and returns `DONE`.
+    parameters; then the function takes steps of `INTERNAL_STEP_S`, fills the outputs and returns `DONE`.
     """
     known, names = vehicle.find_weathers(), list_by_code()
     fixed = build_chassis(vehicle, compute_surface_response(vehicle, known[0], 0.5), Conditions())
@@ -120,11 +118,12 @@ def compile_advance(vehicle: Vehicle, surface: SurfaceParameters) -> Any:
             if samples == 2:
                 push_sample(pressures, block[_PRESSURE])
                 push_sample(engines, block[_ENGINE])
-            begin = (round(state.time / STEP) + 2 - held) * STEP
-            drive = BrakeInput(NO_COMMAND, pressures, STEP, block[_HOLD] != 0.0, engines, begin)
+            begin = (round(state.time / INTERNAL_STEP_S) + 2 - held) * INTERNAL_STEP_S
+            drive = BrakeInput(NO_COMMAND, pressures, INTERNAL_STEP_S, block[_HOLD] != 0.0, engines, begin)
             integrate_motion(
-                state, samples, _SUBSTEPS, STEP, drive, road, level, slots, chassis, tyre, history, states
-            )
+                state, samples, _SUBSTEPS, INTERNAL_STEP_S, drive, road, level, slots, chassis, tyre, history,
+                states,
+            )  # fmt: skip
             state = unpack_state(states[samples - 1])
         last = 0 if steps < 0 else 1
         for i in range(STATE_WIDTH):

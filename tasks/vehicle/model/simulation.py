@@ -35,6 +35,8 @@ from tasks.vehicle.parameters import SurfaceResponse, Vehicle
 from tasks.vehicle.road import Climb, RoadFeature, compute_climb, make_climb, make_road_feature
 from tasks.vehicle.tyres.contract import Tyre
 
+INTERNAL_STEP_S = 0.0005
+"""Internal step of a drive by a brake command, or by another program [s]."""
 COLUMNS = (
     "station", "speed", "longitudinal_acceleration", "braking_slip_f", "braking_slip_r", "wheel_speed_f",
     "wheel_speed_r", "tyre_force_f", "tyre_force_r", "tyre_load_f", "tyre_load_r", "brake_torque_f",

@@ -12,10 +12,10 @@ import flows.auditing.audit
 import manifests.explain
 from catalogs.scenes import load_scene, write_scene
 from flows.auditing.audit import audit_dataset, draw_clips, format_text
-from flows.judging.evaluation import evaluate_dataset
 from flows.making.generate import generate_dataset
 from flows.running.processors import count_processors
 from flows.store.layout import Layout
+from studies.evaluation.evaluation import evaluate_dataset
 from studies.negative_controls.study import run_controls
 from tasks.errors import InputError
 from tests.conftest import own_notes

@@ -16,7 +16,17 @@ from manifests.provenance import SOURCE_ROOT
 from tasks.errors import InputError
 
 FRONT = {
-    "Datasets": {"validate", "generate", "drive", "schedule", "status", "sql", "report", "export"},
+    "Datasets": {
+        "validate",
+        "generate",
+        "materialise",
+        "drive",
+        "schedule",
+        "status",
+        "sql",
+        "report",
+        "export",
+    },
     "Audits": {"verify", "audit", "explain"},
     "Measured data": {"import-measurements", "close-loop"},
     "Groups": {"scene", "vehicle", "lab"},

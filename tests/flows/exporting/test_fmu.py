@@ -19,9 +19,8 @@ from tasks.surface.weather import Weather, surface_state
 from tasks.vehicle.brake import BrakeCommand, compute_brake_pressure
 from tasks.vehicle.model.brake_input import make_trace_input
 from tasks.vehicle.model.chassis import Conditions
-from tasks.vehicle.model.embedded import STEP
 from tasks.vehicle.model.embedded_variables import INPUTS, OUTPUTS
-from tasks.vehicle.model.simulation import COLUMNS, Recording, simulate
+from tasks.vehicle.model.simulation import COLUMNS, INTERNAL_STEP_S, Recording, simulate
 from tasks.vehicle.parameters import compute_surface_response
 from tasks.vehicle.rollout import Controls, simulate_scenario
 from tests.flows.exporting.fmu_car import Car
@@ -115,10 +114,10 @@ def test_a_stop_on_snow_is_the_own_rollout(drive, vehicle, hazard):
     rows = [car.read_row()]
     for n in range(3000):
         car.set_inputs(
-            brake_pressure=compute_brake_pressure((n + 1) * STEP - 0.2, command.profile),
+            brake_pressure=compute_brake_pressure((n + 1) * INTERNAL_STEP_S - 0.2, command.profile),
             hold_speed=int(n < 400),
         )
-        car.take_step(STEP)
+        car.take_step(INTERNAL_STEP_S)
         if n % 2:
             rows.append(car.read_row())
     assert own.columns["speed"][-1] < 7.0
@@ -147,8 +146,8 @@ def test_a_storm_that_grips_by_speed_is_the_own_rollout(drive, vehicle):
     for by_speed in (1, 0):
         car = drive(initial_speed=28.0, wet_friction_by_speed=by_speed, **wet)
         for n in range(2000):
-            car.set_inputs(brake_pressure=compute_brake_pressure((n + 1) * STEP, command.profile))
-            car.take_step(STEP)
+            car.set_inputs(brake_pressure=compute_brake_pressure((n + 1) * INTERNAL_STEP_S, command.profile))
+            car.take_step(INTERNAL_STEP_S)
         ends.append(car.read_row()[COLUMNS.index("speed")])
     assert ends[0] == pytest.approx(own.columns["speed"][-1], abs=1e-6) and ends[1] < ends[0] - 0.3
 
@@ -167,7 +166,7 @@ def test_held_inputs_give_the_same_at_any_step_and_equal_a_trace_that_holds_them
     np.testing.assert_array_equal(runs[0.001], runs[0.01])
     trace = np.concatenate([[0.0], np.repeat(pressures, 20)])
     own = simulate(
-        vehicle, compute_surface_response(vehicle, "snow", 0.3), make_trace_input(trace, STEP),
+        vehicle, compute_surface_response(vehicle, "snow", 0.3), make_trace_input(trace, INTERNAL_STEP_S),
         Conditions(snow_depth_mm=12.0), Recording(samples=len(pressures) + 1, interval=0.01, substeps=20),
         initial_speed=15.0,
     )  # fmt: skip
@@ -289,8 +288,9 @@ def test_every_vehicle_of_the_catalogue_stops_in_every_weather_as_in_its_own_rol
         for _ in range(300):
             car.take_step(0.01)
         own = simulate(
-            vehicle, compute_surface_response(vehicle, weather, 0.37), make_trace_input(np.array([2.0]), STEP),
-            Conditions(), Recording(samples=2, interval=3.0, substeps=6000), initial_speed=20.0,
+            vehicle, compute_surface_response(vehicle, weather, 0.37),
+            make_trace_input(np.array([2.0]), INTERNAL_STEP_S), Conditions(),
+            Recording(samples=2, interval=3.0, substeps=6000), initial_speed=20.0,
         )  # fmt: skip
         np.testing.assert_allclose(car.read_row(), own.history[1], rtol=1e-9, atol=1e-9)
         car.slave.freeInstance()

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from flows.exporting.inertial import STANDARD_GRAVITY, compute_inertial_motion
+from flows.exporting.inertial import compute_inertial_motion
+from tasks.conventions import GRAVITY
 from tasks.render.camera import body_poses
 from tasks.scene.route import Route
 
@@ -51,7 +52,7 @@ def test_velocity_and_acceleration_are_derivatives_of_the_position_over_a_hump(r
     velocity = np.gradient(position, t, axis=0)
     np.testing.assert_allclose(motion.velocity[within], velocity[within], atol=1e-3)
     acceleration = np.gradient(motion.velocity, t, axis=0)
-    felt = motion.force - [0, 0, STANDARD_GRAVITY]
+    felt = motion.force - [0, 0, GRAVITY]
     np.testing.assert_allclose(felt[within], acceleration[within], atol=0.02)
     assert np.abs(felt).max() > 5  # the hump is felt
 
@@ -72,4 +73,4 @@ def test_a_car_that_stands_in_a_bend_feels_gravity_alone():
     motion = compute_inertial_motion(clip, VEHICLE)
     np.testing.assert_array_equal(motion.velocity, 0)
     np.testing.assert_array_equal(motion.turn_rate, 0)
-    np.testing.assert_allclose(motion.force, np.tile([0, 0, STANDARD_GRAVITY], (1001, 1)))
+    np.testing.assert_allclose(motion.force, np.tile([0, 0, GRAVITY], (1001, 1)))

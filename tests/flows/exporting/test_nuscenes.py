@@ -36,7 +36,6 @@ def test_a_scene_chains_its_samples_to_pictures_and_poses(export, stored, tables
     by_token = {row["token"]: row for rows in tables.values() for row in rows}
     assert len(by_token) == sum(map(len, tables.values()))
     data_of = {row["sample_token"]: row for row in tables["sample_data"]}
-    (mount,) = tables["calibrated_sensor"]
     for number, scene in enumerate(tables["scene"]):
         clip = stored[scene["description"]]
         token, seen = scene["first_sample_token"], []
@@ -53,7 +52,9 @@ def test_a_scene_chains_its_samples_to_pictures_and_poses(export, stored, tables
             ego = to_matrix(by_token[row["ego_pose_token"]])
             # ego and mount together give our camera's pose
             expected = clip.T_world_rig[frame] @ catalogue.camera.T_rig_camera
-            np.testing.assert_allclose(ego @ to_matrix(mount), expected, atol=1e-12)
+            np.testing.assert_allclose(
+                ego @ to_matrix(by_token[row["calibrated_sensor_token"]]), expected, atol=1e-12
+            )
             # the ego frame lies a wheelbase behind the front axle
             wheelbase = catalogue.vehicle.cg_to_front_axle + catalogue.vehicle.cg_to_rear_axle
             behind = np.linalg.inv(clip.T_world_rig[frame]) @ ego[:, 3]

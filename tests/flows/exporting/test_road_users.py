@@ -11,11 +11,11 @@ import musync
 from catalogs.entries import load
 from flows.auditing.audit import audit_dataset
 from flows.exporting.export import export_dataset
-from flows.judging.judged_clip import View
 from flows.making import gate
 from flows.making.catalogue import catalogue_of
 from flows.making.generate import generate_dataset
 from flows.store.layout import Layout
+from studies.evaluation.judged_clip import View
 from tasks.errors import InputError
 from tests.toy_street import write_toy_grid
 
@@ -263,7 +263,7 @@ def test_no_check_reads_the_depth_of_what_moves(made, data, masks, monkeypatch):
 
     monkeypatch.setattr(gate, "prepare_for_checks", keep)
     with pytest.raises(InputError, match="enough"):
-        gate.judge_motion(stored, {}, 0.0, catalogue_of(made))
+        gate.judge_motion(stored, {}, 0.0, catalogue_of(made), catalogue_of(made).camera)
     for depth in (*seen, View(root=made).arrays(index, "depth")[0]):
         assert np.isnan(depth[masks > 0]).all()
         np.testing.assert_array_equal(depth[masks == 0], stored["depth"][masks == 0])

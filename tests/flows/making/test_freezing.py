@@ -7,8 +7,8 @@ from typer.testing import CliRunner
 
 import flows.making.freezing
 from catalogs.entries import find_entry, load
+from flows.auditing.physics import audit_physics
 from flows.cli import app
-from flows.judging.physics import audit_physics
 from flows.making.freezing import (
     freeze_run,
     frozen_run,

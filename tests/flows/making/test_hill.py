@@ -12,9 +12,9 @@ from catalogs.road_grade import ROAD_GRADE
 from catalogs.scenes import write_scene
 from flows.auditing.audit import audit_dataset
 from flows.auditing.explain import explain_frame
+from flows.auditing.physics import audit_physics, clip_columns, clip_facts
+from flows.auditing.physics_constants import read_constants
 from flows.auditing.repair import repair_dataset
-from flows.judging.physics import audit_physics, clip_columns, clip_facts
-from flows.judging.physics_constants import read_constants
 from flows.making.catalogue import Catalogue
 from flows.making.freezing import frozen_run
 from flows.making.generate import generate_dataset

@@ -11,7 +11,7 @@ import flows.making.generate
 from flows.auditing.repair import repair_dataset
 from flows.auditing.verify import collect_garbage
 from flows.making.generate import generate_dataset
-from flows.making.places import noted_place, remember_place
+from flows.making.locations import note_location, noted_location
 from flows.making.plan import make_plan
 from flows.store.layout import PARTIAL, Layout
 from flows.store.lock import sole_writer
@@ -261,12 +261,12 @@ def test_a_run_that_waited_while_another_ended_makes_nothing_and_leaves_nothing(
 
 
 def test_a_damaged_note_of_where_a_scene_lies_is_made_anew(toy_dataset, tmp_path, monkeypatch):
-    monkeypatch.setattr("flows.making.places.cache_root", lambda: tmp_path)
+    monkeypatch.setattr("flows.making.locations.cache_root", lambda: tmp_path)
     scene, digest = toy_dataset.root.parent / "scene", "0" * 64
-    remember_place(digest, scene)
+    note_location(digest, scene)
     (note,) = (tmp_path / "places").iterdir()
     for damage in (b"", b"[1]", b"{"):
         note.write_bytes(damage)
-        assert noted_place(digest) is None
-        remember_place(digest, scene)
-        assert noted_place(digest) == scene
+        assert noted_location(digest) is None
+        note_location(digest, scene)
+        assert noted_location(digest) == scene

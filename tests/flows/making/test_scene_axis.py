@@ -10,8 +10,8 @@ from catalogs.road_grade import name_grade_file
 from catalogs.scenes import write_scene
 from flows.auditing.audit import audit_dataset
 from flows.auditing.explain import explain_frame
+from flows.auditing.physics import audit_physics, clip_columns, clip_facts
 from flows.exporting.export import export_dataset
-from flows.judging.physics import audit_physics, clip_columns, clip_facts
 from flows.making.generate import generate_dataset
 from flows.making.plan import make_plan, read_plan
 from flows.reading.report import make_report

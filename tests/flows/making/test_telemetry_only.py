@@ -9,9 +9,9 @@ import pytest
 import musync
 from flows.auditing.audit import audit_dataset
 from flows.auditing.explain import explain_frame
+from flows.auditing.physics import audit_physics
 from flows.auditing.repair import repair_dataset
 from flows.auditing.verify import verify_dataset
-from flows.judging.physics import audit_physics
 from flows.making.generate import generate_dataset
 from flows.making.plan import make_plan
 from flows.reading.describe import describe_dataset

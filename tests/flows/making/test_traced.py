@@ -13,7 +13,7 @@ from catalogs.references import ReferenceCase
 from catalogs.scenario import Scenario
 from flows.auditing.audit import audit_dataset
 from flows.auditing.explain import explain_frame
-from flows.judging.physics import audit_physics, clip_columns, clip_facts
+from flows.auditing.physics import audit_physics, clip_columns, clip_facts
 from flows.making.request import make_dataset
 from flows.reading.query import query_dataset
 from studies.lineage.trace import trace_lineage

@@ -13,21 +13,21 @@ from catalogs.grids import FaultyGrid, GridFile
 from catalogs.scenes import write_scene
 from flows.auditing.audit import audit_dataset
 from flows.auditing.explain import explain_frame
+from flows.auditing.physics import audit_physics, clip_columns, clip_facts
 from flows.auditing.repair import repair_dataset
 from flows.exporting.export import export_dataset
-from flows.judging.physics import audit_physics, clip_columns, clip_facts
 from flows.making.catalogue import Catalogue, catalogue_of
 from flows.making.driving import simulate_drive
 from flows.making.freezing import frozen_run, problems_of
 from flows.making.generate import generate_dataset
 from flows.making.plan import freeze_grid, read_plan
-from flows.making.replay import replay_audit
 from flows.making.summaries import SUMMARIES
 from flows.reading.describe import describe_dataset, validate_grid
 from flows.reading.report import summarise_run
 from flows.store.frames import read_clip
 from flows.store.sealed import read_manifest
 from manifests.explain import find_input_differences
+from studies.paper.replay import replay_audit
 from tasks.errors import InputError
 from tests.toy_street import TOY_CAMERA, toy_street
 

@@ -4,7 +4,7 @@ import pytest
 
 from catalogs.entries import load
 from flows.auditing.explain import explain_frame
-from flows.judging.physics import audit_physics
+from flows.auditing.physics import audit_physics
 from flows.making.generate import generate_dataset
 from flows.making.plan import make_plan
 from flows.store.sealed import read_manifest, recorded_grid

@@ -2,10 +2,10 @@
 
 import pytest
 
-from catalogs.entries import load
 from flows.measured import closing_error_rates
 from flows.measured.closing_error_rates import describe_error_rates, load_error_rates
 from studies.closing_benchmark.summary import summarise_benchmark
+from studies.closing_benchmark.truths import load_truths
 
 
 def row(kind: str, truth: str | None, outcome: str, named: list[str], seed: int) -> dict[str, object]:
@@ -44,6 +44,6 @@ def test_the_counts_that_ship_have_nulls_and_every_truth_as_often() -> None:
     rates = load_error_rates()
     assert rates["false_discoveries"]["of"] == 55
     assert {truth: sum(outcomes.values()) for truth, outcomes in rates["confusion"].items()} == {
-        truth.name: 5 if truth.in_library else 2 for truth in load("list of truths")
+        truth.name: 5 if truth.in_library else 2 for truth in load_truths()
     }
     assert sum(share["of"] for share in rates["summary"] if share["figure"].startswith("refused")) == 140

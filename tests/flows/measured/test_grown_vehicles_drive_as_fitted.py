@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 import yaml
 
-from catalogs.entries import find_entry, load
+from catalogs.entries import load
 from catalogs.vehicles import open_vehicle
 from flows.measured.grown_vehicle import grown_vehicle
+from studies.closing_benchmark.truths import load_truths
 from tasks.campaign.campaign import Run
 from tasks.identification.decision.excitation import find_reached_range
 from tasks.identification.decision.forms import PORT_STEP, RANGE, make_form_in_range
@@ -36,7 +37,7 @@ MANOEUVRES = {
     "slow": (Weather(kind="dry"), 4.5, 0.0, 0.0),
 }
 """Weather, first speed [m/s], peak pressure [MPa] and height of a hump [m]."""
-TRUTHS = yaml.safe_load(find_entry("library of effects").with_name("truths.yaml").read_text())["library"]
+TRUTHS = {truth.name: truth.values for truth in load_truths() if truth.in_library}
 LIBRARY = [e for e in load("library of effects") if e.effect_class != "sensor"]
 OF_THE_ROAD = {"retuned_grade"}
 """A grade belongs to the proving ground and not to the vehicle."""

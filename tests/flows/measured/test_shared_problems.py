@@ -5,14 +5,14 @@ from pathlib import Path
 import pytest
 
 from flows.measured.importing import import_measurements
-from flows.measured.readable_recordings import PlacedProblem, join_shared_problems
+from flows.measured.readable_recordings import RecordingProblem, join_shared_problems
 from tasks.errors import InputError
 from tests.campaign.recorded import braking_columns, log_signal
 from tests.flows.measured.recordings import map_beside, write_csv
 
 
-def find_place_problem(number: int, sentence: str) -> PlacedProblem:
-    return PlacedProblem(name=f"run-{number:02d}", place=f"run-{number:02d} (log.csv)", sentence=sentence)
+def find_place_problem(number: int, sentence: str) -> RecordingProblem:
+    return RecordingProblem(name=f"run-{number:02d}", origin=f"run-{number:02d} (log.csv)", sentence=sentence)
 
 
 def test_a_shared_fault_is_told_once_with_its_runs_and_the_range_of_its_figures() -> None:

@@ -10,16 +10,16 @@ import pytest
 
 import musync
 from flows.auditing.explain import explain_frame
+from flows.auditing.physics import audit_physics
 from flows.exporting.export import export_dataset
-from flows.judging.evaluation import evaluate_dataset
-from flows.judging.physics import audit_physics
 from flows.reading.describe import describe_dataset
 from flows.reading.previews import make_films
 from flows.reading.report import make_report
-from flows.reading.sheets import draw_sheets
 from flows.store.layout import Layout
 from flows.store.telemetry import read_table
+from studies.evaluation.evaluation import evaluate_dataset
 from studies.negative_controls.study import run_controls
+from studies.paper.sheets import draw_sheets
 from tasks.errors import InputError
 
 

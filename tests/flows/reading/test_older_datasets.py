@@ -11,8 +11,8 @@ import musync
 from flows.auditing.audit import audit_dataset
 from flows.auditing.dataset_diff import compare_datasets
 from flows.auditing.explain import explain_frame
+from flows.auditing.physics import audit_physics
 from flows.exporting.export import export_dataset
-from flows.judging.physics import audit_physics
 from flows.reading.query import query_dataset
 from flows.reading.report import make_report
 from flows.store.layout import Layout

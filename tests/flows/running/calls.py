@@ -2,8 +2,6 @@
 
 import os
 
-import dask
-
 
 def square_or_fail(number: int) -> int:
     if number == 3:
@@ -21,7 +19,3 @@ def end_worker(_: int) -> None:
 
 def list_variables(names: tuple[str, ...]) -> dict[str, str | None]:
     return {name: os.environ.get(name) for name in names}
-
-
-def list_settings(names: tuple[str, ...]) -> dict[str, object]:
-    return {name: dask.config.get(name) for name in names}

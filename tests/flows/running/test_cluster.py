@@ -6,13 +6,12 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from threading import Thread
 
-import dask
 import pytest
 from distributed import Client, LocalCluster
 
@@ -27,7 +26,6 @@ from flows.running.cluster import (
     gpu_for,
     warm_cluster,
 )
-from flows.running.runner import open_executor
 from flows.store.layout import Layout
 from tasks.errors import InputError
 
@@ -73,19 +71,15 @@ def test_workers_of_one_machine_take_its_gpus_in_turn(place, visible, present, g
 
 
 @contextmanager
-def cluster(
-    folder: Path, workers: int, tls: Sequence[str] = ()
-) -> Iterator[tuple[str, list[subprocess.Popen]]]:
+def cluster(folder: Path, workers: int) -> Iterator[tuple[str, list[subprocess.Popen]]]:
     """A scheduler and workers, each a process of its own, as an administrator starts them."""
     folder.mkdir(exist_ok=True)
     file, log = folder / "scheduler.json", (folder / "log").open("w")
     dask = [sys.executable, "-m", "dask"]
-    protocol = ["--protocol", "tls"] if tls else []
     parts = [
-        [*dask, "scheduler", "--port", "0", "--no-dashboard", "--host", "127.0.0.1", "--scheduler-file", str(file),
-         *protocol, *tls],
+        [*dask, "scheduler", "--port", "0", "--no-dashboard", "--host", "127.0.0.1", "--scheduler-file", str(file)],
         *[[*dask, "worker", "--scheduler-file", str(file), "--nthreads", "1", "--no-dashboard", "--no-nanny",
-           "--local-directory", str(folder), "--name", str(number), *protocol, *tls] for number in range(workers)],
+           "--local-directory", str(folder), "--name", str(number)] for number in range(workers)],
     ]  # fmt: skip
     running = [
         subprocess.Popen(part, cwd=folder, stdout=log, stderr=log, start_new_session=True) for part in parts
@@ -143,35 +137,6 @@ def test_a_worker_that_dies_while_it_compiles_is_passed_over(tmp_path):
         client.wait_for_workers(2, timeout=60)
         warm_cluster(client, end_the_first, address)
         assert mark.is_dir() and [worker.poll() for worker in workers].count(None) == 1
-
-
-def test_a_cluster_behind_certificates_is_used_with_those_that_dask_is_configured_with(tmp_path):
-    pytest.importorskip("cryptography", reason="makes the certificate of this test")
-    from distributed.security import Security
-
-    made = Security.temporary()
-    names = {"ca-file": "ca.pem", "cert": "cert.pem", "key": "key.pem"}
-    parts = dict(zip(names, (made.tls_ca_file, made.tls_client_cert, made.tls_client_key), strict=True))
-    for option, file in names.items():
-        (tmp_path / file).write_text(parts[option])
-    tls = [word for option, file in names.items() for word in (f"--tls-{option}", str(tmp_path / file))]
-    settings = {
-        "distributed.comm.tls.ca-file": str(tmp_path / "ca.pem"),
-        "distributed.comm.tls.client.cert": str(tmp_path / "cert.pem"),
-        "distributed.comm.tls.client.key": str(tmp_path / "key.pem"),
-    }
-    with cluster(tmp_path / "cluster", 1, tls) as (address, _):
-        assert address.startswith("tls://")
-        with (
-            pytest.raises(InputError, match="tls needs certificates"),
-            open_executor("dask", 1, address),
-        ):
-            pass
-        with dask.config.set(settings):
-            with Client(address) as client:
-                client.wait_for_workers(1, timeout=60)
-            with open_executor("dask", None, address) as executor:
-                assert executor.submit(abs, -7).result() == 7
 
 
 @pytest.fixture

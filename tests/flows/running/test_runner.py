@@ -16,7 +16,6 @@ from flows.running.orchestration import run_as_stage
 from flows.running.runner import (
     ALLOCATOR,
     SPAWNED,
-    WATCH,
     choose_runner,
     log_dashboard,
     open_executor,
@@ -26,7 +25,6 @@ from manifests.provenance import SOURCE_ROOT
 from tasks.errors import InputError
 from tests.flows.running.calls import (
     end_worker,
-    list_settings,
     list_variables,
     square_or_fail,
     tell_process_id,
@@ -183,11 +181,6 @@ def test_a_runner_that_does_not_exist_is_refused_and_not_taken_for_dask(runner, 
 def test_local_workers_keep_the_memory_that_the_next_frame_needs(executors):
     found = executors["dask"].submit(list_variables, tuple(ALLOCATOR)).result()
     assert found == {name: str(value) for name, value in ALLOCATOR.items()}
-
-
-def test_local_workers_watch_themselves_seldom(executors):
-    found = executors["dask"].submit(list_settings, tuple(WATCH)).result()
-    assert found == WATCH
 
 
 def test_each_worker_process_sees_one_gpu_of_those_visible(executors):

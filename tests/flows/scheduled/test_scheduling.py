@@ -13,8 +13,7 @@ from flows.making.clip import make_clip
 from flows.running.failures import ClipsFailed
 from flows.scheduled.failure_report import report_failure
 from flows.scheduled.notification import notify_problem
-from flows.scheduled.prefect_schedule import watch_lateness
-from flows.scheduled.scheduling import checked_parameters, dataset_place, scheduled_run
+from flows.scheduled.scheduling import checked_parameters, choose_dataset, scheduled_run
 from flows.store.layout import Layout
 from tasks.errors import InputError
 
@@ -122,7 +121,7 @@ def test_an_unfinished_dataset_with_a_damaged_plan_is_left_alone(grid, tmp_path,
     damaged = tmp_path / "root" / "toy-20260228T030000Z"
     damaged.mkdir(parents=True)
     (damaged / "plan.json").write_text(plan)
-    assert dataset_place(grid, str(tmp_path / "root"), "auto", AT).endswith("toy-20260301T030000Z")
+    assert choose_dataset(grid, str(tmp_path / "root"), "auto", AT).endswith("toy-20260301T030000Z")
 
 
 def test_a_failure_is_posted_to_a_webhook(tmp_path):
@@ -171,6 +170,10 @@ def test_what_can_never_be_told_is_refused(notify):
 
 
 def test_a_run_is_late_that_begins_late_or_still_goes_on_when_the_next_is_due():
+    from flows.scheduled.prefect_schedule import (
+        watch_lateness,
+    )  # imports Prefect, which no other test here needs
+
     now, told = datetime.now(UTC), []
     with watch_lateness(now - timedelta(hours=2), now + timedelta(seconds=0.01), told.append):
         time.sleep(0.05)

@@ -22,7 +22,7 @@ from flows.making.plan import make_plan
 from flows.reading.describe import describe_dataset
 from flows.reading.query import query_dataset
 from flows.scheduled.failure_report import report_failure
-from flows.scheduled.scheduling import checked_parameters, dataset_place, scheduled_run
+from flows.scheduled.scheduling import checked_parameters, choose_dataset, scheduled_run
 from flows.store.address import open_for_reading, open_for_writing, want_everything, want_progress
 from flows.store.frames import read_clip
 from flows.store.layout import Layout
@@ -93,6 +93,15 @@ def test_it_is_audited_and_questions_bring_no_frames(stored, machine, toy_datase
     assert here and {path.name for path in here} == {"zarr.json"}
     result = audit_dataset(stored, share=0.25, runner="threads", workers=1)
     assert result["verified"] and len(result["rerun"]) == 1
+
+
+def test_frames_of_an_address_are_made_when_they_are_read_and_nothing_is_sent(machine, grid, toy_dataset):
+    address, whole = "s3://data/sets/later", read_clip(toy_dataset.frames, 1, "rgb")
+    assert generate_dataset(grid, address, runner="threads", workers=1, pictures="later").made == 4
+    before, data = objects_of(address), musync.open(address)
+    assert not any(name.startswith("frames.zarr/") for name in before)
+    assert np.array_equal(data.torch(window=3, stride=3, clips=["dry/hump"])[1]["rgb"].numpy(), whole[3:6])
+    assert np.array_equal(data.frames["rgb"][1], whole) and objects_of(address) == before
 
 
 def test_analysts_read_single_frames_from_the_store_and_windows_from_their_cache(
@@ -225,7 +234,7 @@ def test_a_schedule_writes_dated_datasets_to_a_store_resumes_there_and_reports_t
         prepare_dataset(layout, *make_plan(grid, "cpu"))
     run = scheduled_run(grid, root, at=at + timedelta(days=1), runner="threads", workers=1)
     assert (run["dataset"], run["made"]) == (f"{root}/toy-20260301T030000Z", 4)
-    assert dataset_place(grid, root, "cpu", at + timedelta(days=2)) == f"{root}/toy-20260303T030000Z"
+    assert choose_dataset(grid, root, "cpu", at + timedelta(days=2)) == f"{root}/toy-20260303T030000Z"
     report = report_failure("toy", root, at, RuntimeError("no luck"), None)
     assert report.is_relative_to(tmp_path)
     assert Objects(root).read("reports/20260301T030000Z.txt") == report.read_bytes()

@@ -8,15 +8,14 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from flows.auditing.physics import clip_columns, clip_facts
 from flows.cli import app
-from flows.judging.evaluation import evaluate_dataset
-from flows.judging.judged_clip import METHODS, JudgedClip
-from flows.judging.physics import clip_columns, clip_facts
 from flows.making.catalogue import catalogue_of
 from flows.making.generate import generate_dataset
 from flows.making.plan import read_plan
 from flows.reading.previews import make_films
-from flows.reading.sheets import draw_sheets
+from studies.evaluation.evaluation import evaluate_dataset
+from studies.evaluation.judged_clip import METHODS, JudgedClip
 from studies.negative_controls import study as judging_controls
 from studies.negative_controls.claims import Claim
 from studies.negative_controls.study import (
@@ -30,6 +29,7 @@ from studies.negative_controls.study import (
     score_controls,
     summarise_controls,
 )
+from studies.paper.sheets import draw_sheets
 from tasks.errors import InputError
 from tasks.eval.poses.motion import RecoveredMotion
 from tests.toy_street import write_toy_grid

@@ -20,9 +20,7 @@ BRIEF = PROTOCOL | {
     "weather_levels": {"rain-50": {"weather": "rain", "precipitation_mm_h": 50}},
 }
 EDITS = {
-    "noisy": (lambda frames: add_noise(frames, 1), "FFV1"),
-    "warped-road": (warp_road, "FFV1"),
-    "recoded": (lambda frames: frames, "mp4v"),
+    "warped-road": (lambda frames: add_noise(warp_road(frames), 1), "mp4v"),
     "faster": (lambda frames: frames[np.minimum(np.arange(31) * 2, 30)], "FFV1"),
 }
 
@@ -62,13 +60,12 @@ def edited(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     return result | {"unmoved": rms(rain - sunny), "out": root / "out"}
 
 
-@pytest.mark.parametrize("model", ["noisy", "warped-road", "recoded"])
-def test_noise_a_swimming_road_and_another_codec_move_no_car(edited: dict[str, Any], model: str) -> None:
+def test_noise_a_swimming_road_and_another_codec_move_no_car(edited: dict[str, Any]) -> None:
     """Appendix A.5 for a car that moves as in the dry: the whole change that was meant, and no event in the pitch."""
     assert edited["unmoved"] > 0.05
-    assert cell(edited, model, "e_weather") == pytest.approx(edited["unmoved"], rel=0.05)
-    assert cell(edited, model, "e_geometry_hump") == pytest.approx(1.0, abs=0.1)
-    assert cell(edited, model, "e_path") < 0.01
+    assert cell(edited, "warped-road", "e_weather") == pytest.approx(edited["unmoved"], rel=0.05)
+    assert cell(edited, "warped-road", "e_geometry_hump") == pytest.approx(1.0, abs=0.1)
+    assert cell(edited, "warped-road", "e_path") < 0.01
 
 
 def test_a_car_that_an_editor_makes_faster_scores_otherwise(edited: dict[str, Any]) -> None:

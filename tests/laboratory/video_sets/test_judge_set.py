@@ -11,10 +11,8 @@ import pyarrow.parquet as pq
 import pytest
 import yaml
 
-from catalogs.learned_judges import LoadedJudge
-from flows.judging.foreign import read_claim
-from flows.judging.foreign_sources import read_camera
-from flows.judging.learned_rows import score_pictures
+from studies.foreign_video.judge import read_claim
+from studies.foreign_video.sources import read_camera
 from studies.synthetic_street import (
     drive_clip,
     hump_drive,
@@ -27,8 +25,8 @@ from studies.video_sets.motion import JudgedSet, look_at_clip
 from studies.video_sets.motion_panels import list_set_panels
 from studies.video_sets.protocol import load_protocol
 from tasks.errors import InputError
-from tests.flows.judging.test_foreign import encode
-from tests.flows.judging.test_trajectories import tum_lines
+from tests.laboratory.foreign_video.test_foreign import encode
+from tests.laboratory.foreign_video.test_trajectories import tum_lines
 
 Drive = tuple[np.ndarray, np.ndarray, np.ndarray]
 STOPS = {"sunny": 7.0, "rain-50": 4.0, "snow-3": 2.0}
@@ -289,22 +287,3 @@ def test_a_panel_has_the_claim_and_a_row_a_seed_of_each_model(judged: dict[str, 
     np.testing.assert_allclose(rain.recovered["graded, true"], np.zeros((1, 81)), atol=1e-9)
     assert np.abs(hump.recovered["graded, true"]).max() < 1e-6 < 0.5 < np.abs(hump.meant).max()
     assert hump.shaded == pytest.approx((2.2, 3.8))
-
-
-def test_learned_judges_score_one_video_under_their_names() -> None:
-    def loaded(network: Any, features: Any = None) -> LoadedJudge:
-        return LoadedJudge(network=network, text_features=features, note="")
-
-    torch = pytest.importorskip("torch")
-    frames = np.full((3, 32, 48, 3), 100, np.uint8)
-    judges = {
-        "dover": loaded(lambda video: torch.tensor([0.4])),
-        "fast_vqa": loaded(None),
-        "lpips": loaded(lambda a, b: (a - b).abs().mean()),
-        "clip": loaded(lambda x: torch.tensor([[0.6, 0.8]]).repeat(len(x), 1), np.eye(3, 2)),
-    }
-    scores = score_pictures(frames, judges, ("rain", "hail"))
-    assert scores["dover_overall"] == pytest.approx(0.4) and scores["clip_rain"] == pytest.approx(0.2)
-    assert scores["temporal_lpips"] == pytest.approx(0.0, abs=0.02) and set(scores) == {
-        "dover_overall", "temporal_lpips", "clip_rain"
-    }  # fmt: skip

@@ -1,25 +1,29 @@
 """Light put on a street that knows its own: sun, kinds of sky, shadows of the discs themselves."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
+from catalogs.entries import load
 from tasks.conventions import SemanticClass
 from tasks.render.composition import LUMINANCE
 from tasks.render.weather.clouds import draw_closed_sky, draw_sunny_sky
 from tasks.render.weather.daylight import relight_street
+from tasks.render.weather.layers import ClearScene, ClipConditions, choose_light
+from tasks.render.weather.named_sky import ANY_SKY, SKY_NAMES, NamedSky
 from tasks.render.weather.scene_light import append_gaussians, mean_colours
 from tasks.render.weather.skies import (
-    SKY_NAMES,
+    Skies,
     air_mass,
     draw_sky_kind,
     draw_sun,
     light_of_sky,
     point_to_sun,
 )
-from tasks.render.weather.sky import row_elevations
+from tasks.render.weather.sky import expose_light, row_elevations
 from tasks.render.weather.sun_shadow import cast_sun
+from tasks.surface.weather import Weather, surface_state
 from tests.render.weather.scenes import road, surfels
 
 OWN = np.array(((1.9, 1.8, 1.6), (0.4, 0.5, 0.6), (0.2, 0.2, 0.2)))
@@ -111,8 +115,54 @@ def test_a_seed_draws_one_sky_and_seeds_draw_all_by_their_shares(parameters):
     shares = np.array([getattr(skies, name).share for name in SKY_NAMES])
     found = np.array([names.count(name) for name in SKY_NAMES]) / 400
     assert found == pytest.approx(shares / shares.sum(), abs=0.08)
-    heights = [np.degrees(np.arcsin(draw_sun(skies.low_sun, seed)[2])) for seed in range(50)]
+    heights = [np.degrees(np.arcsin(draw_sun(skies.low_sun, seed, ANY_SKY)[2])) for seed in range(50)]
     assert skies.low_sun.lowest_sun_deg <= min(heights) < max(heights) <= skies.low_sun.highest_sun_deg
+
+
+@pytest.mark.parametrize(
+    "weather",
+    [
+        Weather(kind="dry"),
+        Weather(kind="rain", precipitation_mm_h=8.0),
+        Weather(kind="snow", precipitation_mm_h=2.0, snow_accumulation_h=1.0),
+        Weather(kind="ice"),
+    ],
+    ids=lambda weather: weather.kind,
+)
+def test_cloud_closes_over_what_falls_and_opens_when_it_has_ended(weather, half_shaded, parameters):
+    asphalt = load("surface", "dense-asphalt")
+    scene = ClearScene(
+        gaussians=half_shaded, environment=np.zeros((2, 4, 3), np.float32), to_sun=SUN, daylight=OWN
+    )
+
+    def skies(falling, named=ANY_SKY):
+        state = surface_state(replace(weather, falling=falling), asphalt)
+        return [
+            choose_light(
+                scene,
+                ClipConditions(state=state, pavement=asphalt, parameters=parameters, seed=seed, sky=named),
+            )
+            for seed in range(12)
+        ]
+
+    closed = {"rain": {True}, "snow": {True}, "dry": set(), "ice": {True, False}}[weather.kind]
+    for falling in (True, False):
+        assert ({light.name for light in skies(falling)} == {"overcast"}) == (falling in closed)
+    named = skies(False, NamedSky(kind="low_sun", sun_azimuth_deg=30.0, sun_elevation_deg=8.0))
+    assert {light.name for light in named} == {"low_sun"}
+    for light in named:
+        np.testing.assert_allclose(light.to_sun, point_to_sun(30.0, 8.0))
+
+
+def test_the_names_of_skies_are_those_of_the_catalogue():
+    assert tuple(field.name for field in fields(Skies)) == SKY_NAMES
+
+
+def test_a_camera_that_sees_snow_in_the_sun_opens_no_further_than_shows_its_relief(parameters):
+    p = parameters.sky
+    for seed in range(20):
+        assert expose_light(1.0, 1.4, p, seed) * 1.4 <= p.brightest_ground * (1 + 1e-12)
+        assert expose_light(0.25, 0.04, p, seed) == expose_light(0.25, 0.02, p, seed)
 
 
 def test_closed_cloud_has_structure_and_keeps_the_mean_that_lights_the_street(parameters):

@@ -243,6 +243,21 @@ def test_single_pixels_of_another_class_make_no_holes_in_the_wet_road_and_its_ed
     assert np.abs(other.add - whole.add)[inner].max() < 0.02
 
 
+def test_a_hole_in_the_road_leaves_no_pixel_dark_but_its_own(parameters, sky):
+    picture, gbuffer = flat_gbuffer(VIEW)
+    row, column = (int(index.mean()) for index in np.nonzero(gbuffer.class_id == SemanticClass.ROAD))
+    arrays = {name: getattr(gbuffer, name).copy() for name in ("depth", "alpha", "class_id")}
+    arrays["depth"][row, column], arrays["alpha"][row, column], arrays["class_id"][row, column] = np.nan, 0, 0
+    torn = replace(gbuffer, **arrays)
+    film = RoadFilm(
+        depth_mm=1.2, texture_depth_mm=TEXTURE_MM, parameters=parameters.kinds["rain"].film, seed=1
+    )
+    light = LightOnRoad(environment=CLOUDY, sky=sky, extinction=0.0)
+    layer = wet_layer(picture, torn, VIEW, pixel_rays(VIEW), film, light)
+    assert np.isfinite(layer.add).all() and np.isfinite(layer.gain).all()
+    assert not layer.add[row, column].any() and layer.add[row, column + 2].all()
+
+
 def test_drops_blur_what_a_film_mirrors_and_leave_its_share(parameters, sky):
     """Mirrored stripes lose contrast as the rate rises; the gain, which is the share's, stays."""
     view = shutter()

@@ -7,7 +7,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.render.weather.coverage_field import FieldParameters, fractal_noise
+from tasks.render.weather.coverage_field import FieldParameters, sum_waves
 from tasks.render.weather.random_streams import stream_key
 from tasks.render.weather.wet.road_view import RoadView
 
@@ -122,23 +122,61 @@ def _water(  # type: ignore[no-untyped-def]
     depth, rays, normal, road, mirrors, eye, focal, film, wet, texture, spread, uneven, coarsest, octaves, roughness,
     ripple_slope, ripple, key, smooth, water, cosine,
 ):  # fmt: skip
+    """Row after row, the waves of all its road pixels at once."""
+    width = road.shape[1]
+    columns = np.empty(width, dtype=np.int64)
+    places, turned = np.empty((2, width)), np.empty((2, width))
+    size, along, across = np.empty(width), np.empty(width), np.empty(width)
     for row in range(road.shape[0]):
-        for column in range(road.shape[1]):
+        count = 0
+        for column in range(width):
             if not road[row, column]:
                 continue
-            ray, up, z = rays[row, column], normal[row, column], depth[row, column]
-            stretch = sqrt(ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2])
-            facing = max(-(ray[0] * up[0] + ray[1] * up[1] + ray[2] * up[2]) / stretch, 0.01)
-            x, y = eye[0] + z * ray[0], eye[1] + z * ray[1]
-            size = z * stretch / (focal * facing)
-            level = film + uneven * fractal_noise(x, y, size, coarsest, octaves, roughness, key)
-            smooth[row, column] = wet * 0.5 * (1 + erf((level - texture) / (spread * sqrt(2.0))))
+            z, rx, ry, rz = (
+                depth[row, column],
+                rays[row, column, 0],
+                rays[row, column, 1],
+                rays[row, column, 2],
+            )
+            nx, ny, nz = normal[row, column, 0], normal[row, column, 1], normal[row, column, 2]
+            stretch = sqrt(rx * rx + ry * ry + rz * rz)
+            facing = max(-(rx * nx + ry * ny + rz * nz) / stretch, 0.01)
+            places[0, count], places[1, count] = eye[0] + z * rx, eye[1] + z * ry
+            size[count] = z * stretch / (focal * facing)
             cosine[row, column] = min(facing, 1.0)
-            if not mirrors[row, column]:
-                continue
-            nx = up[0] - ripple_slope * fractal_noise(x, y, size, ripple, 2, 0.6, key + np.uint64(1000))
-            ny = up[1] - ripple_slope * fractal_noise(x, y, size, ripple, 2, 0.6, key + np.uint64(2000))
-            length = sqrt(nx * nx + ny * ny + up[2] * up[2])
-            water[row, column, 0] = nx / length
-            water[row, column, 1] = ny / length
-            water[row, column, 2] = up[2] / length
+            columns[count] = column
+            count += 1
+        _copy_places(count, places, turned)
+        sum_waves(count, turned, size, coarsest, octaves, roughness, key, along)
+        mirroring = 0
+        for i in range(count):
+            column = columns[i]
+            level = film + uneven * along[i]
+            smooth[row, column] = wet * 0.5 * (1 + erf((level - texture) / (spread * sqrt(2.0))))
+            if mirrors[row, column]:
+                places[0, mirroring], places[1, mirroring], size[mirroring] = (
+                    places[0, i],
+                    places[1, i],
+                    size[i],
+                )
+                columns[mirroring] = column
+                mirroring += 1
+        _copy_places(mirroring, places, turned)
+        sum_waves(mirroring, turned, size, ripple, 2, 0.6, key + np.uint64(1000), along)
+        _copy_places(mirroring, places, turned)
+        sum_waves(mirroring, turned, size, ripple, 2, 0.6, key + np.uint64(2000), across)
+        for i in range(mirroring):
+            column = columns[i]
+            wx = normal[row, column, 0] - ripple_slope * along[i]
+            wy = normal[row, column, 1] - ripple_slope * across[i]
+            wz = normal[row, column, 2]
+            length = sqrt(wx * wx + wy * wy + wz * wz)
+            water[row, column, 0] = wx / length
+            water[row, column, 1] = wy / length
+            water[row, column, 2] = wz / length
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _copy_places(count, places, to):  # type: ignore[no-untyped-def]
+    for i in range(count):
+        to[0, i], to[1, i] = places[0, i], places[1, i]

@@ -157,6 +157,7 @@ def wet_layer(
     p, sky = film.parameters, light.sky
     focal_px = float(shutter.K[1, 1])
     road, share = soften_mask(np.isin(gbuffer.class_id, ROAD_CLASSES) & (gbuffer.alpha > 0.5))
+    road &= np.isfinite(gbuffer.depth)  # a single pixel of sky between those of a road mirrors nothing
     window = 2 * round(p.normal_window * shutter.height / 2) + 1
     # a slope s along the line of sight turns the mirrored ray by 2 s: a lobe is as high as its slopes, and
     # narrow across at grazing angles
@@ -188,11 +189,8 @@ def wet_layer(
     _wet(
         picture, road, drained, water.smooth, water.cosine, sharp, rough, compute_wetness(film.depth_mm, p.water),
         p.water.ripple_slope, p.rough_slope, p.refractive_index, p.diffuse_reflectance,
-        LUMINANCE / float(LUMINANCE @ sky.white), gain, add,
+        LUMINANCE / float(LUMINANCE @ sky.white), share, gain, add,
     )  # fmt: skip
-    # at the road's edge a pixel is road in part
-    gain[road] = 1 - share[road, None] * (1 - gain[road])
-    add *= share[..., None]
     if film.refracts:
         shift = compute_film_shift(view, 1e-3 * film.depth_mm, p.refractive_index)
         below = see_through_film(picture, view, shift) - picture
@@ -252,13 +250,15 @@ ALBEDO_RANGE = (0.02, 0.9)
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _wet(  # type: ignore[no-untyped-def]
     picture, road, drained, smooth, cosine, sharp, rough, wet, ripple_slope, rough_slope, index, diffuse,
-    to_albedo, gain, add,
+    to_albedo, on_road, gain, add,
 ):  # fmt: skip
     """Mirror lobes of smooth water and of wet texture over the darkened road.
 
     Facets tilted towards the eye meet its line of sight more steeply than the mean surface: a lobe of slope s
     reflects as a mirror does at the cosine sqrt(cos^2 + s^2). Drained ground is as wet as it faces the rain.
+    At the road's edge a pixel is road in part.
     """
+    one = np.float32(1)
     for row in range(road.shape[0]):
         for column in range(road.shape[1]):
             soaked = wet if road[row, column] else wet * drained[row, column]
@@ -275,9 +275,11 @@ def _wet(  # type: ignore[no-untyped-def]
             share, steep = smooth[row, column], cosine[row, column] ** 2
             mirror = share * fresnel_reflectance(min(1.0, sqrt(steep + ripple_slope**2)), index)
             sheen = (wet - share) * fresnel_reflectance(min(1.0, sqrt(steep + rough_slope**2)), index)
-            gain[row, column, 0] = (1 - mirror - sheen) * darker
+            part = on_road[row, column]
+            gain[row, column, 0] = one - part * (one - np.float32((1 - mirror - sheen) * darker))
             for c in range(3):
-                add[row, column, c] = mirror * sharp[row, column, c] + sheen * rough[row, column, c]
+                mirrored = mirror * sharp[row, column, c] + sheen * rough[row, column, c]
+                add[row, column, c] = np.float32(mirrored) * part
 
 
 def _road_normals(normal: NDArray[np.float32], road: NDArray[np.bool_], window: int) -> NDArray[np.float32]:
@@ -288,8 +290,30 @@ def _road_normals(normal: NDArray[np.float32], road: NDArray[np.bool_], window: 
     if len(rows):
         # the window reaches no further than this; a road fills half of the picture at most
         near = slice(max(rows[0] - window, 0), rows[-1] + window + 1)
-        blurred = cv2.blur(np.where(road[near, :, None], normal[near], np.float32(0)), (window, window))
-        within = road[near]
-        up = blurred[within]
-        mean[near][within] = up / np.sqrt((up * up).sum(axis=-1, keepdims=True))
+        on_road = np.zeros_like(normal[near])
+        _copy_where(road[near], normal[near], on_road)
+        _normalise_where(road[near], cv2.blur(on_road, (window, window)), mean[near])
     return mean
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _copy_where(road, normal, out):  # type: ignore[no-untyped-def]
+    for row in range(road.shape[0]):
+        for column in range(road.shape[1]):
+            if road[row, column]:
+                for c in range(3):
+                    out[row, column, c] = normal[row, column, c]
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _normalise_where(road, normal, out):  # type: ignore[no-untyped-def]
+    for row in range(road.shape[0]):
+        for column in range(road.shape[1]):
+            if road[row, column]:
+                x, y, z = normal[row, column, 0], normal[row, column, 1], normal[row, column, 2]
+                length = np.sqrt(x * x + y * y + z * z)
+                out[row, column, 0], out[row, column, 1], out[row, column, 2] = (
+                    x / length,
+                    y / length,
+                    z / length,
+                )

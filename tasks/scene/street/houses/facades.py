@@ -14,6 +14,7 @@ from tasks.scene.street.houses.openings import (
     storey_pattern,
 )
 from tasks.scene.street.layout import PIXEL, StreetLayout, nearest_depth
+from tasks.scene.street.noise import named_generator
 from tasks.scene.street.plan import Building
 from tasks.scene.street.surfels import Surfels, graded_cells, join_surfels, tile_surface
 
@@ -21,6 +22,9 @@ Floats = NDArray[np.float64]
 
 _CELL = (18.0, 12.0)
 """Largest width and height of a wall cell where it is seen closest [px]."""
+_SCATTER = 0.1
+"""Largest distance of a disc from its column over the cell's width [1]. Discs of one column are equally far from a
+level camera: the sign of its pitch would decide which of them cover which, and the front's picture would jump."""
 _RECESS = np.array([0.0, -0.03, 0.10, 0.14, -0.06, -0.08, -0.04])
 """Distance of each part behind the wall's surface [m]."""
 
@@ -49,9 +53,10 @@ def build_facades(layout: StreetLayout, buildings: tuple[Building, ...], seed: i
     ]
     zero = np.zeros(len(side))
     albedo, glow = paint_fronts(layout, cells, looks, seed)
+    aside = named_generator(seed, "front cells").uniform(-_SCATTER, _SCATTER, len(side)) * cells.size[:, 0]
     glazed = (cells.part == Part.GLASS) | (cells.part == Part.FRAME)
     return tile_surface(
-        np.stack([cells.station, front + side * _RECESS[cells.part], cells.height], axis=1),
+        np.stack([cells.station + aside, front + side * _RECESS[cells.part], cells.height], axis=1),
         np.stack([side * cells.size[:, 0], zero, zero], axis=1),
         np.stack([zero, zero, cells.size[:, 1]], axis=1),
         SemanticClass.BUILDING,

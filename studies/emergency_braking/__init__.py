@@ -1,0 +1,1 @@
+"""Emergency brakes against protocols in every weather."""
