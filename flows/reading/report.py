@@ -32,7 +32,7 @@ from flows.store.object_tables import read_objects
 from flows.store.outputs import MARKER, Outputs, read_marker
 from flows.store.sealed import read_manifest, recorded_grid, refuse_changed_clips
 from flows.store.telemetry import read_columns
-from manifests.manifest import describe_scenes, list_scenes
+from manifests.manifest import describe_scenes, is_driven, list_scenes
 from manifests.siblings import iterate_pairs
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
@@ -137,6 +137,7 @@ def page_data(manifest: Mapping[str, Any], brought: set[str], pictures: bool) ->
     return {
         "frame_rate_hz": grid["frame_rate_hz"],
         "tick_rate_hz": TICK_RATE_HZ,
+        "driven": is_driven(manifest["inputs"]),
         "duration_s": settings.telemetry_s,
         "panels": [
             {"column": t.column, "caption": t.caption, "unit": t.unit, "factor": t.factor,

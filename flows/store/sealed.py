@@ -73,7 +73,7 @@ def require_frames(manifest: Mapping[str, Any], origin: object, *, stored: bool 
     if stored and manifest["grid"].get("pictures", True) == "later":
         raise InputError(
             f"{origin}: the dataset makes its frames when they are read (--frames later), and this needs them stored:"
-            " generate its grid with --frames stored into another folder"
+            " generate its grid with stored frames into another folder"
         )
     if not manifest["grid"].get("pictures", True):
         raise InputError(

@@ -30,7 +30,6 @@ DEVIATION = {
 BRIGHTEST = 0.5
 """Linear light from which nothing shows: lying snow is smooth [1]."""
 _TILE = 256
-_LAST, _NEXT = np.uint64(_TILE - 1), np.uint64(1)
 _TEXELS_A_WAVE = 3.0
 _PIXELS_A_WAVE = 2.0
 _WALL_FACING = 0.25
@@ -79,7 +78,8 @@ def _modulate(rgb, depth, class_id, pose, K):  # type: ignore[no-untyped-def]
             z = np.float64(depth[i, j])
             if deviation == 0 or not z * _PIXELS_A_WAVE < coarsest * K[0, 0]:
                 continue
-            light = 0.2126 * rgb[i, j, 0] + 0.7152 * rgb[i, j, 1] + 0.0722 * rgb[i, j, 2]
+            red, green, blue = rgb[i, j]
+            light = 0.2126 * red + 0.7152 * green + 0.0722 * blue
             deviation *= max(1 - light / BRIGHTEST, 0.0)
             across = (j + 0.5 - K[0, 2]) / K[0, 0]
             dx = pose[0, 0] * across + pose[0, 1] * down + pose[0, 2]
@@ -108,18 +108,18 @@ def _modulate(rgb, depth, class_id, pose, K):  # type: ignore[no-untyped-def]
                 rgb[i, j, channel] *= gain
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _blur_along(u, v, along_u, along_v, samples, texels):  # type: ignore[no-untyped-def]
     """Mean of the noise at a place, over a length to either side, weighted by a triangle [1]."""
+    size = _NOISE.shape[0]
     total, weights = 0.0, 0.0
     for n in range(samples):
         t = (2 * n + 1) / samples - 1
         a, b = (u + t * along_u) * texels, (v + t * along_v) * texels
         r, c = np.floor(a), np.floor(b)
         ta, tb = a - r, b - c
-        # the tile repeats: its size is a power of two
-        r0, c0 = np.uint64(np.int64(r)) & _LAST, np.uint64(np.int64(c)) & _LAST
-        r1, c1 = (r0 + _NEXT) & _LAST, (c0 + _NEXT) & _LAST
+        r0, c0 = int(r) % size, int(c) % size
+        r1, c1 = (r0 + 1) % size, (c0 + 1) % size
         weight = 1 - abs(t)
         weights += weight
         total += weight * (

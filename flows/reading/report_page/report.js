@@ -214,7 +214,7 @@ function ranged({ figures }, name, key, digits, unit, factor) {
 /** Why a clip has no stopping distance, in words; empty if it has one. */
 function stopMissing({ scenario, figures }) {
   if (typeof figures.stopping_distance === "number") return "";
-  return scenario.peak_pressure_mpa > 0 ? "no stop within the clip" : "does not brake";
+  return scenario.peak_pressure_mpa > 0 || REPORT.driven ? "no stop within the clip" : "does not brake";
 }
 
 /** What the sibling changes, in words: the controls, then the figures that both have. */
@@ -223,8 +223,10 @@ function changes(clip, sibling) {
     .filter(([, key]) => typeof clip.figures[key] === "number" && typeof sibling.figures[key] === "number")
     .map(([name, key, digits, unit, factor]) => `${name} ${signed((sibling.figures[key] - clip.figures[key]) * factor, digits)}${unit}`);
   if (!stopMissing(clip) && stopMissing(sibling)) parts.push(stopMissing(sibling));
-  const turned = Object.keys(clip.scenario).filter((key) => clip.scenario[key] !== sibling.scenario[key])
-    .map((key) => `${key} ${clip.scenario[key] ?? "–"} → ${sibling.scenario[key] ?? "–"}`);
+  const told = ({ scenario }, key) => (key === "objects" ? JSON.stringify(scenario[key] ?? []) : scenario[key] ?? "–");
+  const turned = [...new Set([...Object.keys(clip.scenario), ...Object.keys(sibling.scenario)])]
+    .filter((key) => told(clip, key) !== told(sibling, key))
+    .map((key) => (key === "objects" ? "other road users" : `${key} ${told(clip, key)} → ${told(sibling, key)}`));
   return `${sibling.label} beside it: ${turned.join(", ")}. This changes ${parts.join(", ") || "no figure that both have"}.`;
 }
 

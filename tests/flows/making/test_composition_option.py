@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from catalogs.entries import load
-from flows.making import pictures, replay
+from flows.making import pictures
 from flows.making.plan import freeze_grid
+from studies.paper import replay
 from tasks.errors import InputError
 from tasks.render.clip import render_clip
 from tests.toy_street import write_toy_grid

@@ -4,10 +4,10 @@ import json
 
 import numpy as np
 import pytest
-from flows.judging.physics import clip_facts
 
 from catalogs.scenes import write_scene
 from flows.auditing.audit import audit_dataset
+from flows.auditing.physics import clip_facts
 from flows.exporting.export import export_dataset
 from flows.making.catalogue import catalogue_of
 from flows.making.generate import generate_dataset

@@ -95,7 +95,8 @@ def measure_approach(point: Floats, T_world_camera: Floats) -> float:
 
 def _make_fine(car: Car, seed: int, cell: float, coarse: Gaussians, layout: StreetLayout) -> dict[str, Any]:
     line = integrate_course(layout)
-    old, new = (place_body(build_parked(car, seed, spacing), car) for spacing in (COARSE, cell))
+    body = build_parked(car, seed, cell)
+    old, new = (place_body(one, car) for one in (build_parked(car, seed, COARSE), body))
     radiance = np.maximum(coarse.sh[:, 0].astype(np.float64) * C0 + 0.5, 0)
     light = np.maximum(radiance - old.glow, 0) / old.albedo
     places = [np.concatenate([s.centre, _NORMAL_M * s.axes[:, 2]], axis=1) for s in (old, new)]
@@ -105,7 +106,6 @@ def _make_fine(car: Car, seed: int, cell: float, coarse: Gaussians, layout: Stre
     lit = np.einsum("nk,nkc->nc", weight, light[nearest])
     colour = new.albedo * lit + new.glow
     station = new.centre[:, 0]
-    body = build_parked(car, seed, cell)
     out: dict[str, Any] = {
         "means": line.to_world(new.centre).astype(np.float32),
         "quats_wxyz": line.to_world_quaternions(station, new.axes).astype(np.float32),
