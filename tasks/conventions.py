@@ -212,6 +212,7 @@ SOME_CLIPS_CHANNELS = (
     Channel(name="sky", unit="", symbol="", description="kind of sky; null is closed cloud where it falls and on ice, else what the visual seed draws"),
     Channel(name="sun_azimuth_deg", unit="degree", symbol="", description="direction of the sun, from world +x towards +y; null is what the visual seed draws"),
     Channel(name="sun_elevation_deg", unit="degree", symbol="", description="height of the sun above the horizon; null is what the visual seed draws"),
+    Channel(name="visual_range_m", unit="m", symbol="", description="meteorological optical range of fog; its extinction is 3.0 over it; null without fog"),
     Channel(name="focal_length_px", unit="px", symbol="", description="focal length of the camera, of a dataset whose clips draw their own"),
     Channel(name="camera_height", unit="m", symbol="", description="height of the camera above the road, of such a dataset"),
     Channel(name="camera_pitch", unit="rad", symbol="", description="pitch of the camera on the body, nose-down positive, of such a dataset"),

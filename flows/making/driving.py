@@ -1,11 +1,14 @@
 """From a scenario to the vehicle's motion: what the weather, the driver and the road are to the model."""
 
 from dataclasses import replace
+from math import inf
 
 import numpy as np
 
 from catalogs.scenario import Scenario
+from tasks.render.weather.controls import air_controls
 from tasks.render.weather.named_sky import NamedSky
+from tasks.render.weather.parameters import WeatherParameters
 from tasks.scene.route import Route
 from tasks.scene.route_shape import find_lateral_demand
 from tasks.studies.label_ranges import label_ranges, sampled_friction
@@ -106,7 +109,20 @@ def weather_of(scenario: Scenario) -> Weather:
         precipitation_mm_h=scenario.precipitation_mm_h,
         snow_accumulation_h=scenario.snow_accumulation_h,
         falling=scenario.falling,
+        visual_range_m=scenario.visual_range_m or inf,
     )
+
+
+def find_visual_range(state: SurfaceState, weather: WeatherParameters) -> float:
+    """Return the meteorological optical range of the air over a road: of fog or haze, and of what falls [m].
+
+    Parameters
+    ----------
+    state : of the road, and what falls on it
+    weather : numbers of the catalogue
+    """
+    still = min(state.visual_range_m, weather.air.haze_visual_range_m)
+    return air_controls(state.kind, state.precipitation_mm_h, weather, still).visual_range_m
 
 
 def sky_of(scenario: Scenario) -> NamedSky:

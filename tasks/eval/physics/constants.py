@@ -301,5 +301,6 @@ SURFACE_FORMS: Mapping[str, SurfaceForm] = {
         film=lambda rate, surface: surface["glaze_mm"],
         friction=lambda film, cover, surface: surface["ice_friction"],
     ),
+    "fog": SurfaceForm(friction=lambda film, cover, surface: surface["dry_friction"]),
 }
 """The judge's own table of weathers, by the name of the kind."""
