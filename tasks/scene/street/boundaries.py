@@ -1,7 +1,6 @@
 """Hedges, fences and walls along gardens, yards and fields."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tasks.conventions import SemanticClass
 from tasks.scene.street import palette
@@ -9,8 +8,6 @@ from tasks.scene.street.layout import PIXEL, StreetLayout, nearest_depth
 from tasks.scene.street.noise import fractal_noise, named_generator
 from tasks.scene.street.surfels import Cover, Grain, Surfels, build_panel, join_surfels, tile_surface
 from tasks.scene.street.vegetation import build_leaves, tint_leaves
-
-Floats = NDArray[np.float64]
 
 _GATE = 3.2
 """Gap for a gate or a drive between two lots [m]."""

@@ -1,6 +1,6 @@
 """Emergency brakes: the closed form of the impact, what they know of the road, tracks of targets, the protocols."""
 
-from math import inf, pi
+from math import inf, pi, sqrt
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from catalogs.entries import load
 from catalogs.road_users import EGO, RoadUser
 from catalogs.scenario import Scenario
 from flows.making.driving import surface_of
-from studies.emergency_braking.brakes import Approach, BlindTrigger, compute_impact_speed, find_threat
+from studies.emergency_braking.brakes import Approach, BlindTrigger, find_threat
 from studies.emergency_braking.cases import Case, list_cases
 from studies.emergency_braking.compare import compare_brakes, drive_approach, find_tyre_friction, make_brake
 from studies.emergency_braking.table import load_table
@@ -24,6 +24,13 @@ OVERHANG = load("road user sizes")[EGO][0]
 
 def road(weather: str):
     return surface_of(Scenario(**TABLE.list_weathers()[weather]), ASPHALT)
+
+
+def compute_impact_speed(closing: float, gap: float, deceleration: float, delay: float, rise: float) -> float:
+    """Return the closing speed at the impact, of a deceleration that rises on a straight line and then stays [m/s]."""
+    left = gap - closing * (delay + rise) + deceleration * rise * rise / 6.0
+    after = closing - 0.5 * deceleration * rise
+    return sqrt(max(after * after - 2.0 * deceleration * left, 0.0))
 
 
 def approach_at(speed_km_h: float, target_km_h: float) -> Case:
