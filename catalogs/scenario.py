@@ -40,7 +40,7 @@ class Scenario:
     objects : road users beside the ego vehicle; in no row of a table, which has one value a column
     scene : that it drives in; None is the one scene of its grid
     falling : rain or snow falls in the picture; where it has ended, the road is as it left it
-    sky : kind of sky; None is closed cloud where it falls and on ice, else what the visual seed draws
+    sky : kind of sky; None is closed cloud where it falls, on ice and in fog, else what the visual seed draws
     sun_azimuth_deg, sun_elevation_deg : of the sun, from world +x towards +y and above the horizon; None is what the
         visual seed draws [deg]
     visual_range_m : meteorological optical range of fog; None without fog [m]

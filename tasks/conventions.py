@@ -209,7 +209,7 @@ SOME_CLIPS_CHANNELS = (
     Channel(name="variant", unit="", symbol="", description="coupling that is cut on purpose, as in the paper's ablation: the picture is the scenario's, the motion is not; a sound dataset has no such column"),
     Channel(name="scene", unit="", symbol="", description="scene that the clip drives in; of a dataset with several"),
     Channel(name="falling", unit="", symbol="", description="rain or snow falls in the picture; false where it has ended and the road is as it left it"),
-    Channel(name="sky", unit="", symbol="", description="kind of sky; null is closed cloud where it falls and on ice, else what the visual seed draws"),
+    Channel(name="sky", unit="", symbol="", description="kind of sky; null is closed cloud where it falls, on ice and in fog, else what the visual seed draws"),
     Channel(name="sun_azimuth_deg", unit="degree", symbol="", description="direction of the sun, from world +x towards +y; null is what the visual seed draws"),
     Channel(name="sun_elevation_deg", unit="degree", symbol="", description="height of the sun above the horizon; null is what the visual seed draws"),
     Channel(name="visual_range_m", unit="m", symbol="", description="meteorological optical range of fog; its extinction is 3.0 over it; null without fog"),

@@ -8,7 +8,8 @@ import pytest
 from catalogs.entries import load
 from catalogs.road_users import EGO, RoadUser
 from catalogs.scenario import Scenario
-from flows.making.driving import surface_of
+from catalogs.weather.look import load_weather
+from flows.making.driving import find_visual_range, surface_of
 from studies.emergency_braking.brakes import Approach, BlindTrigger, find_threat
 from studies.emergency_braking.cases import Case, list_cases
 from studies.emergency_braking.compare import compare_brakes, drive_approach, find_tyre_friction, make_brake
@@ -75,6 +76,19 @@ def test_the_brake_that_knows_friction_stops_a_margin_before_the_target_and_brak
     assert not outcome.collided and 0.3 < outcome.clearance < 4.0
     blind = drive_approach(CAR, state, case, *make_brake("blind", CAR, state, TABLE), TABLE)
     assert blind.collided and blind.brake_time > outcome.brake_time
+
+
+def test_no_brake_sees_through_fog_and_one_that_needs_more_road_than_that_brakes_at_its_visual_range():
+    state, case = surface_of(Scenario(weather="fog", visual_range_m=12.0), ASPHALT), approach_at(60, 0)
+    far, near = (
+        drive_approach(CAR, state, case, *make_brake("friction", CAR, state, TABLE), TABLE, visual_range_m)
+        for visual_range_m in (inf, find_visual_range(state, load_weather()))
+    )
+    line = TABLE.brake_line
+    seen = near.brake_time - line.delay_s.value
+    gap = case.follow().find(0.0).station - OVERHANG - case.speed * seen
+    assert gap == pytest.approx(12.0, abs=case.speed / TABLE.rate_hz.value)
+    assert near.collided and not far.collided and far.brake_time < near.brake_time
 
 
 @pytest.mark.parametrize("slows", [2.0, 6.0])
