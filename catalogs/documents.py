@@ -108,22 +108,20 @@ def parse_yaml_value(content: bytes, origin: object, kind: str, *, finite: bool 
     return load_yaml(text, start, finite=finite)
 
 
-def read_json_document(path: Path, kind: str, *, large_integers: bool = False) -> Any:
+def read_json_document(path: Path, kind: str) -> Any:
     """The value that a JSON file holds; the rules are those of `parse_json`.
 
     Parameters
     ----------
     path : the file
     kind : what it is called in the sentences
-    large_integers : let integers beyond 2^53 pass
 
     Raises
     ------
     InputError
         If it cannot be read or breaks a rule.
     """
-    content = read_content(path, kind, LARGEST_JSON)
-    return parse_json(content, path, kind, large_integers=large_integers)
+    return parse_json(read_content(path, kind, LARGEST_JSON), path, kind)
 
 
 def parse_json(content: bytes, origin: object, kind: str, *, large_integers: bool = False) -> Any:

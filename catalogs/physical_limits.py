@@ -12,7 +12,7 @@ Rate = Annotated[Scalar, require_quantity("mm h-1", above=0)]
 
 
 class PhysicalLimits(CatalogueEntry):
-    """The largest value of each quantity, and of a speed, a hazard's length and the sun's height also the smallest.
+    """The largest value of each quantity, and of some also the smallest.
 
     ``position`` is along the route, ``brake_time`` any time of a brake, ``hazard_slope`` of a feature's steepest flank,
     ``road_grade`` of a scene's steepest road.
@@ -37,6 +37,8 @@ class PhysicalLimits(CatalogueEntry):
     sun_azimuth: Degrees
     sun_elevation: Degrees
     lowest_sun_elevation: Degrees
+    fog_visual_range: Metres
+    densest_fog: Metres
     frame_rate: Annotated[Scalar, require_quantity("Hz", above=0)]
     frames: Annotated[Scalar, require_quantity("1", minimum=2)]
 

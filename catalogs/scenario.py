@@ -40,9 +40,10 @@ class Scenario:
     objects : road users beside the ego vehicle; in no row of a table, which has one value a column
     scene : that it drives in; None is the one scene of its grid
     falling : rain or snow falls in the picture; where it has ended, the road is as it left it
-    sky : kind of sky; None is closed cloud where it falls and on ice, else what the visual seed draws
+    sky : kind of sky; None is closed cloud where it falls, on ice and in fog, else what the visual seed draws
     sun_azimuth_deg, sun_elevation_deg : of the sun, from world +x towards +y and above the horizon; None is what the
         visual seed draws [deg]
+    visual_range_m : meteorological optical range of fog; None without fog [m]
     """
 
     weather: WeatherName = DRY
@@ -64,6 +65,7 @@ class Scenario:
     sky: SkyName | None = None
     sun_azimuth_deg: float | None = None
     sun_elevation_deg: float | None = None
+    visual_range_m: float | None = None
     objects: tuple[RoadUser, ...] = ()
 
     @classmethod
@@ -87,7 +89,7 @@ class Scenario:
 
 OPTIONAL_FIELDS = {
     name: Scenario.__dataclass_fields__[name].default
-    for name in ("scene", "falling", "sky", "sun_azimuth_deg", "sun_elevation_deg")
+    for name in ("scene", "falling", "sky", "sun_azimuth_deg", "sun_elevation_deg", "visual_range_m")
 }
 """Fields that stand in a row only where they have another value than this one."""
 SCENARIO_FIELDS = tuple(
@@ -97,7 +99,9 @@ SCENARIO_FIELDS = tuple(
 _read_fields = attrgetter(*SCENARIO_FIELDS)
 SUN_ANGLES = ("sun_azimuth_deg", "sun_elevation_deg")
 SWITCHES = ("hold_speed", "falling")
-NUMBERS = (*(name for name in SCENARIO_FIELDS if name not in {"weather", "hold_speed"}), *SUN_ANGLES)
+NUMBERS = (
+    *(name for name in SCENARIO_FIELDS if name not in {"weather", "hold_speed"}), *SUN_ANGLES, "visual_range_m",
+)  # fmt: skip
 NOT_NEGATIVE = (
     "precipitation_mm_h", "snow_accumulation_h", "peak_pressure_mpa", "hazard_length_m", "ramp_s", "release_s",
     "brake_onset_s", "brake_onset_m", "hold_s", *SUN_ANGLES,
@@ -113,8 +117,15 @@ HIGHEST = {
     "hazard_length_m": "hazard_length",
     "sun_azimuth_deg": "sun_azimuth",
     "sun_elevation_deg": "sun_elevation",
+    "visual_range_m": "fog_visual_range",
 }
 """Physical limit of each number, of a height by its size; a kind of weather may have another one of its rate."""
+LEAST = {
+    "initial_speed_km_h": "slowest_initial_speed",
+    "sun_elevation_deg": "lowest_sun_elevation",
+    "visual_range_m": "densest_fog",
+}
+"""Physical limit of each number from below."""
 UNKNOWN_WEATHER = "unknown"
 """Replaces a weather that could not be read, as NaN replaces a number: no rule applies to either."""
 
@@ -180,6 +191,17 @@ def _find_weather_problems(s: Scenario) -> list[str]:
         )
     if not s.falling and kind.rate_limit is None:
         problems.append(f"falling: false belongs to weather that falls; the weather is {s.weather}")
+    if kind.obscures and s.visual_range_m is None:
+        problems.append(
+            f"weather {s.weather} needs visual_range_m, its meteorological optical range in metres"
+        )
+    if not kind.obscures and s.visual_range_m is not None:
+        hiding = " or ".join(name for name, row in WEATHERS.items() if row.obscures)
+        problems.append(
+            f"visual_range_m belongs to {hiding}; the weather is {s.weather} and it is {s.visual_range_m:g}"
+        )
+    if kind.obscures and s.sky not in (None, OVERCAST):
+        problems.append(f"sky {s.sky}: {s.weather} closes the sky: name {OVERCAST}, or none")
     falls = s.falling and kind.rate_limit is not None
     if falls and s.sky not in (None, OVERCAST):
         problems.append(
@@ -201,12 +223,10 @@ def find_range_problems(scenario: Scenario) -> list[str]:
     problems = [f"{name} must not be negative; it is {value:g}" for name, value in given.items() if value < 0]
     limits = load("table of physical limits")
     found = [
-        find_least_problem("initial_speed_km_h", scenario.initial_speed_km_h, limits.slowest_initial_speed)
+        find_least_problem(name, value, getattr(limits, least))
+        for name, least in LEAST.items()
+        if (value := getattr(scenario, name)) is not None
     ]
-    if scenario.sun_elevation_deg is not None:
-        found.append(
-            find_least_problem("sun_elevation_deg", scenario.sun_elevation_deg, limits.lowest_sun_elevation)
-        )
     found += [find_limit_problem(*one) for one in _list_limits(scenario, limits)]
     return problems + [problem for problem in found if problem is not None]
 
@@ -215,9 +235,8 @@ def list_ranges() -> dict[str, tuple[float | None, float]]:
     """Return the least and the largest value of each number of a scenario; None where there is no least [its unit]."""
     limits = load("table of physical limits")
     least: dict[str, float] = dict.fromkeys(NOT_NEGATIVE, 0.0)
-    least["initial_speed_km_h"] = limits.slowest_initial_speed.value
+    least |= {name: getattr(limits, lowest).value for name, lowest in LEAST.items()}
     least["hazard_height_m"] = -limits.hazard_height.value
-    least["sun_elevation_deg"] = limits.lowest_sun_elevation.value
     return {name: (least.get(name), getattr(limits, highest).value) for name, highest in HIGHEST.items()}
 
 

@@ -11,8 +11,6 @@ VARIANTS: dict[Variant, str] = {
     "full": "nothing is cut",
 }
 """Effect of each variant (paper, Section 4.4; the low-speed rule is this project's own)."""
-COUPLINGS: tuple[Variant, ...] = ("appearance-only", "vertical-only", "fixed-mu", "full")
-"""Variants of the paper's figure, which cut a coupling or nothing; they hold for every vehicle mode."""
 
 
 def warn_of_variant(variant: Variant) -> str:

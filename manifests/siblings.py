@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 CONTROLS: dict[str, tuple[str, ...]] = {
-    "weather": ("weather", "precipitation_mm_h", "snow_accumulation_h", "falling"),
+    "weather": ("weather", "precipitation_mm_h", "snow_accumulation_h", "falling", "visual_range_m"),
     "light": ("sky", "sun_azimuth_deg", "sun_elevation_deg"),
     "speed": ("initial_speed_km_h",),
     "braking": (

@@ -53,6 +53,7 @@ class PartialScenario(Strict):
     sky: SkyName | None = None
     sun_azimuth_deg: Number | None = None
     sun_elevation_deg: Number | None = None
+    visual_range_m: Number | None = None
     objects: tuple[RoadUser, ...] | None = Field(
         default=None,
         exclude_if=lambda users: users is None,

@@ -62,7 +62,9 @@ def cut_coupling(scenario: Scenario, variant: Variant, families: FamilyWeather |
     variant : which coupling is cut
     families : of ``fixed-mu``; None takes the catalogue's
     """
-    dry = replace(scenario, weather=DRY, precipitation_mm_h=0.0, snow_accumulation_h=0.0, falling=True)
+    dry = replace(
+        scenario, weather=DRY, precipitation_mm_h=0.0, snow_accumulation_h=0.0, falling=True, visual_range_m=None
+    )  # fmt: skip
     if variant == "appearance-only":
         return dry
     if variant == "vertical-only":

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -12,12 +13,13 @@ from catalogs.entries import load
 from catalogs.road_users import EGO
 from catalogs.scenario import Scenario, find_scenario_problems
 from catalogs.sentences import describe_rules, shorten_value
+from catalogs.weather.look import load_weather
 from flows.driving.view import StepCamera
-from flows.making.driving import hazard_of, surface_of
+from flows.making.driving import find_visual_range, hazard_of, surface_of
 from flows.making.grid_inputs import grade_of
 from tasks.driving.outcome import TICK_S, Outcome, find_unbraked_impact, judge_approach
 from tasks.driving.stepped import DriveSettings, SteppedDrive
-from tasks.driving.targets import Target, TargetTrack, follow_track
+from tasks.driving.targets import Target, TargetTrack, follow_track, see_targets
 from tasks.errors import InputError
 from tasks.surface.road_profile import LEVEL_ROAD
 from tasks.surface.state import SurfaceParameters
@@ -44,7 +46,7 @@ class Observation:
     wheel_speed_f, wheel_speed_r : of the axles [rad/s]
     stands : whether the car has come to rest
     ends : whether the drive is over
-    targets : road users ahead, in the order in which they were given
+    targets : road users ahead that the air does not hide, in the order in which they were given
     frame : uint8 [H, W, 3] sRGB picture, where frames are asked for
     truth : every column of the model and the friction that the road has, where the truth is asked for [their units]
     """
@@ -109,6 +111,8 @@ class Simulator:
             for user in asked.objects
         ]
         self.rate_hz, self._targets, self._truth = float(rate_hz), (*objects, *targets), truth
+        self._overhang, _ = load("road user sizes")[EGO]
+        self._visual_range_m = find_visual_range(self.state, load_weather()) if self._targets else inf
         settings = DriveSettings(
             initial_speed=asked.initial_speed_km_h / 3.6, duration_s=duration_s, rate_hz=rate_hz,
             hold_speed=asked.hold_speed, hazard=hazard_of(asked), grade=grade,
@@ -171,7 +175,10 @@ class Simulator:
         return Observation(
             time=time, station=read("station"), speed=read("speed"), acceleration=read("longitudinal_acceleration"),
             wheel_speed_f=read("wheel_speed_f"), wheel_speed_r=read("wheel_speed_r"), stands=drive.stop_time <= time,
-            ends=drive.step_count == drive.steps, targets=tuple(track.find(time) for track in self._targets),
+            ends=drive.step_count == drive.steps,
+            targets=see_targets(
+                (track.find(time) for track in self._targets), read("station") + self._overhang, self._visual_range_m
+            ),
             frame=self._see(), truth=self._read_truth() if self._truth else None,
         )  # fmt: skip
 

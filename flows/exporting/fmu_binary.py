@@ -61,14 +61,9 @@ PLATFORMS = {
 """Platforms by name, all of them x86-64: the standard has no other with 64 bits."""
 
 
-def find_own_platform(system: str = sys.platform) -> Platform:
-    """Return the platform of a system, by default this one.
-
-    Parameters
-    ----------
-    system : as `sys.platform`
-    """
-    return next(row for row in PLATFORMS.values() if row.system == system)
+def find_own_platform() -> Platform:
+    """Return the platform of this system."""
+    return next(row for row in PLATFORMS.values() if row.system == sys.platform)
 
 
 def find_compiler(platform: Platform) -> list[str]:

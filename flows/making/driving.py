@@ -1,11 +1,14 @@
 """From a scenario to the vehicle's motion: what the weather, the driver and the road are to the model."""
 
 from dataclasses import replace
+from math import inf
 
 import numpy as np
 
 from catalogs.scenario import Scenario
+from tasks.render.weather.controls import air_controls
 from tasks.render.weather.named_sky import NamedSky
+from tasks.render.weather.parameters import WeatherParameters
 from tasks.scene.route import Route
 from tasks.scene.route_shape import find_lateral_demand
 from tasks.studies.label_ranges import label_ranges, sampled_friction
@@ -27,10 +30,17 @@ def simulate_drive(
     duration_s: float,
     steady: SteadyStop | None = None,
     grade: RoadGrade = LEVEL_ROAD,
+    friction: float | None = None,
 ) -> tuple[SurfaceState, Rollout]:
-    """Simulate a scenario: weather to surface state to friction to motion; the last two are as the rollout has them."""
+    """Simulate a scenario: weather to surface state to motion; a friction that is given replaces the weather's [1]."""
     state = surface_of(scenario, surface)
-    return state, _simulate_vehicle(scenario, vehicle, state, mode, duration_s, steady, grade)
+    if friction is not None:
+        state = replace(state, friction=friction)
+    ride = simulate_scenario(
+        vehicle, state, controls_of(scenario), hazard_of(scenario), mode=mode, duration_s=duration_s, steady=steady,
+        grade=grade,
+    )  # fmt: skip
+    return state, ride
 
 
 def surface_of(scenario: Scenario, surface: SurfaceParameters) -> SurfaceState:
@@ -73,30 +83,13 @@ def ranges_of(
 ) -> dict[str, float]:
     """Percentiles of the clip's labels under the bounds of the surface parameters; the snow's depth stays nominal."""
 
-    state = surface_of(scenario, surface)
-
     def again(friction: float) -> tuple[float, float]:
-        ride = _simulate_vehicle(
-            scenario, vehicle, replace(state, friction=friction), mode, duration_s, steady, grade
+        _, ride = simulate_drive(
+            scenario, vehicle, surface, mode, duration_s, steady, grade, friction=friction
         )
         return ride.stopping_distance, float(ride.columns["pitch"].max())
 
     return label_ranges(sampled_friction(weather_of(scenario), surface, study), again)
-
-
-def _simulate_vehicle(
-    scenario: Scenario,
-    vehicle: Vehicle,
-    state: SurfaceState,
-    mode: Mode,
-    duration_s: float,
-    steady: SteadyStop | None,
-    grade: RoadGrade,
-) -> Rollout:
-    return simulate_scenario(
-        vehicle, state, controls_of(scenario), hazard_of(scenario), mode=mode, duration_s=duration_s, steady=steady,
-        grade=grade,
-    )  # fmt: skip
 
 
 def weather_of(scenario: Scenario) -> Weather:
@@ -106,7 +99,20 @@ def weather_of(scenario: Scenario) -> Weather:
         precipitation_mm_h=scenario.precipitation_mm_h,
         snow_accumulation_h=scenario.snow_accumulation_h,
         falling=scenario.falling,
+        visual_range_m=scenario.visual_range_m or inf,
     )
+
+
+def find_visual_range(state: SurfaceState, weather: WeatherParameters) -> float:
+    """Return the meteorological optical range of the air over a road: of fog or haze, and of what falls [m].
+
+    Parameters
+    ----------
+    state : of the road, and what falls on it
+    weather : numbers of the catalogue
+    """
+    still = min(state.visual_range_m, weather.air.haze_visual_range_m)
+    return air_controls(state.kind, state.precipitation_mm_h, weather, still).visual_range_m
 
 
 def sky_of(scenario: Scenario) -> NamedSky:

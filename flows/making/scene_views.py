@@ -163,16 +163,11 @@ def compare_streets(grains: NDArray[np.float64]) -> tuple[NDArray[np.float64], N
     return between.min(axis=1) / np.median(within), between.argmin(axis=1)
 
 
-def list_streets(count: int, first: int = 0) -> list[str]:
-    """Return the names of so many streets of every kind, from a seed on.
-
-    Parameters
-    ----------
-    count, first : streets of each kind, and the first seed [1]
-    """
+def list_streets(count: int) -> list[str]:
+    """Return the names of the first streets of every kind, so many of each [1]."""
     if count < 1:
         raise InputError(f"streets must be 1 or more; it is {count}")
-    return [f"{kind}-{seed}" for kind in KINDS for seed in range(first, first + count)]
+    return [f"{kind}-{seed}" for kind in KINDS for seed in range(count)]
 
 
 def _open_scenes(names: list[str]) -> Iterator[tuple[str, Scene]]:

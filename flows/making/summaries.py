@@ -122,8 +122,8 @@ def pairs_tables(receipts: Sequence[Mapping[str, Any]]) -> Iterator[pa.Table]:
         )
 
 
-def batched(items: Iterable[Item], size: int | None = None) -> Iterator[list[Item]]:
-    """Yield the items in lists of at most ``size`` [1], by default `BATCH`."""
+def batched(items: Iterable[Item]) -> Iterator[list[Item]]:
+    """Yield the items in lists of at most `BATCH` [1]."""
     left = iter(items)
-    while batch := list(islice(left, size or BATCH)):
+    while batch := list(islice(left, BATCH)):
         yield batch

@@ -11,9 +11,6 @@ from tasks.identification.decision.verdict import Outcome
 from tasks.identification.inference.forward import RunModel, predict_channels
 from tasks.vehicle.effects.table import EFFECT_TABLE
 
-MODELS = ("frozen", "after")
-"""Models of a verdict: the vehicle file's, and with what was found."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class RunPrediction:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import inf, sqrt
+from math import inf
 from typing import Protocol
 
 import numpy as np
@@ -223,19 +223,3 @@ class BrakeLine:
         if since <= 0.0:
             return 0.0
         return self.full_mpa * (min(since / self.build_up, 1.0) if self.build_up > 0 else 1.0)
-
-
-def compute_impact_speed(closing: float, gap: float, deceleration: float, delay: float, rise: float) -> float:
-    """Return the closing speed at which a braking car meets a target of constant speed; 0 where it does not [m/s].
-
-    Parameters
-    ----------
-    closing : at the demand [m/s]
-    gap : at the demand [m]
-    deceleration : from the end of the rise on [m/s2]
-    delay : after the demand, without any deceleration [s]
-    rise : time in which it rises to its value, on a straight line [s]
-    """
-    left = gap - closing * (delay + rise) + deceleration * rise * rise / 6.0
-    after = closing - 0.5 * deceleration * rise
-    return sqrt(max(after * after - 2.0 * deceleration * left, 0.0)) if after > 0 else 0.0

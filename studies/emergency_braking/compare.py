@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, islice, product
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,10 @@ from catalogs.entries import load
 from catalogs.road_users import EGO
 from catalogs.scenario import Scenario
 from catalogs.scenes.opendrive import find_street, format_opendrive
+from catalogs.weather.look import load_weather
 from flows.driving.policy import Policy, drive_with, load_policy
 from flows.driving.simulator import Observation, Simulator
-from flows.making.driving import surface_of, weather_of
+from flows.making.driving import find_visual_range, surface_of, weather_of
 from flows.running.progress import progress_bar
 from flows.store.outputs import Outputs
 from studies.emergency_braking.brakes import (
@@ -38,6 +40,7 @@ from tasks.driving.outcome import (
     judge_approach,
 )
 from tasks.driving.stepped import DriveSettings, SteppedDrive
+from tasks.driving.targets import see_targets
 from tasks.errors import InputError
 from tasks.studies.label_ranges import sampled_friction
 from tasks.surface.state import SurfaceParameters, SurfaceState
@@ -90,13 +93,15 @@ def compare_brakes(
         for name in chosen["weather"]:
             scenario = Scenario(**table.list_weathers()[name])
             state = surface_of(scenario, pavement)
+            visual_range_m = find_visual_range(state, load_weather())
             frictions = np.percentile(sampled_friction(weather_of(scenario), pavement, study), PERCENTILES)
             for case, kind in product(cases, (*chosen["brake"], *own)):
                 if kind in own:
                     outcome = _drive_policy(own[kind], case, scenario, car, pavement)
                     found = {"friction": round(state.friction, 4), **describe_outcome(outcome)}
                 else:
-                    found = _drive_case(car, state, case, kind, table, frictions.tolist() if bounds else [])
+                    spread = frictions.tolist() if bounds else []
+                    found = _drive_case(car, state, case, kind, table, spread, visual_range_m)
                 rows.append(
                     {
                         "protocol": case.protocol,
@@ -125,8 +130,9 @@ def compare_brakes(
 
 
 def drive_approach(
-    car: Vehicle, state: SurfaceState, case: Case, trigger: Trigger, line: BrakeLine, table: EmergencyBraking
-) -> Outcome:
+    car: Vehicle, state: SurfaceState, case: Case, trigger: Trigger, line: BrakeLine, table: EmergencyBraking,
+    visual_range_m: float = inf,
+) -> Outcome:  # fmt: skip
     """Drive an approach to its end and return the outcome.
 
     Parameters
@@ -135,6 +141,7 @@ def drive_approach(
     case : the approach
     trigger, line : when the brake is put on, and the pressure behind
     table : how often the brake looks
+    visual_range_m : beyond which the air hides the target [m]
     """
     (overhang, width), track = load("road user sizes")[EGO], case.follow(state.friction)
     rate_hz = table.rate_hz.value
@@ -149,7 +156,13 @@ def drive_approach(
         bumper = overhang + case.speed * held * step
         unbraked = bumper >= target.station
         if unbraked or trigger.demands(
-            Approach(time=held * step, bumper=bumper, speed=case.speed, width=width, targets=(target,))
+            Approach(
+                time=held * step,
+                bumper=bumper,
+                speed=case.speed,
+                width=width,
+                targets=see_targets((target,), bumper, visual_range_m),
+            )
         ):
             break
     drive.advance(0.0, max(held + unbraked, 1))
@@ -242,9 +255,10 @@ def _drive_case(
     kind: str,
     table: EmergencyBraking,
     frictions: Sequence[float],
+    visual_range_m: float,
 ) -> dict[str, Any]:
     def drive_on(road: SurfaceState) -> Outcome:
-        return drive_approach(car, road, case, *make_brake(kind, car, road, table), table)
+        return drive_approach(car, road, case, *make_brake(kind, car, road, table), table, visual_range_m)
 
     outcome = drive_on(state)
     spread = [drive_on(replace(state, friction=float(mu))).impact_speed * 3.6 for mu in frictions]
@@ -291,12 +305,12 @@ def _drive_policy(
     )  # fmt: skip
     simulator = Simulator(asked, vehicle=car, surface=pavement, duration_s=LONGEST_S)
     overhang, _ = load("road user sizes")[EGO]
-    settles_at = case.follow(simulator.state.friction).settles_at
+    track = case.follow(simulator.state.friction)
 
     def is_over(seen: Observation) -> bool:
-        (target,) = seen.targets
+        target = track.find(seen.time)
         met = seen.station + overhang >= target.station
-        return met or seen.stands or (seen.speed <= target.speed and seen.time >= settles_at)
+        return met or seen.stands or (seen.speed <= target.speed and seen.time >= track.settles_at)
 
     drive_with(policy, simulator, f"{case.protocol}, {case.name}, {weather.weather}", is_over)
     (outcome,) = simulator.judge()

@@ -13,7 +13,7 @@ from catalogs.references import Traces, read_reference
 from catalogs.scenario import Scenario
 from catalogs.studies import Condition
 from catalogs.studies.ablation import AblationEntry, cut_coupling
-from catalogs.variants import COUPLINGS, Variant
+from catalogs.variants import Variant
 from catalogs.vehicles import open_vehicle
 from flows.making.driving import simulate_drive
 from flows.pages.static import as_svg
@@ -30,6 +30,8 @@ from tasks.vehicle.rollout import Mode, Rollout
 
 STOP_S, PITCH_S = 15.0, 10.0
 """Length of a drive to the stop on the slipperiest road, and of one whose pitch is compared [s]."""
+COUPLINGS: tuple[Variant, ...] = ("appearance-only", "vertical-only", "fixed-mu", "full")
+"""Variants of the paper's figure, which cut a coupling or nothing; they hold for every vehicle mode."""
 
 Rows = list[dict[str, Any]]
 

@@ -82,6 +82,7 @@ def _draw_noise(
     catalogue: Catalogue,
     seed: int,
     rig_at: Any,
+    shown: range | None,
 ) -> dict[str, Any]:
     return _make_noise(seed, plan.settings.frames, catalogue.camera.height, catalogue.camera.width)
 

@@ -1,6 +1,6 @@
 """What stands or moves ahead of the car, as a brake sees it: a rear end by its station, without a picture."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from math import cos, inf, isfinite, sin
 
@@ -34,6 +34,18 @@ class Target:
     lateral: float = 0.0
     lateral_speed: float = 0.0
     width: float = 1.8
+
+
+def see_targets(targets: Iterable[Target], bumper: float, visual_range_m: float) -> tuple[Target, ...]:
+    """Return the targets that a sensor on the front sees: the air hides those beyond its visual range.
+
+    Parameters
+    ----------
+    targets : of the road
+    bumper : station of the front bumper [m]
+    visual_range_m : meteorological optical range: beyond it the contrast is below 5 % (WMO-No. 8) [m]
+    """
+    return tuple(target for target in targets if target.station - bumper <= visual_range_m)
 
 
 @dataclass(frozen=True, kw_only=True)

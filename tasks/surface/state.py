@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import isfinite, nan
+from math import inf, isfinite, nan
 
 from tasks.errors import InputError
 from tasks.surface.wet_friction import ANY_SPEED, WetGrip
@@ -86,6 +86,7 @@ class SurfaceState:
     snow_coverage : share of the road that snow covers, c_s; friction takes it for that of the tyres' contact [1]
     friction : reference surface coefficient, mu_c; NaN where only the picture is asked for [1]
     grip : how friction depends on speed; mu_c is that at the pavement's ``wet_reference_speed``
+    visual_range_m : meteorological optical range of fog; infinite without fog [m]
 
     Raises
     ------
@@ -100,6 +101,7 @@ class SurfaceState:
     snow_coverage: float = 0.0
     friction: float = nan
     grip: WetGrip = ANY_SPEED
+    visual_range_m: float = inf
 
     def __post_init__(self) -> None:
         problems = [
@@ -107,6 +109,8 @@ class SurfaceState:
             for name in ("precipitation_mm_h", "film_depth_mm", "snow_depth_mm", "snow_coverage")
             if not (isfinite(value := getattr(self, name)) and value >= 0)
         ]
+        if not self.visual_range_m > 0:
+            problems.append(f"weather: visual_range_m must be above 0; it is {self.visual_range_m:g}")
         if self.snow_coverage > 1:
             problems.append(f"weather: snow_coverage must not exceed 1; it is {self.snow_coverage:g}")
         if problems:

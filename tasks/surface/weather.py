@@ -8,7 +8,7 @@ for vehicles that have none of their own. To add a kind is one row here, one ent
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import exp
+from math import exp, inf
 
 from tasks.errors import InputError
 from tasks.surface.state import Derivation, SurfaceParameters, SurfaceState
@@ -25,6 +25,7 @@ class Weather:
     precipitation_mm_h : rain rate, or water-equivalent snow rate [mm/h]
     snow_accumulation_h : time over which the snow has fallen [h]
     falling : whether it still falls; where it has just ended, the road is as it left it
+    visual_range_m : meteorological optical range of fog; infinite without fog [m]
 
     Raises
     ------
@@ -36,6 +37,7 @@ class Weather:
     precipitation_mm_h: float = 0.0
     snow_accumulation_h: float = 0.0
     falling: bool = True
+    visual_range_m: float = inf
 
     def __post_init__(self) -> None:
         find_weather(self.kind)
@@ -236,8 +238,10 @@ class WeatherKind:
     derive : how those follow, for people
     rate_limit : name of the physical limit of its precipitation rate; None where nothing falls
     accumulates : it lies as deep as the hours make it
-    overcast : it comes with closed cloud, and has an entry in ``catalogs/weather/`` that says how it looks
+    overcast : it comes with closed cloud, and if it does not obscure has an entry in ``catalogs/weather/`` that says
+        how it looks
     wet : liquid water lies under the wheels
+    obscures : all of it is air that hides what is far, by the visual range of the scenario
     grips_as : kind whose tyre family it takes; None has a family of its own
     """
 
@@ -251,6 +255,7 @@ class WeatherKind:
     accumulates: bool = False
     overcast: bool = True
     wet: bool = False
+    obscures: bool = False
     grips_as: str | None = None
 
     @property
@@ -275,6 +280,7 @@ WEATHERS: Mapping[str, WeatherKind] = {
             accumulates=True,
         ),
         WeatherKind(name="ice", code=4, film=glaze_depth, friction=ice_friction, derive=derive_ice),
+        WeatherKind(name="fog", code=5, friction=dry_friction, derive=derive_dry, obscures=True, grips_as=DRY),
     )
 }  # fmt: skip
 """Every kind of weather there is, by its name."""
@@ -349,5 +355,6 @@ def surface_state(weather: Weather, parameters: SurfaceParameters) -> SurfaceSta
         snow_depth_mm=snow,
         snow_coverage=coverage,
         friction=kind.friction(film, coverage, parameters),
+        visual_range_m=weather.visual_range_m if kind.obscures else inf,
         grip=find_wet_grip(film, parameters) if kind.wet and parameters.grips_by_speed else ANY_SPEED,
     )

@@ -105,8 +105,8 @@ def test_a_scenario_without_a_split_is_told():
 @pytest.mark.parametrize(
     ("condition", "told"),
     [
-        ("weather: rian", "weather: must be dry, rain, snow or ice; it is 'rian'"),
-        ("weather: [rain, 3]", "weather: must be dry, rain, snow or ice; it is '3.0'"),
+        ("weather: rian", "weather: must be dry, rain, snow, ice or fog; it is 'rian'"),
+        ("weather: [rain, 3]", "weather: must be dry, rain, snow, ice or fog; it is '3.0'"),
         ("weather: {min: 3}", "weather: an interval is of numbers"),
         ("precipitation_mm_h: '5'", "precipitation_mm_h: must be a number or an interval; it is '5'"),
         ("precipitation_mm_h: true", "precipitation_mm_h: must be a number or an interval; it is True"),

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import musync
+from catalogs.entries import load
+from catalogs.road_users import EGO
 from flows.auditing.explain import explain_frame
 from flows.auditing.physics import audit_physics
 from flows.driving import policy as policies
@@ -108,6 +110,19 @@ def test_pictures_are_those_of_the_drive_and_the_same_again(tmp_path):
     assert first[0].shape == (64, 96, 3) and first[0].dtype == np.uint8
     assert all((a == b).all() for a, b in zip(first, again, strict=True))
     assert np.abs(first[2].astype(int) - first[0]).mean() > 1.0
+
+
+def test_a_road_user_comes_out_of_the_fog_at_the_visual_range():
+    objects = [{"kind": "car", "track": {"gap_m": 25.0}}]
+    fog = {"weather": "fog", "visual_range_m": 15.0, "initial_speed_km_h": 36.0, "objects": objects}
+    simulator = Simulator(fog, duration_s=1.5, rate_hz=20)
+    (clear,) = Simulator(fog | {"visual_range_m": 100.0}, duration_s=1.0).reset().targets
+    assert simulator.reset().targets == ()
+    seen = [simulator.step(0.0) for _ in range(30)]
+    bumper = load("road user sizes")[EGO][0]
+    gaps = np.array([clear.station - one.station - bumper for one in seen])
+    assert [bool(one.targets) for one in seen] == (gaps <= 15.0).tolist()
+    assert 0 < (gaps <= 15.0).sum() < 30
 
 
 def test_the_objects_of_a_scenario_are_seen_by_the_end_that_the_car_meets():

@@ -178,6 +178,7 @@ NO_JUDGE = (
     "catalogs/physical_limits", "catalogs/quantities", "catalogs/sentences", "catalogs/studies/__init__",
     "catalogs/variants", "catalogs/vehicles/added", "catalogs/vehicles/frozen", "catalogs/yaml_text", "flows/__init__",
     "flows/measured/__init__", "manifests/", "tasks/__init__", "tasks/errors", "tasks/kernel_cache",
+    "tasks/render/__init__", "tasks/render/weather/__init__", "tasks/render/weather/named_sky",
 )  # fmt: skip
 """Sources that a verdict imports and that decide nothing in it: reading, checking, naming and writing of files."""
 

@@ -1,6 +1,7 @@
 """The table of weathers: one row a kind, the judge's own table beside it, and no kind beyond them anywhere."""
 
 from dataclasses import fields, replace
+from math import inf
 
 import pytest
 
@@ -24,6 +25,7 @@ def sound(kind: str) -> Scenario:
         weather=kind,
         precipitation_mm_h=1.5 if row.rate_limit else 0.0,
         snow_accumulation_h=0.7 if row.accumulates else 0.0,
+        visual_range_m=80.0 if row.obscures else None,
     )
 
 
@@ -35,6 +37,7 @@ def test_a_row_says_what_its_scenarios_give(kind):
         weather=kind,
         precipitation_mm_h=0.0 if row.rate_limit else 1.5,
         snow_accumulation_h=0.0 if row.accumulates else 0.7,
+        visual_range_m=80.0 if row.obscures else None,
     )
     assert len(find_scenario_problems(wrong)) == 2
     assert row.rate_limit is None or row.rate_limit in PhysicalLimits.model_fields
@@ -60,7 +63,12 @@ def test_the_judge_finds_the_same_surface_and_the_derivation_names_what_moved(ki
         | {"surface_friction": state.friction}
     )
     derived = [one.field for one in WEATHERS[kind].derive(weather, state, ASPHALT)]
-    names = {field.name for field in fields(SurfaceState)} - {"kind", "precipitation_mm_h", "grip"}
+    names = {field.name for field in fields(SurfaceState)} - {
+        "kind",
+        "precipitation_mm_h",
+        "grip",
+        "visual_range_m",
+    }
     assert derived[-1] == "friction"
     assert set(derived[:-1]) == {name for name in names - {"friction"} if getattr(state, name) > 0}
 
@@ -82,7 +90,13 @@ def test_an_unknown_kind_is_refused_and_the_known_are_listed(use):
 
 
 def test_a_kinds_code_stays_what_files_and_fmus_hold():
-    assert {name: row.code for name, row in WEATHERS.items()} == {"dry": 1, "rain": 2, "snow": 3, "ice": 4}
+    assert {name: row.code for name, row in WEATHERS.items()} == {
+        "dry": 1,
+        "rain": 2,
+        "snow": 3,
+        "ice": 4,
+        "fog": 5,
+    }
 
 
 def test_a_kind_may_grip_as_another_does_and_leave_codes_free(monkeypatch):
@@ -91,8 +105,8 @@ def test_a_kind_may_grip_as_another_does_and_leave_codes_free(monkeypatch):
     monkeypatch.setitem(WEATHERS, "gravel", gravel)
     vehicle = load("vehicle", "paper-reference")
     assert vehicle.find_tyre_family("gravel") is vehicle.find_tyre_family("dry")
-    assert vehicle.find_weathers() == ["dry", "rain", "snow", "ice", "gravel"]
-    assert list_by_code() == ("dry", "rain", "snow", "ice", "", "", "gravel")
+    assert vehicle.find_weathers() == ["dry", "rain", "snow", "ice", "fog", "gravel"]
+    assert list_by_code() == ("dry", "rain", "snow", "ice", "fog", "", "gravel")
 
 
 def test_dry_is_the_kind_that_changes_no_picture():
@@ -126,5 +140,27 @@ def test_what_never_fell_cannot_have_ended_and_skies_must_fit_what_falls():
         == len(problems("dry", sky="overcast", sun_azimuth_deg=9.0))
         == 1
     )
+    assert len(problems("fog", sky="clear")) == 1
+    assert problems("fog", sky="overcast") == []
     assert problems("dry", sky="haze", sun_azimuth_deg=90.0, sun_elevation_deg=5.0) == []
     assert len(problems("dry", sky="haze", sun_azimuth_deg=361.0, sun_elevation_deg=0.5)) == 2
+
+
+@pytest.mark.parametrize(
+    ("weather", "visual_range_m", "rule"),
+    [
+        ("fog", None, "weather fog needs visual_range_m"),
+        ("dry", 80.0, "visual_range_m belongs to fog; the weather is dry and it is 80"),
+        ("fog", 1001.0, "visual_range_m must be at most 1000 m"),
+        ("fog", 0.0, "visual_range_m must be at least 10 m"),
+    ],
+)
+def test_fog_and_its_visual_range_go_together_within_limits(weather, visual_range_m, rule):
+    (problem,) = find_scenario_problems(Scenario(weather=weather, visual_range_m=visual_range_m))
+    assert problem.startswith(rule)
+
+
+def test_a_foggy_road_grips_as_the_dry_one_and_only_its_air_differs():
+    foggy = surface_state(Weather(kind="fog", visual_range_m=80.0), ASPHALT)
+    assert replace(foggy, kind="dry", visual_range_m=inf) == surface_state(Weather(kind="dry"), ASPHALT)
+    assert foggy.visual_range_m == 80.0

@@ -11,7 +11,7 @@ from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
 from tasks.vehicle import reference
 from tasks.vehicle.model.chassis import Conditions, build_chassis
 from tasks.vehicle.model.ports import compute_ports
-from tasks.vehicle.model.states import AT_REST, Instant, Memory, Motion
+from tasks.vehicle.model.states import AxleMemory, Instant, Memory, Motion
 from tasks.vehicle.model.step import compute_body_rates, compute_motion_rates
 from tasks.vehicle.parameters import compute_surface_response
 from tasks.vehicle.road import make_road_feature
@@ -42,7 +42,7 @@ def test_rates_agree_with_the_twin_in_any_state(vehicle, pressure):
         motion = Motion(station, speed, *omega)
         ports = compute_ports(
             motion,
-            Memory(AT_REST, AT_REST),
+            Memory(AxleMemory(0.0, 0.0, 0.0, 0.0), AxleMemory(0.0, 0.0, 0.0, 0.0)),
             tuple(x),
             Instant(0.0, pressure, 0.0, 0.0, False, False, 0.0, 0.0),
             1.0,

@@ -55,5 +55,5 @@ def test_the_samples_that_are_held_reach_back_to_the_dead_time(vehicle, dead_tim
 
 
 def test_a_weather_without_a_tyre_family_is_none_of_a_vehicles(vehicle):
-    assert vehicle.find_weathers() == ["dry", "rain", "snow", "ice"]
-    assert replace(vehicle, shared_families={}).find_weathers() == ["dry", "rain", "snow"]
+    assert vehicle.find_weathers() == ["dry", "rain", "snow", "ice", "fog"]
+    assert replace(vehicle, shared_families={}).find_weathers() == ["dry", "rain", "snow", "fog"]

@@ -12,7 +12,13 @@ from tasks.surface.weather import Weather, surface_state
 from tasks.vehicle import reference
 from tasks.vehicle.paper import paper_mode
 from tasks.vehicle.paper.low_speed import BrakedStop
-from tasks.vehicle.paper.paper_mode import LITERAL_PASSES, SETTLED, StepGrid, run_paper_mode, simulate_body
+from tasks.vehicle.paper.paper_mode import (
+    LITERAL_PASSES,
+    MOST_PASSES,
+    StepGrid,
+    run_paper_mode,
+    simulate_body,
+)
 from tasks.vehicle.paper.wheels import build_wheels, simulate_stop
 from tasks.vehicle.parameters import compute_surface_response
 from tests.vehicle.conftest import HUMP, command
@@ -160,15 +166,17 @@ def test_passes_go_on_until_the_station_settles(vehicle, monkeypatch):
     brake = command(10.3, onset=0.22, hold_s=0.3, release_s=0.0).profile
     hump = RoadHazard(center_m=1.904, length_m=3.2, height_m=0.12)
 
-    def change(*drive):
+    def stations(most, *drive):
+        monkeypatch.setattr(paper_mode, "MOST_PASSES", most)
         return run_paper_mode(
             vehicle, response, *drive, StepGrid(steps=8230, step=5e-4), load("low-speed rule")
-        ).last_change
+        ).log[:, 0]
 
-    assert change(10.6 / 3.6, False, brake, hump) < SETTLED
-    monkeypatch.setattr(paper_mode, "MOST_PASSES", LITERAL_PASSES)
-    assert change(10.6 / 3.6, False, brake, hump) > 1e-3
-    assert change(40 / 3.6, True, command().profile, HUMP) < SETTLED
+    usual, stalling = (40 / 3.6, True, command().profile, HUMP), (10.6 / 3.6, False, brake, hump)
+    published, settled = (stations(most, *stalling) for most in (LITERAL_PASSES, MOST_PASSES))
+    assert np.abs(settled - published).max() > 1e-3
+    np.testing.assert_array_equal(stations(2 * MOST_PASSES, *stalling), settled)
+    np.testing.assert_array_equal(stations(MOST_PASSES, *usual), stations(LITERAL_PASSES, *usual))
 
 
 def test_the_body_response_is_that_of_road_and_brake_together(vehicle):

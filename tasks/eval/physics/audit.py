@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tasks.eval.physics.body import body_laws
 from tasks.eval.physics.clip_row import command_laws, outcome_laws, road_height_laws, surface_laws
-from tasks.eval.physics.constants import Constants
+from tasks.eval.physics.constants import ClipColumns, Constants
 from tasks.eval.physics.coupled_laws import coupled_laws
 from tasks.eval.physics.effects import find_unjudged
 from tasks.eval.physics.frames import frame_laws, pose_check_laws, pose_laws
@@ -102,17 +102,18 @@ def evaluate_laws(
     ----------
     ticks, frames, facts, constants, route : as in ``audit_clip``
     """
+    clip = ClipColumns(ticks, facts, constants)
     if constants.mode == "paper":
-        half = follow_half_step(ticks, facts, constants)
+        half = follow_half_step(clip)
         moving = [
-            *wheel_laws(ticks, facts, "f", constants, half),
-            *wheel_laws(ticks, facts, "r", constants, half),
-            *motion_laws(ticks, facts, constants, half),
-            *road_height_laws(ticks, facts, constants),
-            *body_laws(ticks, facts, constants, half),
+            *wheel_laws(clip, "f", half),
+            *wheel_laws(clip, "r", half),
+            *motion_laws(clip, half),
+            *road_height_laws(clip),
+            *body_laws(clip, half),
         ]
     else:
-        moving = coupled_laws(ticks, facts, constants)
+        moving = coupled_laws(clip)
     found = [
         *moving,
         *command_laws(ticks, facts),
@@ -121,7 +122,7 @@ def evaluate_laws(
         *pose_laws(frames, constants),
         *route_laws(frames, route, constants),
         *grade_laws(ticks, frames, constants),
-        *outcome_laws(ticks, facts, constants),
+        *outcome_laws(clip),
         *pose_check_laws(frames, facts),
     ]
     unjudged = find_unjudged(facts, constants)

@@ -4,13 +4,12 @@ Once a wheel has left the road, the tyres' forces are those in the sum of the re
 """
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lsim
 
-from tasks.eval.physics.constants import DT, Constants, Floats, find_climb
+from tasks.eval.physics.constants import DT, ClipColumns, Constants, Floats, find_climb
 from tasks.eval.physics.coupled import find_hits, spread
 from tasks.eval.physics.half_step import INNER_STEP, HalfStep, find_brake_onset
 from tasks.eval.physics.laws import Law, evaluate_law, is_shaken, rounding_tolerance
@@ -23,24 +22,21 @@ CAP_RATIO = 1.05
 """Cap over the reference [1]."""
 
 
-def body_laws(
-    ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants, half: HalfStep
-) -> list[Law | None]:
+def body_laws(clip: ClipColumns, half: HalfStep) -> list[Law | None]:
     """Return the laws of rates, the half-car's four equations and contact loads (paper, Eq. app_half_car_complete).
 
     Parameters
     ----------
-    ticks : columns of the tick table
-    facts : the clip's row
-    constants : car and pavement
+    clip : what is judged
     half : state half a tick after each tick
     """
+    ticks, facts, constants = clip
     car = constants.car
     z, dz, theta, dtheta = (ticks[c] for c in ("heave", "heave_rate", "pitch", "pitch_rate"))
     # the brake moment follows dv/dt, so its jumps within a few ticks change both rates
     shaken, hits = is_shaken(ticks, constants), find_hits(ticks, constants)
     literal = constants.steady_limit == 0 and facts["hazard_height_m"] != 0
-    jumpy = _spread_maximum(_largest_input_changes(ticks, facts, constants), STOP_PASS if literal else 3)
+    jumpy = _spread_maximum(_largest_input_changes(clip), STOP_PASS if literal else 3)
     pitch_input = 1.3 * car["sprung_mass"] * car["cg_height"] / car["pitch_inertia"]
     laws: list[Law | None] = []
     for name, x, dx, per_jump in (("heave", z, dz, 0.05), ("pitch", theta, dtheta, pitch_input)):
@@ -52,7 +48,7 @@ def body_laws(
         )
 
     forces: dict[str, Floats] = {}
-    moment = _brake_moment(ticks, facts, constants, half)
+    moment = _brake_moment(clip, half)
     pushed = sum_contact_changes(ticks, moment, constants) if shaken else {}
     for axle, lever in (("f", -car["cg_to_front_axle"]), ("r", car["cg_to_rear_axle"])):
         u = ticks[f"unsprung_heave_{axle}"]
@@ -84,7 +80,7 @@ def body_laws(
                 5e-3 * size + mass * 5 * jumpy[inner] + 0.5 * spread(np.abs(np.diff(push, 2))[2:-2], 2)
                 + np.where(hits, spread(np.abs(np.diff(push, prepend=push[:1])), 3), 0.0)[inner])
         )  # fmt: skip
-    judged = _judged_rows(ticks, facts, constants)
+    judged = _judged_rows(clip)
     laws += _sprung_laws(dz, dtheta, forces, moment, judged, constants, jumpy, hits)
     return laws
 
@@ -114,13 +110,12 @@ def _sprung_laws(
     return laws
 
 
-def _judged_rows(
-    ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants
-) -> NDArray[np.bool_]:
+def _judged_rows(clip: ClipColumns) -> NDArray[np.bool_]:
     """Rows whose brake moment follows from the ticks [N]: all but those about a literal stop on a road feature.
 
     There the low-speed rule holds one sample of the last fixed-point pass but one, and the ticks are of the last.
     """
+    ticks, facts, constants = clip
     judged = np.ones(len(ticks["speed"]), bool)
     standing = np.flatnonzero(ticks["speed"] <= 0)
     if standing.size and constants.held_share == 0 and facts["hazard_height_m"] != 0:
@@ -131,22 +126,20 @@ def _judged_rows(
     return judged
 
 
-def _brake_moment(
-    ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants, half: HalfStep
-) -> Floats:
+def _brake_moment(clip: ClipColumns, half: HalfStep) -> Floats:
     """Pitch moment of the brake at each tick (paper, Eq. app_brake_pitch), [N] [N m]."""
+    facts, constants = clip.facts, clip.constants
     car, tyre = constants.car, constants.tyres[facts["weather"]]
     gamma = tyre.at(tyre.pitch_scale, facts["surface_friction"])
     gamma *= 1.0 if facts["hazard_height_m"] == 0 else car["coupled_pitch_scale"]
-    deceleration = compute_pitching_deceleration(ticks, facts, constants, half)
+    deceleration = compute_pitching_deceleration(clip, half)
     moment: Floats = gamma * car["sprung_mass"] * car["cg_height"] * deceleration
     return moment
 
 
-def _largest_input_changes(
-    ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants
-) -> Floats:
+def _largest_input_changes(clip: ClipColumns) -> Floats:
     """Largest change within each tick of the acceleration that drives the brake moment, [N - 1] [m/s2]."""
+    ticks, facts, constants = clip
     v, a = ticks["speed"], ticks["longitudinal_acceleration"]
     between = np.diff(v) / INNER_STEP - a[:-1]
     swing = np.maximum(np.abs(between - a[:-1]), np.abs(a[1:] - between))
@@ -218,9 +211,7 @@ def follow_moment(moment: Floats, constants: Constants) -> dict[str, Floats]:
     return {"f": heave[:, 0], "r": heave[:, 1]}
 
 
-def compute_pitching_deceleration(
-    ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants, half: HalfStep
-) -> Floats:
+def compute_pitching_deceleration(clip: ClipColumns, half: HalfStep) -> Floats:
     """Return d_theta at each tick [N] [m/s2] (paper, Appendix B).
 
     Away from a stop it is the deceleration. Up to the stop, the rule holds the reference or caps the deceleration;
@@ -229,11 +220,10 @@ def compute_pitching_deceleration(
 
     Parameters
     ----------
-    ticks : columns of the tick table
-    facts : the clip's row
-    constants : car and pavement
+    clip : what is judged
     half : state half a tick after each tick
     """
+    ticks, facts, constants = clip
     v, a = ticks["speed"], ticks["longitudinal_acceleration"]
     climb, later_climb, _ = find_climb(ticks, constants)
     pitching: Floats = np.maximum(-a - climb, np.minimum(-climb, 0.0))

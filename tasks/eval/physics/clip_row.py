@@ -8,6 +8,7 @@ import numpy as np
 from tasks.eval.physics.constants import (
     DT,
     SURFACE_FORMS,
+    ClipColumns,
     Constants,
     Floats,
     derive_surface,
@@ -53,17 +54,14 @@ def command_laws(ticks: Mapping[str, Floats], facts: Mapping[str, Any]) -> list[
     return [evaluate_law("brake pressure as commanded", columns, pressure - wanted, slack)]
 
 
-def road_height_laws(
-    ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants
-) -> list[Law | None]:
+def road_height_laws(clip: ClipColumns) -> list[Law | None]:
     """Return the laws of the road heights under both axles.
 
     Parameters
     ----------
-    ticks : columns of the tick table
-    facts : the clip's row
-    constants : car and pavement
+    clip : what is judged
     """
+    ticks, facts, constants = clip
     s, v = ticks["station"], ticks["speed"]
     laws = []
     hump = facts["hazard_center_m"], facts["hazard_length_m"], facts["hazard_height_m"]
@@ -104,17 +102,14 @@ def surface_laws(facts: Mapping[str, Any], constants: Constants) -> list[Law | N
     return laws
 
 
-def outcome_laws(
-    ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants
-) -> list[Law | None]:
+def outcome_laws(clip: ClipColumns) -> list[Law | None]:
     """Return the laws of stop, distance, peaks, ABS and wheel lift, each computed again.
 
     Parameters
     ----------
-    ticks : columns of the tick table
-    facts : the clip's row
-    constants : car and pavement
+    clip : what is judged
     """
+    ticks, facts, constants = clip
     s, v, pitch = ticks["station"], ticks["speed"], ticks["pitch"]
     laws = [
         evaluate_law("peak pitch is the largest", "clips.peak_pitch pitch", pitch.max() - facts["peak_pitch"], 1e-12),

@@ -5,6 +5,7 @@ Written from the paper's appendices alone: nothing here is shared with the model
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,6 +104,21 @@ class Constants:
         """
         front = self.car["front_brake_share"]
         return front if axle == "f" else 1.0 - front
+
+
+class ClipColumns(NamedTuple):
+    """What the laws of a clip's motion relate.
+
+    Parameters
+    ----------
+    ticks : columns of the tick table
+    facts : the clip's row
+    constants : car and pavement
+    """
+
+    ticks: Mapping[str, Floats]
+    facts: Mapping[str, Any]
+    constants: Constants
 
 
 def read_grade(ticks: Mapping[str, Floats]) -> Floats:
@@ -301,5 +317,6 @@ SURFACE_FORMS: Mapping[str, SurfaceForm] = {
         film=lambda rate, surface: surface["glaze_mm"],
         friction=lambda film, cover, surface: surface["ice_friction"],
     ),
+    "fog": SurfaceForm(friction=lambda film, cover, surface: surface["dry_friction"]),
 }
 """The judge's own table of weathers, by the name of the kind."""

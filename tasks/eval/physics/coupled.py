@@ -10,6 +10,7 @@ from scipy.ndimage import maximum_filter1d
 
 from tasks.eval.physics.constants import (
     DT,
+    ClipColumns,
     Constants,
     Floats,
     compute_wet_friction,
@@ -99,27 +100,24 @@ class Forces:
     hidden: Floats
 
 
-def compute_forces(ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants) -> Forces:
+def compute_forces(clip: ClipColumns) -> Forces:
     """Return what acts on the car at each tick.
 
     Parameters
     ----------
-    ticks : columns of the tick table
-    facts : the clip's row
-    constants : car and pavement
+    clip : what is judged
     """
+    ticks, facts, constants = clip
     car, m, e = constants.car, constants.mass, constants.effects.get
     curve, v = find_curve(facts, constants), ticks["speed"]
     moves = v > 0
     held = find_held_rows(DT * np.arange(len(v), dtype=np.float64), facts, find_brake_onset(ticks, facts))
     climb = car["gravity"] * read_grade(ticks)
-    line = _act_on_pads(ticks, facts, constants)
+    line = _act_on_pads(clip)
     front, rear = (constants.brake_share(axle) * car["brake_gain"] for axle in "fr")
     moved = np.clip(e("bias_pressure", 0.0) * line * (front + rear), -front, rear)
     gains = {"f": front + moved, "r": rear - moved}
-    axles = {
-        axle: _compute_axle(ticks, facts, axle, gains[axle], line, climb, curve, constants) for axle in "fr"
-    }
+    axles = {axle: _compute_axle(clip, axle, gains[axle], line, climb, curve) for axle in "fr"}
     along = {axle: ticks[f"tyre_load_{axle}"] * axles[axle].slope for axle in "fr"}
     force = ticks["tyre_force_f"] + ticks["tyre_force_r"]
     drag = m * (car["coast_deceleration"] + climb)
@@ -155,9 +153,9 @@ def compute_forces(ticks: Mapping[str, Floats], facts: Mapping[str, Any], consta
 
 
 def _compute_axle(
-    ticks: Mapping[str, Floats], facts: Mapping[str, Any], axle: str, gain: Floats, line: Floats, climb: Floats,
-    curve: TyreCurve, constants: Constants,
-) -> AxleForces:  # fmt: skip
+    clip: ClipColumns, axle: str, gain: Floats, line: Floats, climb: Floats, curve: TyreCurve
+) -> AxleForces:
+    ticks, facts, constants = clip
     car, e = constants.car, constants.effects.get
     v, omega, q = ticks["speed"], ticks[f"wheel_speed_{axle}"], ticks[f"abs_scale_{axle}"]
     u, load, kappa = (ticks[f"{name}_{axle}"] for name in ("unsprung_heave", "tyre_load", "braking_slip"))
@@ -251,8 +249,9 @@ def _bound_line_error(line: Floats, facts: Mapping[str, Any], constants: Constan
     return np.asarray((0.5 if by_place else 1e-6) * change + 1e-9)
 
 
-def _act_on_pads(ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants) -> Floats:
+def _act_on_pads(clip: ClipColumns) -> Floats:
     """Pressure at the pads at each tick: the recorded one, or what a line with dead time and lag makes of it [MPa]."""
+    ticks, facts, constants = clip
     dead = constants.effects.get("dead_time", 0.0)
     if dead == 0.0 and constants.effects.get("lag", 0.0) <= 0.0:
         return ticks["brake_pressure_mpa"]

@@ -5,12 +5,11 @@ change beyond a straight line about the tick, since that is all that the logging
 """
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.eval.physics.constants import DT, Constants, Floats
+from tasks.eval.physics.constants import DT, ClipColumns, Constants, Floats
 from tasks.eval.physics.coupled import Forces, compute_forces, spread
 from tasks.eval.physics.effects import AXLE, FORCE, HEAVE, PITCH, SUM, TORQUE
 from tasks.eval.physics.half_step import INNER_STEP
@@ -35,22 +34,19 @@ STATES = "heave pitch heave_rate pitch_rate unsprung_heave_f unsprung_heave_r"
 """Columns that decide the struts' forces."""
 
 
-def coupled_laws(
-    ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants
-) -> list[Law | None]:
+def coupled_laws(clip: ClipColumns) -> list[Law | None]:
     """Return the laws of slip, tyre, brake, wheels, motion, road, contact and body of the physical model.
 
     Parameters
     ----------
-    ticks : columns of the tick table
-    facts : the clip's row
-    constants : car and pavement
+    clip : what is judged
     """
-    forces = compute_forces(ticks, facts, constants)
+    ticks, constants = clip.ticks, clip.constants
+    forces = compute_forces(clip)
     return [
-        *_axle_laws(ticks, facts, forces, "f", constants),
-        *_axle_laws(ticks, facts, forces, "r", constants),
-        *_motion_laws(ticks, facts, forces, constants),
+        *_axle_laws(clip, forces, "f"),
+        *_axle_laws(clip, forces, "r"),
+        *_motion_laws(clip, forces),
         *_body_laws(ticks, forces, constants),
     ]
 
@@ -118,9 +114,8 @@ def _find_weighted_median(values: Floats, weight: Floats) -> float:
     return float(values[order][np.searchsorted(total, 0.5 * total[-1])])
 
 
-def _axle_laws(
-    ticks: Mapping[str, Floats], facts: Mapping[str, Any], forces: Forces, axle: str, constants: Constants
-) -> list[Law | None]:
+def _axle_laws(clip: ClipColumns, forces: Forces, axle: str) -> list[Law | None]:
+    ticks, facts, constants = clip
     car, curve, x, at = constants.car, find_curve(facts, constants), f"_{axle}", forces.axles[axle]
     v, omega, kappa = ticks["speed"], ticks[f"wheel_speed{x}"], ticks[f"braking_slip{x}"]
     load, torque = ticks[f"tyre_load{x}"], ticks[f"brake_torque{x}"]
@@ -189,9 +184,8 @@ def _abs_laws(
     ]
 
 
-def _motion_laws(
-    ticks: Mapping[str, Floats], facts: Mapping[str, Any], forces: Forces, constants: Constants
-) -> list[Law | None]:
+def _motion_laws(clip: ClipColumns, forces: Forces) -> list[Law | None]:
+    ticks, facts, constants = clip
     s, v, a = ticks["station"], ticks["speed"], ticks["longitudinal_acceleration"]
     moves, road = forces.moves, ticks["road_force"]
     force = ticks["tyre_force_f"] + ticks["tyre_force_r"]

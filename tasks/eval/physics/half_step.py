@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from tasks.eval.physics.constants import (
     DT,
+    ClipColumns,
     Constants,
     Floats,
     find_climb,
@@ -43,17 +44,16 @@ class HalfStep:
     load_uncertainty: Mapping[str, Floats]
 
 
-def follow_half_step(ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants) -> HalfStep:
+def follow_half_step(clip: ClipColumns) -> HalfStep:
     """Integrate the car half a tick on from each tick (paper, Eqs. app_abs_command to app_longitudinal_complete).
 
     The ABS changes from one inner step to the next, so the ticks alone do not hold all forces that act between them.
 
     Parameters
     ----------
-    ticks : columns of the tick table
-    facts : the clip's row
-    constants : car and pavement
+    clip : what is judged
     """
+    ticks, facts, constants = clip
     car, m, L = constants.car, constants.mass, constants.wheelbase
     curve = find_curve(facts, constants)
     target, width, radius = curve.target_slip, car["abs_release_width"], car["wheel_radius"]

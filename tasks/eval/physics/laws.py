@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.eval.physics.constants import (
+    ClipColumns,
     Constants,
     Floats,
     find_climb,
@@ -112,19 +113,16 @@ def rounding_tolerance(*terms: Floats) -> Floats:
     return ROUNDING * (size + 1e-3 * size.max() + 1e-12)
 
 
-def wheel_laws(
-    ticks: Mapping[str, Floats], facts: Mapping[str, Any], axle: str, constants: Constants, half: HalfStep
-) -> list[Law | None]:
+def wheel_laws(clip: ClipColumns, axle: str, half: HalfStep) -> list[Law | None]:
     """Return the laws of slip, tyre force, brake torque, ABS and torque balance of one axle (paper, Appendix B).
 
     Parameters
     ----------
-    ticks : columns of the tick table
-    facts : the clip's row
+    clip : what is judged
     axle : f or r
-    constants : car and pavement
     half : state half a tick after each tick
     """
+    ticks, facts, constants = clip
     car, curve = constants.car, find_curve(facts, constants)
     v, omega = ticks["speed"], ticks[f"wheel_speed_{axle}"]
     kappa, force = ticks[f"braking_slip_{axle}"], ticks[f"tyre_force_{axle}"]
@@ -169,18 +167,15 @@ def wheel_laws(
     return laws
 
 
-def motion_laws(
-    ticks: Mapping[str, Floats], facts: Mapping[str, Any], constants: Constants, half: HalfStep
-) -> list[Law | None]:
+def motion_laws(clip: ClipColumns, half: HalfStep) -> list[Law | None]:
     """Return the laws of station, speed, forces, energy, loads and time (paper, Eq. app_longitudinal_complete).
 
     Parameters
     ----------
-    ticks : columns of the tick table
-    facts : the clip's row
-    constants : car and pavement
+    clip : what is judged
     half : state half a tick after each tick
     """
+    ticks, facts, constants = clip
     car, m, L = constants.car, constants.mass, constants.wheelbase
     s, v, a = ticks["station"], ticks["speed"], ticks["longitudinal_acceleration"]
     force = ticks["tyre_force_f"] + ticks["tyre_force_r"]

@@ -104,7 +104,8 @@ def make_outside(
     """
     daylight, environment, white = scene.daylight, scene.environment, scene.white
     p = parameters
-    visual_range = p.air.haze_visual_range_m if daylight is None else daylight.kind.visual_range_m
+    haze = p.air.haze_visual_range_m if daylight is None else daylight.kind.visual_range_m
+    visual_range = min(state.visual_range_m, haze)
     xi_road = road_controls(state, look)
     xi_atm = air_controls(state.kind, state.precipitation_mm_h, p, visual_range)
     covered, ground = xi_road.snow_coverage, p.sky.asphalt_albedo

@@ -61,7 +61,7 @@ class WeatherParameters:
     kinds: Mapping[str, KindLook]
 
     def find_look(self, kind: str) -> KindLook:
-        """How a kind of weather looks; in dry weather nothing falls and nothing lies.
+        """How a kind of weather looks; in dry weather and in fog nothing falls and nothing lies.
 
         Parameters
         ----------
@@ -72,7 +72,8 @@ class WeatherParameters:
         InputError
             If there is no such kind, or the catalogue has no entry of it.
         """
-        if not find_weather(kind).overcast:
+        row = find_weather(kind)
+        if row.obscures or not row.overcast:
             return KindLook()
         if kind not in self.kinds:
             raise InputError(

@@ -46,20 +46,6 @@ def smooth_overlap(first: Floats, second: Floats, radius: float) -> Floats:
     return -smooth_union(-first, -second, radius)
 
 
-def box_distance(points: Floats, middle: ArrayLike, half: ArrayLike, radius: float) -> Floats:
-    """Return the distance from an upright box with rounded edges.
-
-    Parameters
-    ----------
-    points : [N, 3] [m]
-    middle, half : [3] its centre and half its sides [m]
-    radius : of its edges [m]
-    """
-    away = np.abs(points - np.asarray(middle)) - (np.asarray(half) - radius)
-    outside = np.linalg.norm(np.maximum(away, 0), axis=1)
-    return outside + np.minimum(away.max(axis=1), 0) - radius
-
-
 def limb_distance(points: Floats, start: ArrayLike, stop: ArrayLike, thick: float, thin: float) -> Floats:
     """Return the distance from a limb with round ends: a rod from ``start`` to ``stop`` with a radius at each [m]."""
     origin, run = np.asarray(start, float), np.subtract(stop, start)

@@ -1,7 +1,8 @@
 """Hedges, fences and walls along gardens, yards and fields."""
 
+from typing import NamedTuple
+
 import numpy as np
-from numpy.typing import NDArray
 
 from tasks.conventions import SemanticClass
 from tasks.scene.street import palette
@@ -10,14 +11,22 @@ from tasks.scene.street.noise import fractal_noise, named_generator
 from tasks.scene.street.surfels import Cover, Grain, Surfels, build_panel, join_surfels, tile_surface
 from tasks.scene.street.vegetation import build_leaves, tint_leaves
 
-Floats = NDArray[np.float64]
-
 _GATE = 3.2
 """Gap for a gate or a drive between two lots [m]."""
 _PALE, _PALE_GAP = 0.09, 0.14
 """Width of the pales of a fence and distance of their middles [m]."""
 _MESH = 0.30
 """Distance of the drawn wires of a wire fence: a real mesh is finer than a pixel [m]."""
+
+
+class _Line(NamedTuple):
+    """What closes a lot: side of the road, 1 at the left, and where it begins, ends, runs, and its height [m]."""
+
+    side: int
+    start: float
+    stop: float
+    lateral: float
+    height: float
 
 
 def build_boundaries(layout: StreetLayout, seed: int) -> Surfels:
@@ -45,20 +54,19 @@ def _build_side(layout: StreetLayout, seed: int, side: int) -> list[Surfels]:
         stop = min(start + length, last)
         choice, height = rng.random(), rng.uniform(0.8, 1.7)
         if choice < hedge:
-            parts.append(_build_hedge(layout, rng, start, stop, lateral, height))
+            parts += _build_hedge(layout, rng, _Line(side, start, stop, lateral, height))
         elif choice < hedge + fence:
-            parts += _build_fence(layout, rng, side, start, stop, lateral, 0.65 * height)
+            parts += _build_fence(layout, rng, _Line(side, start, stop, lateral, 0.65 * height))
         elif choice < hedge + fence + wall:
-            parts += _build_wall(layout, rng, side, start, stop, lateral, 0.8 * height)
+            parts += _build_wall(layout, rng, _Line(side, start, stop, lateral, 0.8 * height))
         elif choice < hedge + fence + wall + mesh:
-            parts += _build_mesh(layout, rng, side, start, stop, lateral, 1.2 + 0.5 * height)
+            parts += _build_mesh(layout, rng, _Line(side, start, stop, lateral, 1.2 + 0.5 * height))
         start = stop + _GATE
     return parts
 
 
-def _build_hedge(
-    layout: StreetLayout, rng: np.random.Generator, start: float, stop: float, lateral: float, height: float
-) -> Surfels:
+def _build_hedge(layout: StreetLayout, rng: np.random.Generator, line: _Line) -> list[Surfels]:
+    _, start, stop, lateral, height = line
     n = max(int((stop - start) / 0.5), 2)
     s = start + (np.arange(n) + 0.5) * (stop - start) / n
     radius = 0.36 + 0.1 * height
@@ -71,19 +79,12 @@ def _build_hedge(
     ])  # fmt: skip
     depth = float(nearest_depth(layout, start, lateral, height / 2))
     colour = tint_leaves(palette.HEDGE * rng.uniform(0.7, 1.3), 0.5 * layout.autumn_share, rng)
-    return build_leaves(balls, colour, max(8.0 * PIXEL * depth, 0.07), rng)
+    return [build_leaves(balls, colour, max(8.0 * PIXEL * depth, 0.07), rng)]
 
 
-def _build_fence(
-    layout: StreetLayout,
-    rng: np.random.Generator,
-    side: int,
-    start: float,
-    stop: float,
-    lateral: float,
-    height: float,
-) -> list[Surfels]:
+def _build_fence(layout: StreetLayout, rng: np.random.Generator, line: _Line) -> list[Surfels]:
     """Build wooden pales on two rails."""
+    side, start, stop, lateral, height = line
     paint = palette.FENCES[rng.integers(len(palette.FENCES))]
     s = np.arange(start, stop, _PALE_GAP)
     z = layout.kerb_height + height * np.array([0.35, 0.8])
@@ -102,15 +103,8 @@ def _build_fence(
     return [pales, *rails]
 
 
-def _build_wall(
-    layout: StreetLayout,
-    rng: np.random.Generator,
-    side: int,
-    start: float,
-    stop: float,
-    lateral: float,
-    height: float,
-) -> list[Surfels]:
+def _build_wall(layout: StreetLayout, rng: np.random.Generator, line: _Line) -> list[Surfels]:
+    side, start, stop, lateral, height = line
     stone = palette.BRICK if rng.random() < 0.5 else palette.PLASTER
     albedo = stone[rng.integers(len(stone))]
     depth = float(nearest_depth(layout, start, lateral, height / 2))
@@ -125,16 +119,9 @@ def _build_wall(
     ]  # fmt: skip
 
 
-def _build_mesh(
-    layout: StreetLayout,
-    rng: np.random.Generator,
-    side: int,
-    start: float,
-    stop: float,
-    lateral: float,
-    height: float,
-) -> list[Surfels]:
+def _build_mesh(layout: StreetLayout, rng: np.random.Generator, line: _Line) -> list[Surfels]:
     """Build a wire fence: posts, and wires through which one sees."""
+    side, start, stop, lateral, height = line
     steel = palette.METAL_GREY if rng.random() < 0.5 else palette.BIN_GREEN
     kind, ground = SemanticClass.OTHER, layout.kerb_height
     posts = np.arange(start, stop, 2.5)

@@ -56,11 +56,7 @@ CAR_PAINT = _linear_light(
     "#b4b7b8",
 )
 TYRE = _linear_light("#222223")[0]
-RIM = _linear_light("#a3a6a8")[0]
-PLASTIC = _linear_light("#2a2b2d")[0]
-TAIL_LIGHT = _linear_light("#7c1416")[0]
 HEAD_LIGHT = _linear_light("#d8dde0")[0]
-NUMBER_PLATE = _linear_light("#c4c0ae")[0]
 WHITE_PAINT = _linear_light("#dddcd6")[0]
 ZINC = _linear_light("#9ea3a5")[0]
 SIGN_RED = _linear_light("#b01c22")[0]
@@ -71,7 +67,6 @@ LITTER = _linear_light("#7a5c3e")[0]
 """Dead leaves on the ground of a wood."""
 DEAD_GRASS = _linear_light("#9c9064")[0]
 AUTUMN = _linear_light("#a8742c", "#8f4d24", "#b99a35", "#7d6a30", "#9c5a2a")
-CONCRETE = _linear_light("#a8a49b")[0]
 SIGN_BLUE = _linear_light("#1d4f9c")[0]
 POST_YELLOW = _linear_light("#d9a514")[0]
 BIN_GREEN = _linear_light("#2f4b3c")[0]

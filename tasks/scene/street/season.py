@@ -3,11 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tasks.scene.street.noise import named_generator
 
-Floats = NDArray[np.float64]
 Range = tuple[float, float]
 Colour = tuple[float, float, float]
 

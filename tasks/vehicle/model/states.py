@@ -69,8 +69,6 @@ class Instant(NamedTuple):
 
 STATE_WIDTH = 29
 """Number of values in a state's row."""
-AT_REST = AxleMemory(0.0, 0.0, 0.0, 0.0)
-"""No slip, tyres and discs at ambient temperature."""
 
 
 class VehicleState(NamedTuple):

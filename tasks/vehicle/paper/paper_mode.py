@@ -54,7 +54,6 @@ class PaperRun:
     onset : brake onset; infinite if there is none [s]
     stop : sample of the stop; -1 if there is none
     stop_time : time of the stop, at or before that sample; infinite if there is none [s]
-    last_change : largest change of the station in the last fixed-point pass; 0 on a flat road [m]
     """
 
     log: NDArray[np.float64]
@@ -64,7 +63,6 @@ class PaperRun:
     onset: float
     stop: int
     stop_time: float
-    last_change: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,13 +129,9 @@ def run_paper_mode(
     log, onset, stop, stop_time = drive(ANALYTIC_LOADS)
     if hazard.height_m == 0:
         states, heights, loads = move_body()
-        return PaperRun(
-            log=log, states=states, road=heights, loads=loads, onset=onset, stop=stop, stop_time=stop_time,
-            last_change=0.0,
-        )  # fmt: skip
     done, change = 0, inf
     most = LITERAL_PASSES if steady is None else MOST_PASSES
-    while done < LITERAL_PASSES or (change > SETTLED and done < most):
+    while hazard.height_m != 0 and (done < LITERAL_PASSES or (change > SETTLED and done < most)):
         station = log[:, 0]
         states, heights, loads = move_body()
         log, onset, stop, stop_time = drive(loads)
@@ -150,7 +144,6 @@ def run_paper_mode(
         onset=onset,
         stop=stop,
         stop_time=stop_time,
-        last_change=change,
     )
 
 

@@ -257,7 +257,7 @@ def test_no_check_reads_the_depth_of_what_moves(made, data, masks, monkeypatch):
     assert np.isfinite(stored["depth"][masks > 0]).any()
     seen = []
 
-    def keep(pinhole, *_):
+    def keep(pinhole, *_, **_how):
         seen.append(pinhole["depth"])
         raise InputError("enough")
 

@@ -161,6 +161,9 @@ def test_channel_names_are_unique_and_described():
         "variant",
         "scene",
         "kind",
+        "collided",
+        "sky",
+        "falling",
     }
     assert {c.name for c in CHANNELS_BY_NAME.values() if not c.unit} == texts, "every number has a unit"
 

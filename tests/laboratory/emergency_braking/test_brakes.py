@@ -1,6 +1,6 @@
 """Emergency brakes: the closed form of the impact, what they know of the road, tracks of targets, the protocols."""
 
-from math import inf, pi
+from math import inf, pi, sqrt
 
 import numpy as np
 import pytest
@@ -8,8 +8,9 @@ import pytest
 from catalogs.entries import load
 from catalogs.road_users import EGO, RoadUser
 from catalogs.scenario import Scenario
-from flows.making.driving import surface_of
-from studies.emergency_braking.brakes import Approach, BlindTrigger, compute_impact_speed, find_threat
+from catalogs.weather.look import load_weather
+from flows.making.driving import find_visual_range, surface_of
+from studies.emergency_braking.brakes import Approach, BlindTrigger, find_threat
 from studies.emergency_braking.cases import Case, list_cases
 from studies.emergency_braking.compare import compare_brakes, drive_approach, find_tyre_friction, make_brake
 from studies.emergency_braking.table import load_table
@@ -24,6 +25,13 @@ OVERHANG = load("road user sizes")[EGO][0]
 
 def road(weather: str):
     return surface_of(Scenario(**TABLE.list_weathers()[weather]), ASPHALT)
+
+
+def compute_impact_speed(closing: float, gap: float, deceleration: float, delay: float, rise: float) -> float:
+    """Return the closing speed at the impact, of a deceleration that rises on a straight line and then stays [m/s]."""
+    left = gap - closing * (delay + rise) + deceleration * rise * rise / 6.0
+    after = closing - 0.5 * deceleration * rise
+    return sqrt(max(after * after - 2.0 * deceleration * left, 0.0))
 
 
 def approach_at(speed_km_h: float, target_km_h: float) -> Case:
@@ -68,6 +76,19 @@ def test_the_brake_that_knows_friction_stops_a_margin_before_the_target_and_brak
     assert not outcome.collided and 0.3 < outcome.clearance < 4.0
     blind = drive_approach(CAR, state, case, *make_brake("blind", CAR, state, TABLE), TABLE)
     assert blind.collided and blind.brake_time > outcome.brake_time
+
+
+def test_no_brake_sees_through_fog_and_one_that_needs_more_road_than_that_brakes_at_its_visual_range():
+    state, case = surface_of(Scenario(weather="fog", visual_range_m=12.0), ASPHALT), approach_at(60, 0)
+    far, near = (
+        drive_approach(CAR, state, case, *make_brake("friction", CAR, state, TABLE), TABLE, visual_range_m)
+        for visual_range_m in (inf, find_visual_range(state, load_weather()))
+    )
+    line = TABLE.brake_line
+    seen = near.brake_time - line.delay_s.value
+    gap = case.follow().find(0.0).station - OVERHANG - case.speed * seen
+    assert gap == pytest.approx(12.0, abs=case.speed / TABLE.rate_hz.value)
+    assert near.collided and not far.collided and far.brake_time < near.brake_time
 
 
 @pytest.mark.parametrize("slows", [2.0, 6.0])

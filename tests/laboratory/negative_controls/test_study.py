@@ -160,7 +160,7 @@ def test_the_command_fails_and_names_what_could_not_be_tried(
     made = {clip.facts["clip_id"]: clip for clip in clips}
     monkeypatch.setattr(judging_controls, "judge_clip", lambda view, facts: made[facts["clip_id"]])
     monkeypatch.setattr(judging_controls, "run_as_stage", lambda work: work)
-    monkeypatch.setattr(judging_controls, "require_frames", lambda manifest, place: None)
+    monkeypatch.setattr(judging_controls, "require_frames", lambda manifest, place, stored: None)
     arguments = ["lab", "controls", str(dataset), "--out", str(tmp_path / "out")]
     assert CliRunner().invoke(app, arguments).exit_code == 0
     monkeypatch.setattr(judging_controls, "LEAST_PITCH", 9.0)

@@ -8,8 +8,7 @@ import pytest
 
 from catalogs.scenario import Scenario
 from catalogs.studies.ablation import cut_coupling
-from catalogs.variants import COUPLINGS
-from studies.paper.ablation import run_ablation
+from studies.paper.ablation import COUPLINGS, run_ablation
 
 
 @pytest.fixture(scope="module")

@@ -70,6 +70,15 @@ def test_dry_air_holds_haze_alone(parameters):
     assert air.visual_range_m == pytest.approx(3000.0)
 
 
+def test_fog_veils_by_koschmieders_extinction_and_hides_sky_and_horizon_alike(parameters, surface):
+    """ln(1 / 0.05), the contrast threshold of WMO-No. 8, over the meteorological optical range."""
+    fog = surface_state(Weather(kind="fog", visual_range_m=80.0), surface)
+    outside = weather_over(road(), clear_sky(), fog, parameters)[1].outside
+    assert outside.air.extinction == outside.atmosphere.extinction == pytest.approx(2.99573 / 80.0, rel=1e-5)
+    above = outside.environment[: len(outside.environment) // 2 - 1]
+    assert np.ptp(above[..., 1]) < 0.02 * above[..., 1].mean()
+
+
 def test_a_rate_between_two_anchors_has_these_two(surface):
     rain = Weather(kind="rain", precipitation_mm_h=15)
     low, high = adjacent_anchors(rain, ANCHORS, surface)
