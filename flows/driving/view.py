@@ -13,7 +13,7 @@ from catalogs.weather.grip import WEATHER
 from catalogs.weather.look import load_weather
 from flows.making.bodies import build_moving_bodies
 from flows.making.driving import hazard_of
-from flows.making.pictures import edit_scene
+from flows.making.pictures import edit_scene, shape_road
 from flows.making.road_users import move_road_users
 from tasks.errors import InputError
 from tasks.render.camera import Camera, body_poses
@@ -55,9 +55,8 @@ class StepCamera:
                 f"camera {camera}: moves while it sees a picture, which a drive by steps cannot show"
             )
         parameters = load_weather(WEATHER)
-        gaussians, self._relief = edit_scene(
-            self._scene, hazard_of(scenario), None, parameters.sky.asphalt_albedo
-        )
+        self._relief = shape_road(self._scene, hazard_of(scenario))
+        gaussians = edit_scene(self._scene, self._relief, None, parameters.sky.asphalt_albedo)
         self._edited = replace(self._scene, gaussians=gaussians)
         self._conditions = ClipConditions(state=state, pavement=pavement, parameters=parameters, seed=SEED)
         self.road_user_sizes: dict[str, tuple[float, ...]] = (

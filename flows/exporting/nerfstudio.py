@@ -23,7 +23,7 @@ from catalogs.scenes.gaussian_files import write_gaussians
 from flows.exporting.dataset import ExportedClip, ExportedDataset
 from flows.making.catalogue import catalogue_of
 from flows.making.driving import hazard_of
-from flows.making.pictures import edit_scene
+from flows.making.pictures import edit_scene, shape_road
 from flows.store.layout import write_json
 from tasks.render.camera import Camera
 from tasks.render.contact_sheet import encode_png
@@ -55,9 +55,9 @@ def write_nerfstudio(dataset: ExportedDataset, folder: Path) -> None:
         if road not in roads:
             catalogue = catalogue_of(dataset.layout.root, scenario.scene)
             roads[road] = f"scenes/road-{len(roads):03d}.ply"
-            drawn, _ = edit_scene(
+            drawn = edit_scene(
                 catalogue.scene,
-                hazard_of(scenario),
+                shape_road(catalogue.scene, hazard_of(scenario)),
                 catalogue.marking,
                 catalogue.weather_parameters.sky.asphalt_albedo,
             )

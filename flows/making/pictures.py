@@ -67,28 +67,14 @@ def render_frames(
     shown: range | None = None,
 ) -> dict[str, NDArray[Any]]:
     """Render the clip's finished frames, depth and class; ``shown`` is that of `RigMotion`."""
-    T_world_rig = frames["T_world_rig"].reshape(-1, 4, 4)
-    scene, camera = catalogue.scene, catalogue.camera_of(seed)
-    if (street := catalogue.street) is not None:
-        scene = replace(
-            scene,
-            gaussians=detail_cars(
-                scene.gaussians,
-                *street,
-                T_world_rig @ camera.T_rig_camera,
-                float(camera.K[0, 0]),
-            ),
-        )
-    gaussians, relief = edit_scene(
-        scene,
-        hazard_of(scenario),
-        catalogue.marking,
-        catalogue.weather_parameters.sky.asphalt_albedo,
-    )
+    camera = catalogue.camera_of(seed)
+    motion = gather_motion(scenario, state, frames, plan, catalogue, camera, rig_at)
+    relief = shape_road(catalogue.scene, hazard_of(scenario))
     buffers = render_clip(
-        replace(scene, gaussians=gaussians),
+        # no name is given to it here: the renderer frees the clear scene when the weather is in it
+        _make_clear_scene(catalogue, relief, camera, motion.T_world_rig),
         camera,
-        replace(gather_motion(scenario, state, frames, plan, catalogue, camera, rig_at), shown=shown),
+        replace(motion, shown=shown),
         ClipConditions(
             state=state,
             pavement=catalogue.surface,
@@ -130,27 +116,51 @@ def gather_motion(
     )
 
 
-def edit_scene(
-    scene: Scene, hazard: RoadHazard, marking: HazardMarking | None, asphalt_albedo: float
-) -> tuple[Gaussians, RoadRelief | None]:
-    """Return the Gaussians with a road feature, and the feature as the renderer takes it; None on a flat road.
+def _make_clear_scene(
+    catalogue: Catalogue, relief: RoadRelief | None, camera: Camera, T_world_rig: NDArray[np.float64]
+) -> Scene:
+    """Return the scene with near cars in detail and the road feature in it."""
+    scene = catalogue.scene
+    if (street := catalogue.street) is not None:
+        T_world_camera, focal_px = T_world_rig @ camera.T_rig_camera, float(camera.K[0, 0])
+        scene = replace(scene, gaussians=detail_cars(scene.gaussians, *street, T_world_camera, focal_px))
+    albedo = catalogue.weather_parameters.sky.asphalt_albedo
+    return replace(scene, gaussians=edit_scene(scene, relief, catalogue.marking, albedo))
+
+
+def shape_road(scene: Scene, hazard: RoadHazard) -> RoadRelief | None:
+    """Return a road feature as the renderer takes it; None on a flat road.
 
     Parameters
     ----------
-    scene : without the feature
-    hazard : road feature; height 0 leaves the scene as it is
-    marking : finish of the feature; None leaves it plain
-    asphalt_albedo : share of the light that the pavement sends back [1]
+    scene : whose route the feature lies on
+    hazard : road feature; height 0 is a flat road
     """
     if hazard.height_m == 0:
-        return scene.gaussians, None
-    relief = RoadRelief(
+        return None
+    return RoadRelief(
         route=scene.route,
         elevation=lambda station: road_elevation(station, hazard),
         slope=lambda station: road_slope(station, hazard),
         near=hazard.center_m - hazard.length_m / 2,
         far=hazard.center_m + hazard.length_m / 2,
     )
+
+
+def edit_scene(
+    scene: Scene, relief: RoadRelief | None, marking: HazardMarking | None, asphalt_albedo: float
+) -> Gaussians:
+    """Return the Gaussians of a scene with a road feature.
+
+    Parameters
+    ----------
+    scene : without the feature
+    relief : road feature; None leaves the scene as it is
+    marking : finish of the feature; None leaves it plain
+    asphalt_albedo : share of the light that the pavement sends back [1]
+    """
+    if relief is None:
+        return scene.gaussians
     carriageway = scene.carriageway_left, scene.carriageway_right
     gaussians = refine_road(scene.gaussians, relief)
     if marking is not None:
@@ -159,7 +169,7 @@ def edit_scene(
             gaussians = add_sign(
                 gaussians, relief, marking.sign, scene.carriageway_right, asphalt_albedo, scene.daylight
             )
-    return extend_kerbs(apply_road_profile(gaussians, relief, *carriageway)[0], relief), relief
+    return extend_kerbs(apply_road_profile(gaussians, relief, *carriageway)[0], relief)
 
 
 def _anchors_of(scenario: Scenario, plan: Plan, catalogue: Catalogue) -> tuple[SurfaceState, ...]:

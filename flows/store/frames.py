@@ -3,14 +3,15 @@
 A shard has one writer. Zarr takes an absent shard for fill values, black pictures; here every clip has its shards, and
 one that is absent is damage. Every chunk ends in a CRC-32C, because Blosc alone lets flipped bits through.
 
-Single frames are read without Zarr, which takes half a millisecond a frame for its tasks and copies: as long as the
-decompression of a picture of 480 x 320. The form is that of this module alone, which `flows.store.frame_metadata`
-makes sure of: bytes, Blosc and CRC-32C a chunk, the index of offsets and lengths at the end (Zarr 3, codec
-``sharding_indexed`` 1.0).
+Frames are read and written without Zarr. For its tasks it takes half a millisecond a frame, as long as the
+decompression of a picture of 480 x 320; and to write a clip's array it copies it as a whole. The form is that of this
+module alone, which `flows.store.frame_metadata` makes sure of: bytes, Blosc and CRC-32C a chunk, the index of offsets
+and lengths at the end (Zarr 3, codec ``sharding_indexed`` 1.0).
 """
 
+import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import prod
 from pathlib import Path
 from typing import Any, Literal
@@ -21,15 +22,14 @@ import numpy as np
 import zarr
 from numcodecs import blosc
 from zarr.abc.buffer import Buffer
-from zarr.buffer import default_buffer_prototype
 from zarr.codecs import BloscCodec, Crc32cCodec
 from zarr.errors import ZarrUserWarning
 from zarr.storage import MemoryStore
 
 from catalogs.sentences import shorten
 from flows.store.arrays import DIMENSION_SIZES, EVERY_ARRAY, PixelArray, arrays_of
-from flows.store.frame_metadata import check_array, read_local_metadata
-from flows.store.layout import write_atomically
+from flows.store.frame_metadata import METADATA, check_array, read_local_metadata
+from flows.store.layout import write_atomically, write_pieces
 from flows.store.telemetry import channel_labels
 from manifests.canonical import sha256_of
 from tasks.errors import InputError
@@ -120,20 +120,46 @@ def encode_arrays(
 def write_clip(path: Path, index: int, buffers: Mapping[str, np.ndarray]) -> None:
     """Write one clip's whole shard of every array; ``buffers`` maps array name to [frame, y, x(, channel)].
 
-    Zarr encodes in memory and `write_atomically` writes, so that a shard is whole and on the disk before the clip's
-    receipt is. Pictures of fill values are not stored, unless a shard would have no other.
+    A picture is compressed when it is written, and a shard is whole and on the disk before the clip's receipt is.
+    Pictures of fill values are not stored, unless a shard would have no other.
+
+    Raises
+    ------
+    InputError
+        If the metadata are not those that muSync writes, or an array has another shape or type.
     """
     for name, values in buffers.items():
-        check_array(read_local_metadata(path), name, path)
-        metadata = (path / name / "zarr.json").read_bytes()
-        files: dict[str, Buffer] = {"zarr.json": default_buffer_prototype().buffer.from_bytes(metadata)}
-        array = zarr.open_array(MemoryStore(files), mode="r+")
-        array[index] = values
-        if len(files) == 1:
-            array.with_config({"write_empty_chunks": True})[index] = values
-        del files["zarr.json"]
-        for file, content in files.items():
-            write_atomically(path / name / file, content.to_bytes())
+        shape, dtype = check_array(read_local_metadata(path), name, path), EVERY_ARRAY[name].dtype
+        if values.shape != shape[1:] or values.dtype != dtype:
+            raise InputError(
+                f"{path}/{name}: a clip must be {dtype} {shape[1:]}; it is {values.dtype} {values.shape}"
+            )
+        write_pieces(_locate_shard(path, name, shape, index), _encode_shard(path / name, values))
+
+
+def _encode_shard(array: Path, pictures: np.ndarray) -> Iterator[bytes]:
+    """Yield each stored picture's chunk and, last, their index, as Zarr's ``sharding_indexed`` has them."""
+    (sharding,) = json.loads((array / METADATA).read_bytes())["codecs"]
+    codec = sharding["configuration"]["codecs"][1]["configuration"]
+    settings = codec["cname"].encode(), codec["clevel"], blosc.SHUFFLE, codec["blocksize"], codec["typesize"]
+    fill_value = _choose_fill_value(EVERY_ARRAY[array.name].dtype)
+    stored = [not np.array_equal(picture, np.full_like(picture, fill_value), True) for picture in pictures]
+    index, offset = np.full((len(pictures), 2), _NO_CHUNK, "<u8"), 0
+    for k, picture in enumerate(pictures):
+        if stored[k] or not any(stored):
+            chunk = _add_checksum(blosc.compress(np.ascontiguousarray(picture), *settings))
+            index[k] = offset, len(chunk)
+            offset += len(chunk)
+            yield chunk
+    yield _add_checksum(index.tobytes())
+
+
+def _add_checksum(body: bytes) -> bytes:
+    return body + google_crc32c.value(body).to_bytes(_CHECKSUM, "little")
+
+
+def _locate_shard(path: Path, name: str, shape: tuple[int, ...], index: int) -> Path:
+    return path / name / "c" / "/".join(str(number) for number in (index, *(0 for _ in shape[1:])))
 
 
 def read_clip(path: Path, index: int, name: str, frames: Sequence[int] | None = None) -> np.ndarray:
@@ -184,7 +210,7 @@ def read_frames(path: Path, name: str, shape: tuple[int, ...], index: int, span:
         raise ValueError(f"there are {shape[0]} clips of {shape[1]} frames; asked for clip {index}, {span}")
     array = EVERY_ARRAY[name]
     pictures = np.empty((span.stop - span.start, *shape[2:]), array.dtype)
-    shard = path / name / "c" / "/".join(str(number) for number in (index, *(0 for _ in shape[1:])))
+    shard = _locate_shard(path, name, shape, index)
     read_chunks(shard, shape[1], span.start, pictures, _choose_fill_value(array.dtype))
     return pictures
 

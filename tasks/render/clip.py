@@ -84,27 +84,32 @@ def render_clip(
     InputError
         The camera moves during a frame, and ``motion`` has no poses between frames.
     """
-    clear_scene = ClearScene(
-        gaussians=scene.gaussians,
-        environment=scene.environment,
-        route=scene.route,
-        lanes=scene.lanes,
-        relief=relief,
-        to_sun=scene.to_sun,
-        daylight=scene.daylight,
-    )
-    weathered, weather = weather_scene(clear_scene, conditions, float(camera.K[0, 0]))
-    prepared = backend.prepare_gaussians(weathered)
     field = sensor_field(camera)
     T_world_camera = motion.T_world_rig @ camera.T_rig_camera
     T_world_rows = pose_rows(camera, T_world_camera, motion.rig_at)
+    weathered, weather = weather_scene(
+        ClearScene(
+            gaussians=scene.gaussians,
+            environment=scene.environment,
+            route=scene.route,
+            lanes=scene.lanes,
+            relief=relief,
+            to_sun=scene.to_sun,
+            daylight=scene.daylight,
+        ),
+        conditions,
+        float(camera.K[0, 0]),
+    )
     moving = BodiesInClip(motion.bodies, scene, weathered, weather, backend, T_world_camera)
+    prepared = backend.prepare_gaussians(weathered)
+    route, environment, daylight = scene.route, scene.environment, scene.daylight
+    display_encoded = scene.gaussians.display_encoded
+    del scene, weathered  # memory: frames need none of their Gaussians
     velocity = np.gradient(T_world_camera[:, :3, 3], 1 / motion.frame_rate_hz, axis=0)
-    shows_sky = scene.gaussians.display_encoded or not weather.replaces_sky
+    shows_sky = display_encoded or not weather.replaces_sky
     black = np.zeros((field.height, field.width, 3), np.float32)
-    clip: dict[str, NDArray[Any]] = {}
-    chosen = range(len(T_world_camera)) if motion.shown is None else motion.shown
-    for place, frame in enumerate(chosen):
+
+    def render_frame(frame: int) -> dict[str, NDArray[np.generic]]:
         pose = T_world_camera[frame]
         view = world_to_camera(pose)
         gbuffer = backend.rasterise_view(
@@ -112,7 +117,7 @@ def render_clip(
             normals=labels or weather.reads_normals,
             bodies=moving.place(frame), shade=moving.shade(frame),
         )  # fmt: skip
-        if scene.daylight is not None:
+        if daylight is not None:
             gbuffer = add_grain(gbuffer, pose, field.K)
         shutter = Shutter(
             T_world_camera=pose,
@@ -125,8 +130,8 @@ def render_clip(
         )
         clear = gbuffer.rgb
         if labels or shows_sky:
-            sky = environment_view(scene.environment, view, field.K, field.width, field.height)
-            clear = compose_over_sky(gbuffer, sky, scene.gaussians.display_encoded)
+            sky = environment_view(environment, view, field.K, field.width, field.height)
+            clear = compose_over_sky(gbuffer, sky, display_encoded)
         before = (clear, sky) if shows_sky else (gbuffer.rgb, black)
         finished = replace(
             apply_weather(weather, *before, gbuffer, shutter, particles=camera.plain), base=clear
@@ -152,10 +157,13 @@ def render_clip(
             buffers["instance"] = seen.object_id
         if seen.points is not None and seen.changes is not None:
             elevation = None if relief is None else relief.elevation
-            buffers |= label_frame(
-                seen.normal, seen.class_id, seen.points, seen.changes, scene.route, elevation
-            )
-        for name, values in buffers.items():
+            buffers |= label_frame(seen.normal, seen.class_id, seen.points, seen.changes, route, elevation)
+        return buffers
+
+    clip: dict[str, NDArray[Any]] = {}
+    chosen = range(len(T_world_camera)) if motion.shown is None else motion.shown
+    for place, frame in enumerate(chosen):
+        for name, values in render_frame(frame).items():
             if not place:
                 clip[name] = np.empty((len(chosen), *values.shape), values.dtype)
             clip[name][place] = values

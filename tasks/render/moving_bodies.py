@@ -76,11 +76,12 @@ class BodiesInClip:
         backend: Backend,
         T_world_camera: Floats,
     ) -> None:
-        self._bodies, self._scene, self._weather, self._backend = tuple(bodies), scene, weather, backend
+        self._bodies, self._weather, self._backend = tuple(bodies), weather, backend
+        self._display_encoded = scene.gaussians.display_encoded
         if not bodies:
             return
         self._light: BodyLight = find_body_light(scene, weathered, weather)
-        self._clouds = [self._wrap(moving.body) for moving in bodies]
+        self._clouds = [_wrap_body(moving.body, scene.gaussians) for moving in bodies]
         self._mirrored = [_mirror_from(moving, T_world_camera) for moving in bodies]
         self._ground = np.flatnonzero(np.isin(weathered.class_id, GROUND_CLASSES))
         self._places = weathered.means[self._ground].astype(np.float64)
@@ -108,7 +109,7 @@ class BodiesInClip:
             near = self._tree.query_ball_point(pose[:2, 3], reach_of_shade(moving.body, self._light))
             share[near] *= shade_ground(self._places[near], moving.body, pose, self._light)
         shaded = np.flatnonzero(share != 1)
-        left = share[shaded] ** (1 / 2.2) if self._scene.gaussians.display_encoded else share[shaded]
+        left = share[shaded] ** (1 / 2.2) if self._display_encoded else share[shaded]
         return Shade(index=self._ground[shaded], share=left.astype(np.float32))
 
     def wrap(self, place: int, frame: int) -> Gaussians:
@@ -120,7 +121,7 @@ class BodiesInClip:
         frame : number in the clip
         """
         radiance = self._colour(place, frame)
-        return _colour_cloud(self._clouds[place], radiance, self._scene.gaussians.display_encoded)
+        return _colour_cloud(self._clouds[place], radiance, self._display_encoded)
 
     def _prepare(self, place: int, frame: int) -> Any:
         """Return a body's cloud in the light of a frame; under cloud that of the first frame with the same lamps."""
@@ -164,11 +165,11 @@ class BodiesInClip:
             radiance[body.stop_lamps] += white * (STOP_LAMP if braking else POSITION_LAMP)
         return radiance
 
-    def _wrap(self, body: RoadUserBody) -> Gaussians:
-        """Return a body's Gaussians as the scene has its own, without colour."""
-        own, like = body.body.gaussians, self._scene.gaussians
-        cloud = replace(own, antialiased=like.antialiased, display_encoded=like.display_encoded)
-        return cloud if like.surroundings is None else add_surroundings(cloud)
+
+def _wrap_body(body: RoadUserBody, like: Gaussians) -> Gaussians:
+    """Return a body's Gaussians as the scene has its own, without colour."""
+    cloud = replace(body.body.gaussians, antialiased=like.antialiased, display_encoded=like.display_encoded)
+    return cloud if like.surroundings is None else add_surroundings(cloud)
 
 
 def _colour_cloud(cloud: Gaussians, radiance: Floats, display_encoded: bool) -> Gaussians:

@@ -9,7 +9,7 @@ import pytest
 from catalogs.scenes.gaussian_files import read_gaussians
 from flows.making.catalogue import catalogue_of
 from flows.making.driving import hazard_of
-from flows.making.pictures import edit_scene
+from flows.making.pictures import edit_scene, shape_road
 from flows.making.plan import read_plan
 from tests.flows.exporting.conftest import BRAKING, HUMP
 
@@ -64,7 +64,8 @@ def test_the_ply_of_a_clip_is_the_scene_that_it_was_drawn_from(export, toy_datas
     file = folder / json.loads((folder / "transforms.json").read_text())["gaussians_file"]
     scenario = next(clip.scenario for clip in plan.clips if clip.label == label)
     albedo = catalogue.weather_parameters.sky.asphalt_albedo
-    drawn, _ = edit_scene(catalogue.scene, hazard_of(scenario), catalogue.marking, albedo)
+    relief = shape_road(catalogue.scene, hazard_of(scenario))
+    drawn = edit_scene(catalogue.scene, relief, catalogue.marking, albedo)
     assert np.array_equal(drawn.means, catalogue.scene.gaussians.means) == (label == BRAKING)
     read = read_gaussians(file)
     np.testing.assert_allclose(read.means, drawn.means, atol=1e-6)
