@@ -12,6 +12,7 @@ from catalogs.scenes import load_route
 from catalogs.studies.ablation import cut_coupling
 from catalogs.variants import warn_of_variant
 from flows.making.catalogue import Catalogue
+from flows.making.driven import refuse_driven
 from flows.making.driving import collect_surface_depths, controls_of, hazard_of, surface_of, weather_of
 from flows.making.input_changes import refuse_changed_records
 from flows.making.locations import find_scene
@@ -23,7 +24,6 @@ from flows.store.address import open_for_reading, want_telemetry
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest
 from flows.store.telemetry import list_columns, read_columns
-from manifests.manifest import is_driven
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
 from tasks.explanation import Step, force_steps, picture_steps, pitch_steps, surface_steps
@@ -59,11 +59,7 @@ def explain_frame(dataset: str, clip: str, frame: int, *, out: str | None = None
     manifest, plan = read_manifest(layout), read_plan(layout.root)
     refuse_changed_records(layout, manifest)
     refuse_traced(plan.inputs, dataset, "explain")
-    if is_driven(plan.inputs):
-        raise InputError(
-            f"{dataset}: a policy braked its clips (musync drive);"
-            " musync explain needs a dataset whose scenarios brake"
-        )
+    refuse_driven(plan.inputs, dataset, "explain")
     problems: list[str] = []
     planned = None
     try:

@@ -1,11 +1,13 @@
 """Clips that a policy braked: the motion that its pressures give, and what they would give on other surfaces."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 from catalogs.driven import PRESSURES
 from catalogs.scenario import Scenario
 from flows.making.catalogue import Catalogue
 from flows.making.driving import hazard_of, surface_of, weather_of
+from manifests.manifest import is_driven
 from tasks.driving.stepped import DriveSettings, simulate_pressures
 from tasks.errors import InputError
 from tasks.studies.label_ranges import label_ranges, sampled_friction
@@ -57,3 +59,24 @@ def driven_ranges_of(
         return ride.stopping_distance, float(ride.columns["pitch"].max())
 
     return label_ranges(sampled_friction(weather_of(scenario), catalogue.surface, catalogue.study), again)
+
+
+def refuse_driven(inputs: Iterable[str], origin: object, command: str) -> None:
+    """Refuse a dataset whose brake follows from no scenario.
+
+    Parameters
+    ----------
+    inputs : names of its frozen inputs
+    origin : what messages call the dataset
+    command : that needs the scenario's brake
+
+    Raises
+    ------
+    InputError
+        If a policy braked.
+    """
+    if is_driven(inputs):
+        raise InputError(
+            f"{origin}: a policy braked its clips (musync drive);"
+            f" musync {command} needs a dataset whose scenarios brake"
+        )

@@ -99,6 +99,6 @@ def _make_noise(seed: int, frames: int, height: int, width: int) -> dict[str, An
 
 
 def _judge_nothing(
-    buffers: Any, frames: Mapping[str, Any], film: float, catalogue: Catalogue
+    buffers: Any, frames: Mapping[str, Any], film: float, catalogue: Catalogue, camera: Any
 ) -> dict[str, Any]:
-    return nothing_to_judge(len(frames["frame"]))
+    return nothing_to_judge(len(frames["frame"]), "pictures of noise")
