@@ -49,6 +49,7 @@ from tasks.vehicle.parameters import Vehicle, compute_surface_response
 
 PERCENTILES = (5, 50, 95)
 LONGEST_S = 30.0
+"""A drive in which nothing is decided by then ends [s]."""
 ROAD = "street"
 """Street of the OpenSCENARIO files."""
 

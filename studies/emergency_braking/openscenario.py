@@ -22,7 +22,6 @@ from tasks.scene.street.layout import StreetLayout
 PEDESTRIANS: dict[Kind, float] = {"adult": 75.0, "child": 30.0}
 """Kinds that are pedestrians there, with the mass that the format wants [kg]."""
 CATEGORIES = {"car": "car", "van": "van", "truck": "truck", "bicycle": "bicycle"}
-EGO_HEIGHT_M = 1.5
 LONGEST_BYTES = 2**20
 REFUSED = ("ParameterDeclaration", "CatalogReference", "GlobalAction", "LateralAction")
 """Elements of a file that mean more than is read."""
@@ -57,7 +56,8 @@ def format_openscenario(
     actions = ET.SubElement(ET.SubElement(board, "Init"), "Actions")
     sizes = load("road user sizes")
     overhang, width = sizes[EGO]
-    ego = (wheelbase + 2 * overhang, width, EGO_HEIGHT_M)
+    _, _, height = sizes["car"]  # no height of the ego is used elsewhere: as tall as the car target
+    ego = (wheelbase + 2 * overhang, width, height)
     _add_entity(entities, EGO, "car", ego, wheelbase / 2)
     _add_start(actions, EGO, locate_station(layout, -wheelbase), 0.0, 0.0, scenario.initial_speed_km_h / 3.6)
     for number, user in enumerate(scenario.objects, start=1):

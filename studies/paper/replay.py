@@ -58,7 +58,7 @@ def replay_audit(
     Returns
     -------
     ``runs``, ``largest_difference`` by channel against the first seed's rollout, ``verified``: every difference is
-    zero, no seed changes a dry picture without noise, every seed changes any other, and the first seed's
+    zero, every seed changes the pictures of which it draws anything and no other picture, and the first seed's
     picture comes out the same a second time; ``problems`` says which of these is not so
 
     Raises
@@ -71,6 +71,7 @@ def replay_audit(
     results = Outputs(out, "lab replay-audit", "replay.json")
     checked, name = load("grid", grid), select_backend(backend).name
     runs: list[Replay] = []
+    drawn: dict[str, bool] = {}
     count = len(checked.scenarios)
     with tempfile.TemporaryDirectory() as folder, progress_bar("runs", count * (seeds + 1)) as advance:
         # the first seed comes twice: its picture must too
@@ -83,21 +84,16 @@ def replay_audit(
                 named = clip.scenario.scene
                 catalogue = Catalogue(Path(folder), named or settings.scene, named)
                 runs.append(_run_clip(clip, plan, catalogue, frames))
+                drawn[clip.label] = _is_drawn(clip, catalogue)
                 advance(f"{clip.label} seed {seed}")
     replays, again = runs[: count * seeds], runs[count * seeds :]
     differences = _largest_differences(replays, count)
     problems = [
         f"{channel} differs by up to {size:g} between seeds" for channel, size in differences.items() if size
     ]
-    # a sensor's noise is drawn by the seed too
-    still = {
-        label
-        for label, scenario in checked.scenarios
-        if scenario.weather == DRY and catalogue.camera.sensor.full_well is None
-    }
     for k, (label, _) in enumerate(checked.scenarios):
         pictures = {run.frames_sha256 for run in replays[k::count]}
-        if len(pictures) != (1 if label in still else seeds):
+        if len(pictures) != (seeds if drawn[label] else 1):
             problems.append(f"{label}: {seeds} seeds gave {len(pictures)} different pictures")
         if again[k].frames_sha256 != replays[k].frames_sha256:
             problems.append(f"{label}: one seed gave two pictures")
@@ -111,6 +107,16 @@ def replay_audit(
     }
     results.write_json("replay.json", result)
     return result
+
+
+def _is_drawn(clip: ClipPlan, catalogue: Catalogue) -> bool:
+    """Whether the visual seed draws anything of a clip's picture.
+
+    It draws what falls and lies, the light on a scene that knows its light, a camera with bounds, and noise.
+    """
+    weather, scene, camera = clip.scenario.weather, catalogue.scene, catalogue.camera
+    has_noise = camera.sensor.full_well is not None
+    return weather != DRY or scene.daylight is not None or camera.varies or has_noise
 
 
 def _run_clip(clip: ClipPlan, plan: Plan, catalogue: Catalogue, frames: int) -> Replay:

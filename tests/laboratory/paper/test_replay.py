@@ -56,11 +56,12 @@ def test_one_seed_is_no_audit(grid):
 
 
 @pytest.mark.parametrize("name", entry_names("grid"))
-def test_each_scenario_of_a_grid_that_ships_is_held_against_itself_whatever_seeds_the_grid_has(
-    name, monkeypatch
+@pytest.mark.parametrize("daylight", [None, ((1.0, 1.0, 1.0),) * 3])
+def test_each_scenario_is_held_against_itself_and_a_dry_street_that_knows_its_light_changes_with_the_seed(
+    name, daylight, monkeypatch
 ):
     def run(clip, plan, catalogue, frames):
-        """Motion by the scenario, pictures by what falls and the seed."""
+        """Motion by the scenario, pictures by what falls and the seed: no other light on a dry street."""
         asked = [float(value) for value in clip.scenario.as_row().values() if isinstance(value, float)]
         seen = (clip.label, clip.scenario.weather != "dry" and clip.seed)
         return replay.Replay(
@@ -71,7 +72,11 @@ def test_each_scenario_of_a_grid_that_ships_is_held_against_itself_whatever_seed
         )
 
     monkeypatch.setattr(replay, "_run_clip", run)
-    camera = SimpleNamespace(camera=SimpleNamespace(sensor=Sensor()))
-    monkeypatch.setattr(replay, "Catalogue", lambda *given: camera)
+    camera = SimpleNamespace(sensor=Sensor(), varies=False)
+    made = SimpleNamespace(camera=camera, scene=SimpleNamespace(daylight=daylight))
+    monkeypatch.setattr(replay, "Catalogue", lambda *given: made)
+    scenarios = load("grid", name).scenarios
+    dry = [label for label, scenario in scenarios if scenario.weather == "dry" and daylight is not None]
     result = replay.replay_audit(name, seeds=3)
-    assert result["problems"] == [] and result["runs"] == 3 * len(load("grid", name).scenarios)
+    assert result["problems"] == [f"{label}: 3 seeds gave 1 different pictures" for label in dry]
+    assert result["runs"] == 3 * len(scenarios)
