@@ -298,9 +298,9 @@ COMMANDS = (
             define_option(
                 "brake",
                 list[str] | None,
-                "blind, friction or driver; by default each.",
+                "blind, friction, driver or picture; by default each but picture.",
                 None,
-                known=("blind", "friction", "driver"),
+                known=("blind", "friction", "driver", "picture"),
             ),
             define_option(
                 "policy",
