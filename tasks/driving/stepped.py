@@ -59,8 +59,8 @@ def trace_pressures(
     pressures : of the steps [MPa]
     ticks_per_step : ticks of a step [1]
     """
-    told = np.repeat(np.asarray(pressures, np.float64), PER_TICK * ticks_per_step)
-    return np.concatenate([np.zeros(LATE), told])
+    given = np.repeat(np.asarray(pressures, np.float64), PER_TICK * ticks_per_step)
+    return np.concatenate([np.zeros(LATE), given])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -221,9 +221,9 @@ def simulate_pressures(
     vehicle, surface, settings : as of `SteppedDrive`
     pressures : of the steps [MPa]
     """
-    per_step, told = settings.ticks_per_step, np.flatnonzero(np.asarray(pressures) > 0)
+    per_step, braked = settings.ticks_per_step, np.flatnonzero(np.asarray(pressures) > 0)
     # half a step early: time is a whole number of steps, but for rounding
-    onset = (PER_TICK * per_step * int(told[0]) - 0.5) * INTERNAL_STEP_S if told.size else inf
+    onset = (PER_TICK * per_step * int(braked[0]) - 0.5) * INTERNAL_STEP_S if braked.size else inf
     drive = make_trace_input(trace_pressures(pressures, per_step), INTERNAL_STEP_S)
     run = simulate(
         vehicle, compute_surface_response(vehicle, surface.kind, surface.friction),

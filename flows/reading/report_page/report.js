@@ -224,10 +224,10 @@ function changes(clip, sibling) {
     .filter(([, key]) => typeof clip.figures[key] === "number" && typeof sibling.figures[key] === "number")
     .map(([name, key, digits, unit, factor]) => `${name} ${signed((sibling.figures[key] - clip.figures[key]) * factor, digits)}${unit}`);
   if (!stopMissing(clip) && stopMissing(sibling)) parts.push(stopMissing(sibling));
-  const told = ({ scenario }, key) => (key === "objects" ? JSON.stringify(scenario[key] ?? []) : scenario[key] ?? "–");
+  const read = ({ scenario }, key) => (key === "objects" ? JSON.stringify(scenario[key] ?? []) : scenario[key] ?? "–");
   const turned = [...new Set([...Object.keys(clip.scenario), ...Object.keys(sibling.scenario)])]
-    .filter((key) => told(clip, key) !== told(sibling, key))
-    .map((key) => (key === "objects" ? "other road users" : `${key} ${told(clip, key)} → ${told(sibling, key)}`));
+    .filter((key) => read(clip, key) !== read(sibling, key))
+    .map((key) => (key === "objects" ? "other road users" : `${key} ${read(clip, key)} → ${read(sibling, key)}`));
   return `${sibling.label} beside it: ${turned.join(", ")}. This changes ${parts.join(", ") || "no figure that both have"}.`;
 }
 
