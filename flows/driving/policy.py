@@ -29,11 +29,13 @@ class Policy:
     name : ``module:function``
     source : of the module
     begin : gives what one drive asks at each step: the function, or a new object of the class
+    camera : name or file of the camera whose pictures it reads: the ``camera`` of function or class; None for none
     """
 
     name: str
     source: bytes
     begin: Callable[[], Act]
+    camera: str | None = None
 
     @property
     def source_sha256(self) -> str:
@@ -69,9 +71,13 @@ def load_policy(name: str) -> Policy:
     file = getattr(module, "__file__", None)
     if file is None:
         raise InputError(f"policy {name}: {module_name} has no source file, whose hash could be kept")
+    camera = getattr(found, "camera", None)
+    if not isinstance(camera, str | None):
+        raise InputError(f"policy {name}: camera must be the name or file of a camera; it is {camera!r:.80}")
     return Policy(
-        name=name, source=Path(file).read_bytes(), begin=found if isinstance(found, type) else lambda: found
-    )
+        name=name, source=Path(file).read_bytes(), begin=found if isinstance(found, type) else lambda: found,
+        camera=camera,
+    )  # fmt: skip
 
 
 def drive_with(

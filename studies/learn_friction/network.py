@@ -1,6 +1,7 @@
 """A small convolutional network: pictures and brake command in, deceleration out."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import torch
@@ -58,13 +59,36 @@ class Trained:
 
     def predict(self, samples: Samples) -> NDArray[np.float64]:
         """Return the deceleration of each sample [m/s2]."""
-        command = torch.from_numpy((samples.command - self.centre[:2]) / self.scale[:2]).float()
+        return self.answer(samples.pictures, samples.command)
+
+    def answer(self, pictures: torch.Tensor, command: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the deceleration for pictures and commands, as of `Samples` [m/s2]."""
+        numbers = torch.from_numpy((command - self.centre[:2]) / self.scale[:2]).float()
         with torch.no_grad():
             answer = torch.cat([
-                self.network(pictures, numbers)
-                for pictures, numbers in zip(samples.pictures.split(256), command.split(256), strict=True)
+                self.network(*part) for part in zip(pictures.split(256), numbers.split(256), strict=True)
             ])  # fmt: skip
         return answer.double().numpy() * self.scale[2] + self.centre[2]
+
+    def write(self, path: Path) -> None:
+        """Write weights and scales; the same ones give the same bytes."""
+        weights = {name: values.numpy() for name, values in self.network.state_dict().items()}
+        np.savez(path, centre=self.centre, scale=self.scale, **weights)
+
+
+def read_trained(path: Path) -> Trained:
+    """Return a network that `Trained.write` wrote, without its losses.
+
+    Parameters
+    ----------
+    path : of the file
+    """
+    with np.load(path) as kept:
+        weights = {name: torch.from_numpy(kept[name]) for name in kept.files}
+    centre, scale = (weights.pop(name).numpy() for name in ("centre", "scale"))
+    network = BrakeNetwork(weights["see.0.weight"].shape[1])
+    network.load_state_dict(weights)
+    return Trained(network=network, centre=centre, scale=scale, losses=())
 
 
 def train_network(samples: Samples, *, seed: int, epochs: int = EPOCHS) -> Trained:

@@ -12,7 +12,7 @@ import musync
 FRAMES = 3
 """Pictures of one sample [1]."""
 WINDOWS = 4
-"""Samples of one clip at most, each a frame earlier than the one before [1]."""
+"""Samples of one clip at most [1]."""
 OVER_S = 1.5
 """The deceleration is the mean over this time from the brake onset on [s]."""
 DRIVE = ["initial_speed_km_h", "peak_pressure_mpa", "brake_onset_m", "brake_onset_s"]
@@ -100,7 +100,9 @@ def read_brakes(data: musync.Dataset, *, over_s: float = OVER_S) -> dict[str, Br
     return brakes
 
 
-def read_samples(data: musync.Dataset, *, over_s: float = OVER_S) -> Samples:
+def read_samples(
+    data: musync.Dataset, *, over_s: float = OVER_S, frames: int = FRAMES, most: int = WINDOWS
+) -> Samples:
     """Read the samples of every clip that brakes and has enough frames before.
 
     Clips in quarantine are taken too: the pose check wants more pixels than these pictures have, and nothing is
@@ -110,6 +112,8 @@ def read_samples(data: musync.Dataset, *, over_s: float = OVER_S) -> Samples:
     ----------
     data : dataset with frames
     over_s : time over which the deceleration is averaged [s]
+    frames : pictures of one sample [1]
+    most : samples of one clip, each a frame earlier than the one before [1]
 
     Raises
     ------
@@ -118,7 +122,7 @@ def read_samples(data: musync.Dataset, *, over_s: float = OVER_S) -> Samples:
     """
     clips = data.pandas("clips").sort_values("index")
     drives = clips.groupby(DRIVE, dropna=False, sort=True).ngroup().to_numpy()
-    windows = data.torch(window=FRAMES, stride=1, columns=["speed"], arrays=["rgb"], quarantined=True)
+    windows = data.torch(window=frames, stride=1, columns=["speed"], arrays=["rgb"], quarantined=True)
     rate_hz = data.manifest["grid"]["frame_rate_hz"]
     brakes = read_brakes(data, over_s=over_s)
     rows, pictures = [], []
@@ -126,9 +130,9 @@ def read_samples(data: musync.Dataset, *, over_s: float = OVER_S) -> Samples:
         if (brake := brakes.get(clip["label"])) is None:
             continue
         last = min(
-            int(brake.onset_s * rate_hz), windows.starts[-1] + FRAMES - 1
+            int(brake.onset_s * rate_hz), windows.starts[-1] + frames - 1
         )  # the last frame before the onset
-        for first in range(last - FRAMES + 1, max(last - FRAMES + 1 - WINDOWS, -1), -1):
+        for first in range(last - frames + 1, max(last - frames + 1 - most, -1), -1):
             shown = windows[windows.clips.index(clip["index"]) * len(windows.starts) + first]["rgb"]
             pictures.append(shown.permute(0, 3, 1, 2).flatten(0, 1))
             rows.append({
@@ -137,7 +141,7 @@ def read_samples(data: musync.Dataset, *, over_s: float = OVER_S) -> Samples:
                 "rate": clip["precipitation_mm_h"],
             })  # fmt: skip
     if not rows:
-        raise musync.InputError(f"a sample needs {FRAMES} frames before a brake onset; no clip has them")
+        raise musync.InputError(f"a sample needs {frames} frames before a brake onset; no clip has them")
     return Samples(
         pictures=torch.stack(pictures), **{name: np.array([row[name] for row in rows]) for name in rows[0]}
     )

@@ -9,12 +9,12 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.eval.physics.constants import DT, ClipColumns, Constants, Floats
-from tasks.eval.physics.coupled import Forces, compute_forces, spread
-from tasks.eval.physics.effects import AXLE, FORCE, HEAVE, PITCH, SUM, TORQUE
-from tasks.eval.physics.half_step import INNER_STEP
-from tasks.eval.physics.laws import Law, evaluate_law, rounding_tolerance
-from tasks.eval.physics.tyres import find_curve
+from studies.physics_judge.laws.constants import DT, ClipColumns, Constants, Floats
+from studies.physics_judge.laws.coupled import Forces, compute_forces, spread
+from studies.physics_judge.laws.effects import AXLE, FORCE, HEAVE, PITCH, SUM, TORQUE
+from studies.physics_judge.laws.half_step import INNER_STEP
+from studies.physics_judge.laws.law import Law, evaluate_law, rounding_tolerance
+from studies.physics_judge.laws.tyres import find_curve
 
 HIDDEN = 1.5
 """Share of a rate's change of slope that an integral over a tick may miss: half where it jumps within, times 3 [1]."""
