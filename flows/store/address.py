@@ -54,7 +54,7 @@ def want_plan(name: str) -> bool:
 
 
 def want_record(name: str) -> bool:
-    """Whether a file tells how far a dataset is, or was staged by a killed run."""
+    """Whether a file records how far a dataset is, or was staged by a killed run."""
     return name in {"plan.json", "manifest.json"} or name.startswith(".staging/")
 
 

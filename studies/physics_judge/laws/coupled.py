@@ -222,7 +222,7 @@ def _compute_axle(
 
 
 def _compare_with_reference(v: Floats, facts: Mapping[str, Any], constants: Constants) -> Floats:
-    """Wet friction at each speed over that which the clip's mu_c tells [1]."""
+    """Wet friction at each speed over that for which the clip's mu_c holds [1]."""
     surface = constants.surface
     if facts["weather"] not in WET or not grips_by_speed(surface):
         return np.ones(len(v))

@@ -21,7 +21,7 @@ HIDDEN = 1.5
 UNEQUAL = 0.01
 """Share of its integral by which a wheel's change of speed may miss it over a clip [1]."""
 FAINT = 1e-5
-"""Change of wheel speed in an interval that tells nothing of it [rad/s]."""
+"""Change of wheel speed in an interval that shows nothing of it [rad/s]."""
 FEWEST = 20
 """Intervals that a ratio over all of them needs [1]."""
 AROUND = 20
