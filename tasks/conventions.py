@@ -160,7 +160,7 @@ IDENTITY_CHANNELS: tuple[Channel, ...] = (
 )  # fmt: skip
 
 CHECK_CHANNELS: tuple[Channel, ...] = (
-    Channel(name="quarantined", unit="", symbol="", description="the pose check failed: kept and told, left out of training windows unless asked for"),
+    Channel(name="quarantined", unit="", symbol="", description="the pose check failed: kept and marked, left out of training windows unless asked for"),
     Channel(name="check_method", unit="", symbol="", description="pose check that judged the finished frames"),
     Channel(name="check_passed", unit="", symbol="", description="every judged figure keeps its threshold; null without frames, and where the check sees too little to judge (check_method is set)"),
     Channel(name="check_pitch_rmse_deg", unit="deg", symbol="", description="RMSE of recovered against claimed pitch, both from frame 0"),

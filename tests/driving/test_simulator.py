@@ -12,13 +12,13 @@ import musync
 from catalogs.entries import load
 from catalogs.road_users import EGO
 from flows.auditing.explain import explain_frame
-from flows.auditing.physics import audit_physics
 from flows.driving import policy as policies
 from flows.driving.drive import drive_grid
 from flows.driving.simulator import Simulator
 from flows.driving.view import StepCamera
 from flows.store.layout import Layout
 from flows.store.sealed import read_manifest
+from studies.physics_judge.audit_physics import audit_physics
 from tasks.driving.targets import TargetTrack
 from tasks.errors import InputError
 from tests.toy_street import write_toy_grid

@@ -170,10 +170,11 @@ async function beside(clip, sibling) {
   $("sibling").value = sibling?.clip_id ?? "";
   $("label").textContent = clip.label;
   $("badge").className = `badge ${TONES[verdictOf(clip)]}`;
-  $("badge").textContent = { passed: "pose check passed", failed: "pose check failed", unjudged: "not judged: no frames" }[verdictOf(clip)];
+  $("badge").textContent = { passed: "pose check passed", failed: "pose check failed", unjudged: "not judged" }[verdictOf(clip)];
   $("labels").replaceChildren([...LABELS.map((label) => ranged(clip, ...label)), stopMissing(clip)].filter(Boolean).join(" · "),
     " ", el("small", { textContent: "in brackets p05 to p95" }));
   $("reasons").hidden = clip.verdict.reasons.length === 0;
+  $("reasons").className = TONES[verdictOf(clip)];
   $("reasons").textContent = clip.verdict.reasons.join("; ");
   $("changes").textContent = sibling ? changes(clip, sibling) : "";
   history.replaceState(null, "", `#${clip.clip_id}${sibling ? `+${sibling.clip_id}` : ""}`);
