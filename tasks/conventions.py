@@ -195,11 +195,11 @@ PAIR_CHANNELS: tuple[Channel, ...] = (
 OBJECT_CHANNELS: tuple[Channel, ...] = (
     Channel(name="object", unit="1", symbol="", description="number of the road user in its clip, from 1 on, and in the array of instances"),
     Channel(name="kind", unit="", symbol="", description="kind of the road user"),
-    Channel(name="box_left", unit="px", symbol="", description="left edge of the pixels that show it; null where none does, as the other edges"),
+    Channel(name="box_left", unit="px", symbol="", description="left edge of the pixels that show it; null where none does, as the other edges, and in tables of frames that are not stored"),
     Channel(name="box_top", unit="px", symbol="", description="upper edge of these pixels"),
     Channel(name="box_right", unit="px", symbol="", description="right edge of these pixels, behind the last"),
     Channel(name="box_bottom", unit="px", symbol="", description="lower edge of these pixels, behind the last"),
-    Channel(name="visible_pixels", unit="1", symbol="", description="number of these pixels"),
+    Channel(name="visible_pixels", unit="1", symbol="", description="number of these pixels; 0 in tables of frames that are not stored"),
     Channel(name="visibility", unit="1", symbol="", description="share of its surface towards the camera, inside the picture, that nothing else hides; null where none is inside"),
     Channel(name="truncation", unit="1", symbol="", description="share of its surface towards the camera that lies outside the picture"),
     Channel(name="size", unit="m", symbol="", description="length, width and height of its box"),

@@ -28,7 +28,8 @@ GRID, WEIGHTS = (Path(__file__).with_name(name) for name in ("pictures.yaml", "n
 CAMERA = str(Path(__file__).parents[1] / "learn_friction" / "streets-camera.yaml")
 OVER_S = 0.5
 """The deceleration that the network learns is the mean over this time from the brake onset on [s]."""
-SEED = 1
+SEED, EPOCHS = 1, 300
+"""Of the network whose weights are kept; passes over its few pictures [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,7 +108,7 @@ def run_study() -> None:
     asked = parser.parse_args()
     torch.set_num_threads(1)
     train, test = split_samples(make_samples(asked.dataset))
-    networks = [train_network(train, seed=SEED + place) for place in range(asked.seeds)]
+    networks = [train_network(train, seed=SEED + place, epochs=EPOCHS) for place in range(asked.seeds)]
     print(format_errors(test, [network.predict(test) for network in networks]))
     networks[0].write(WEIGHTS)
 
