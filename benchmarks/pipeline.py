@@ -13,21 +13,29 @@ from flows.making.generate import generate_dataset
 
 WORKERS = 2
 CLIP = """
-name: clip-{width}x{height}
+name: clip-{label}
 scene: street
 vehicle: paper-reference
 surface: dense-asphalt
-camera: dashcam-{width}x{height}
+camera: dashcam-{size}
 frames: {frames}
 frame_rate_hz: 10
 seed: 2025
 scenarios:
-  dry: {{weather: dry, initial_speed_km_h: 60, peak_pressure_mpa: 2.3, brake_onset_s: 1.0}}
+  {label}: {{{weather}, initial_speed_km_h: 60, peak_pressure_mpa: 2.3, brake_onset_s: 1.0}}
 """
-"""One braking stop on the built-in street in dry weather."""
+"""One braking stop on the built-in street."""
+WEATHERS = {
+    "dry": "weather: dry",
+    "rain-50": "weather: rain, precipitation_mm_h: 50",
+    "snow-3": "weather: snow, precipitation_mm_h: 3, snow_accumulation_h: 1",
+}
 FRAMES = 81
-SIZES = ((480, 320, None), (1280, 720, 25.0))
-"""Width, height, and the processor time asked for of a dry clip [px, px, CPU-s]."""
+LIMITS = {
+    ("480x320", "dry"): 6.3, ("480x320", "rain-50"): 9.0, ("480x320", "snow-3"): 8.5,
+    ("1280x720", "dry"): 14.0, ("1280x720", "rain-50"): 28.0, ("1280x720", "snow-3"): 22.0,
+}  # fmt: skip
+"""Processor time asked for of a clip of each size and weather [CPU-s]."""
 
 
 def measure_rows(grid: str = "demo") -> list[dict[str, Any]]:
@@ -57,21 +65,19 @@ def measure_rows(grid: str = "demo") -> list[dict[str, Any]]:
         make_row("clip cpu", cpu / report.clips, "CPU-s/clip"),
         make_row("worker peak memory", memory, "MiB", "limit 1536", 1536),
         make_row("finished run called again", resume_wall, "s", "limit 3", 3),
-        *(_measure_clip(*size) for size in SIZES),
+        *(_measure_clip(*clip, limit) for clip, limit in LIMITS.items()),
     ]
 
 
-def _measure_clip(width: int, height: int, limit_cpu_s: float | None) -> dict[str, Any]:
-    """Row of one dry clip in one process, after two frames that compile and load what it needs."""
+def _measure_clip(size: str, label: str, limit_cpu_s: float) -> dict[str, Any]:
+    """Row of one clip in one process, after two frames that compile and load what it needs."""
     with tempfile.TemporaryDirectory() as folder:
         for frames in (2, FRAMES):
             grid = Path(folder) / f"{frames}.yaml"
-            grid.write_text(CLIP.format(width=width, height=height, frames=frames))
+            grid.write_text(CLIP.format(size=size, label=label, weather=WEATHERS[label], frames=frames))
             report = generate_dataset(str(grid), str(Path(folder) / str(frames)), runner="threads", workers=1)
-    peer = None if limit_cpu_s is None else f"limit {limit_cpu_s:g}"
-    return make_row(
-        f"dry clip, {FRAMES} frames, {width}x{height}", report.cost.cpu_s, "CPU-s", peer, limit_cpu_s
-    )
+    name = f"{label} clip, {FRAMES} frames, {size}"
+    return make_row(name, report.cost.cpu_s, "CPU-s", f"limit {limit_cpu_s:g}", limit_cpu_s)
 
 
 def _count_processor_time() -> tuple[float, float]:

@@ -2,18 +2,19 @@
 
 import os
 import resource
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from catalogs.grids import GridFile
-from flows.store.arrays import DIMENSION_SIZES, arrays_of
+from flows.store.arrays import ARRAYS, DIMENSION_SIZES, PixelArray, arrays_of
 from tasks.render.camera import Camera
 
-BASE_BYTES = 600 * 2**20
+BASE_BYTES = 560 * 2**20
 """Of a worker with its libraries, the built-in street and the compiled kernels [B]: measured."""
-COPIES_OF_PICTURES = 2.5
-"""Memory of a clip over the size of its frames [1]: measured between 11 and 81 frames, with and without labels."""
+BYTES_PER_PIXEL = 160
+"""Of one frame while it is drawn, in rain [B]: measured at 480 x 320 and at 1280 x 720."""
 BYTES_PER_TICK = 700
 """Memory of a clip's telemetry while it is driven and written [B]: measured over 500,000 ticks."""
 
@@ -27,13 +28,20 @@ def clip_memory(settings: GridFile, camera: Camera, ticks: int) -> int:
     camera : whose pictures are made
     ticks : rows of telemetry of a clip [1]
     """
-    numbers = sum(
+    # the check takes lens and rolling shutter out of copies; else it needs no more than the last frame has freed
+    copies = (camera.distortion is not None) + (camera.line_delay_s > 0)
+    held = _count_bytes(arrays_of(settings.labels, settings.has_objects)) + copies * _count_bytes(ARRAYS)
+    pixels = camera.width * camera.height if settings.pictures else 0
+    return BASE_BYTES + pixels * (BYTES_PER_PIXEL + settings.frames * held) + BYTES_PER_TICK * ticks
+
+
+def _count_bytes(arrays: Mapping[str, PixelArray]) -> int:
+    """Return the bytes of a pixel in some arrays."""
+    return sum(
         np.dtype(array.dtype).itemsize
         * int(np.prod([DIMENSION_SIZES[dimension] for dimension in array.dimensions]))
-        for array in arrays_of(settings.labels, settings.has_objects).values()
+        for array in arrays.values()
     )
-    pixels = settings.frames * camera.width * camera.height if settings.pictures else 0
-    return int(BASE_BYTES + COPIES_OF_PICTURES * numbers * pixels + BYTES_PER_TICK * ticks)
 
 
 def memory_here() -> int:

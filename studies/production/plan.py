@@ -66,7 +66,7 @@ class ClipCosts:
     driver_cpu_s: float = 0.0015
     scheduler_cpu_s: float = 0.0062
     frames_bytes: float = 29.9e6
-    tables_bytes: float = 0.22e6
+    tables_bytes: float = 0.54e6
     manifest_bytes: float = 2000
     files: float = 3.02
     puts: float = 6.02

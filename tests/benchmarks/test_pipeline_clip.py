@@ -2,15 +2,14 @@
 
 import pytest
 
-from benchmarks.pipeline import CLIP, FRAMES, SIZES
+from benchmarks.pipeline import CLIP, FRAMES, LIMITS, WEATHERS
 from catalogs.entries import load
 
 
-@pytest.mark.parametrize("size", SIZES)
-def test_the_clip_of_each_size_is_a_grid_of_one_dry_stop_seen_by_a_camera_of_that_size(tmp_path, size):
-    width, height, _ = size
+@pytest.mark.parametrize(("size", "label"), LIMITS)
+def test_each_clip_is_a_grid_of_one_stop_in_its_weather_seen_by_a_camera_of_its_size(tmp_path, size, label):
     path = tmp_path / "clip.yaml"
-    path.write_text(CLIP.format(width=width, height=height, frames=FRAMES))
+    path.write_text(CLIP.format(size=size, label=label, weather=WEATHERS[label], frames=FRAMES))
     grid = load("grid", str(path))
-    assert [(label, scenario.weather) for label, scenario in grid.scenarios] == [("dry", "dry")]
-    assert (grid.settings.camera, grid.settings.frames) == (f"dashcam-{width}x{height}", FRAMES)
+    assert [(name, scenario.weather) for name, scenario in grid.scenarios] == [(label, label.split("-")[0])]
+    assert (grid.settings.camera, grid.settings.frames) == (f"dashcam-{size}", FRAMES)

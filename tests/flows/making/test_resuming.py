@@ -215,9 +215,9 @@ def test_a_clip_that_cannot_fit_into_memory_is_refused_before_anything_is_made(g
         .replace("frame_rate_hz: 10", "frame_rate_hz: 100")
     )
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("flows.making.memory.memory_here", lambda: 8 * 10**9)
+        patch.setattr("flows.making.memory.memory_here", lambda: 4 * 10**9)
         with pytest.raises(
-            InputError, match=r"40000 frames need about 18\.1 GB, and this machine has 8\.0 GB"
+            InputError, match=r"40000 frames need about 7\.7 GB, and this machine has 4\.0 GB"
         ):
             make_plan(str(big), "cpu")
 

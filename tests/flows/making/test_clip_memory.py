@@ -1,0 +1,57 @@
+"""The memory that a clip is estimated to need, held against what it takes."""
+
+import gc
+import tracemalloc
+from pathlib import Path
+
+import pytest
+
+from catalogs.scenes import write_scene
+from flows.making.catalogue import catalogue_of
+from flows.making.generate import generate_dataset
+from flows.making.memory import clip_memory
+from flows.making.plan import read_plan
+from tests.toy_street import TOY_CAMERA, toy_street
+
+GRID = """\
+name: clip-{frames}
+scene: flat
+camera: camera.yaml
+frames: {frames}
+frame_rate_hz: 100
+scenarios:
+  one: {{weather: dry, initial_speed_km_h: 30, hold_speed: true}}
+"""
+LENS = "".join(
+    f'{name}: {{value: {value}, unit: "1", source: test}}\n' for name, value in (("k1", -0.3), ("k2", 0.1))
+)
+ROLLING = "line_delay: {value: 1.0e-4, unit: s, source: test}\n"
+FEW, MANY = 3, 23
+
+
+def measure_clip(folder: Path, frames: int) -> tuple[int, int]:
+    """The peak of what Python and NumPy hold while a clip is made, and the estimate [B]."""
+    grid, root = folder / f"{frames}.yaml", folder / str(frames)
+    grid.write_text(GRID.format(frames=frames))
+    # what is loaded and compiled once belongs to no clip
+    generate_dataset(str(grid), str(folder / f"untraced-{frames}"), runner="threads", workers=1)
+    gc.collect()
+    tracemalloc.start()
+    try:
+        generate_dataset(str(grid), str(root), runner="threads", workers=1)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    settings = read_plan(root).settings
+    ticks = round(settings.telemetry_s * 2000) + 1
+    return peak, clip_memory(settings, catalogue_of(root).camera, ticks)
+
+
+@pytest.mark.parametrize("lens", ["", LENS, LENS + ROLLING])
+def test_a_clip_grows_with_its_frames_as_estimated(lens: str, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_scene(toy_street(1), tmp_path / "flat", {})
+    camera = TOY_CAMERA.replace("value: 96", "value: 288").replace("value: 64", "value: 192")
+    Path("camera.yaml").write_text(camera.replace("value: 80", "value: 240") + lens)
+    (few, least), (many, most) = (measure_clip(tmp_path, n) for n in (FEW, MANY))
+    assert many - few == pytest.approx(most - least, rel=0.25)
