@@ -15,7 +15,7 @@ _CLOUD_LIGHT, _CLOUD_SHADE = np.array([1.05, 1.02, 0.98]), np.array([0.50, 0.55,
 _GROUND = np.array([0.16, 0.155, 0.145])
 _GLOW = np.array([1.0, 0.9, 0.72])
 _SUN_RADIUS_DEG = 0.6
-_RIDGES = ((0.030, 0.9, np.array([0.19, 0.22, 0.25])), (0.018, 0.4, np.array([0.115, 0.135, 0.13])))
+_RIDGES = ((0.030, 0.9, np.array([0.19, 0.22, 0.25])), (0.018, 0.4, np.array([0.085, 0.115, 0.068])))
 """Mean height [rad], longest wave by the distance and colour of each ridge of far trees, dimmer than the sky [1]."""
 _CLOUD_BASE, _CLOUD_WAVE = 1.0, 0.8
 """Height of the cloud layer and length of its longest wave, in units of that height [1]."""
