@@ -196,7 +196,7 @@ def _look(
     T_rig_camera = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, EYE_HEIGHT], [0, 0, 0, 1]])
     for station in stations:
         viewmat = np.linalg.inv(scene.route.pose(station) @ T_rig_camera)
-        buffer = engine.rasterise_view(cloud, viewmat, K, width, height)
+        buffer = engine.rasterise_view(cloud, viewmat, K, width, height).on_host()
         sky = environment_view(scene.environment, viewmat, K, width, height)
         picture = encode_8bit(compose_over_sky(buffer, sky, scene.gaussians.display_encoded))
         yield picture, _measure_holes(scene, station, viewmat, K, buffer.alpha)

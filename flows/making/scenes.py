@@ -125,7 +125,7 @@ def render_pose(scene: str, pose: str, out: str, *, backend: str = "auto") -> di
     engine = select_backend(backend)
     gbuffer = engine.rasterise_view(
         engine.prepare_gaussians(loaded.gaussians), viewmat, intrinsics, width, height
-    )
+    ).on_host()
     sky = environment_view(loaded.environment, viewmat, intrinsics, width, height)
     picture = encode_8bit(compose_over_sky(gbuffer, sky, loaded.gaussians.display_encoded))
     buffers: dict[str, Any] = {

@@ -15,6 +15,7 @@ from tasks.render.environment import environment_view
 from tasks.render.grain import add_grain
 from tasks.render.labels import MovedPixels, compute_clip_flow, compute_flow, compute_row_flow, label_frame
 from tasks.render.moving_bodies import BodiesInClip, MovingBody
+from tasks.render.pixels import bring_to_host
 from tasks.render.rasterise.backend import Backend
 from tasks.render.readout import Field, sensor_field
 from tasks.render.road_edit import RoadRelief
@@ -107,7 +108,15 @@ def render_clip(
     del scene, weathered  # memory: frames need none of their Gaussians
     velocity = np.gradient(T_world_camera[:, :3, 3], 1 / motion.frame_rate_hz, axis=0)
     shows_sky = display_encoded or not weather.replaces_sky
+    # labels, the paper's composition and its film, a lens, a shutter and a sensor's noise are the processor's
+    stays = camera.plain and not labels and composition == "linear"
+    stays = stays and not conditions.refracts and camera.sensor.full_well is None
     black = np.zeros((field.height, field.width, 3), np.float32)
+    if stays:
+        environment, black = backend.keep(environment), backend.keep(black)
+        if weather.outside is not None:
+            own = replace(weather.outside, environment=backend.keep(weather.outside.environment))
+            weather = replace(weather, outside=own)
 
     def render_frame(frame: int) -> dict[str, NDArray[np.generic]]:
         pose = T_world_camera[frame]
@@ -117,6 +126,8 @@ def render_clip(
             normals=labels or weather.reads_normals,
             bodies=moving.place(frame), shade=moving.shade(frame),
         )  # fmt: skip
+        if not stays:
+            gbuffer = gbuffer.on_host()
         if daylight is not None:
             gbuffer = add_grain(gbuffer, pose, field.K)
         shutter = Shutter(
@@ -163,7 +174,8 @@ def render_clip(
     clip: dict[str, NDArray[Any]] = {}
     chosen = range(len(T_world_camera)) if motion.shown is None else motion.shown
     for place, frame in enumerate(chosen):
-        for name, values in render_frame(frame).items():
+        for name, drawn in render_frame(frame).items():
+            values = bring_to_host(drawn)
             if not place:
                 clip[name] = np.empty((len(chosen), *values.shape), values.dtype)
             clip[name][place] = values

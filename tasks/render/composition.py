@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from tasks.render.pixels import find_namespace
 from tasks.render.rasterise.gbuffer import GBuffer
 
 LUMINANCE = np.array((0.2126, 0.7152, 0.0722))
@@ -14,14 +15,16 @@ DEPTH_BITS_DROPPED = 10
 
 def to_linear(display: NDArray[np.float32]) -> NDArray[np.float32]:
     """Convert sRGB-encoded values in [0, 1] to linear light (IEC 61966-2-1); negative values become 0."""
-    x = np.maximum(display, 0)
-    return np.where(x <= 0.04045, x / 12.92, ((x + 0.055) / 1.055) ** 2.4).astype(np.float32)
+    xp = find_namespace(display)
+    x = xp.clip(display, 0, None)
+    return xp.asarray(xp.where(x <= 0.04045, x / 12.92, ((x + 0.055) / 1.055) ** 2.4), dtype=xp.float32)
 
 
 def to_display(linear: NDArray[np.float32]) -> NDArray[np.float32]:
     """Convert linear light, clipped to [0, 1], to sRGB-encoded values (IEC 61966-2-1)."""
-    x = np.clip(linear, 0, 1)
-    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055).astype(np.float32)
+    xp = find_namespace(linear)
+    x = xp.clip(linear, 0, 1)
+    return xp.asarray(xp.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055), dtype=xp.float32)
 
 
 def compose_over_sky(
@@ -57,7 +60,7 @@ def round_depth(depth: NDArray[np.float32]) -> NDArray[np.float32]:
     ----------
     depth : float32 [H, W] positive or NaN [m]
     """
-    bits = depth.view(np.uint32)
-    half = np.uint32(1 << (DEPTH_BITS_DROPPED - 1))
-    rounded = (bits + half) & ~np.uint32((1 << DEPTH_BITS_DROPPED) - 1)
-    return np.where(np.isnan(depth), np.float32(np.nan), rounded.view(np.float32))
+    xp = find_namespace(depth)
+    bits = depth.view(xp.int32)
+    rounded = (bits + (1 << (DEPTH_BITS_DROPPED - 1))) & ~((1 << DEPTH_BITS_DROPPED) - 1)
+    return xp.where(xp.isnan(depth), xp.nan, rounded.view(xp.float32))

@@ -5,6 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.render.composition import encode_8bit
+from tasks.render.pixels import INLINED, LAW, find_namespace, run_on_either
 
 _CELL_BITS = 15
 """Last bits of a number that its cell leaves out: 8 bits of the mantissa stay, so that no cell holds two thresholds."""
@@ -43,18 +44,25 @@ def encode_picture(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
     ----------
     linear : float32 [H, W, 3] linear light; NaN gives 0 [1]
     """
-    values = np.ascontiguousarray(linear)
-    encoded = np.empty(values.shape, dtype=np.uint8)
-    _look_up(values.ravel(), values.ravel().view(np.uint32), encoded.ravel())
+    xp = find_namespace(linear)
+    values = linear if xp is not np else np.ascontiguousarray(linear)
+    encoded = xp.empty_like(values, dtype=xp.uint8)
+    _encode(*(one.reshape(len(values), -1) for one in (values, values.view(xp.int32), encoded)))
     return encoded
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _look_up(values, bits, out):  # type: ignore[no-untyped-def]
-    last = len(_BYTES) - 1
-    for i in range(len(values)):
-        value = values[i]
-        cell = min(max(int(bits[i] >> np.uint32(_CELL_BITS)) - _FIRST_CELL, 0), last)
-        byte = int(_BYTES[cell])
-        byte += value >= _THRESHOLDS[byte + 1]
-        out[i] = np.uint8(byte if value > _ZERO else 0)
+@numba.njit(**INLINED)
+def _encode_value(row, column, values, bits, out):  # type: ignore[no-untyped-def]
+    value = values[row, column]
+    cell = min(max(int(bits[row, column] >> _CELL_BITS) - _FIRST_CELL, 0), len(_BYTES) - 1)
+    byte = int(_BYTES[cell])
+    byte += value >= _THRESHOLDS[byte + 1]
+    out[row, column] = np.uint8(byte if value > _ZERO else 0)
+
+
+@run_on_either(_encode_value)
+@numba.njit(**LAW)
+def _encode(values, bits, out):  # type: ignore[no-untyped-def]
+    for row in range(values.shape[0]):
+        for column in range(values.shape[1]):
+            _encode_value(row, column, values, bits, out)

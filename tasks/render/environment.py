@@ -6,6 +6,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from tasks.render.pixels import INLINED, LAW, run_on_either
+
 _ZERO, _HALF, _ONE = np.float32(0), np.float32(0.5), np.float32(1)
 _QUARTER_TURN, _HALF_TURN = np.float32(pi / 2), np.float32(pi)
 _PER_TURN, _PER_HALF_TURN = np.float32(1 / (2 * pi)), np.float32(1 / pi)
@@ -17,7 +19,7 @@ _A0, _A1, _A2, _A3, _A4, _A5, _A6 = (
 )
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LAW)
 def direction_angle(y, x):  # type: ignore[no-untyped-def]
     """Return the angle of the vector (x, y) from +x to +y, in single precision and without a branch.
 
@@ -41,7 +43,7 @@ def direction_angle(y, x):  # type: ignore[no-untyped-def]
     return -angle if y < _ZERO else angle
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LAW)
 def find_on_panorama(x, y, z, rows, columns):  # type: ignore[no-untyped-def]
     """Return row and column of an equirectangular picture in the direction (x, y, z), float32 of any length [px]."""
     row = (_HALF - direction_angle(z, np.float32(sqrt(x * x + y * y))) * _PER_HALF_TURN) * np.float32(
@@ -51,11 +53,11 @@ def find_on_panorama(x, y, z, rows, columns):  # type: ignore[no-untyped-def]
     return row, column
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LAW)
 def blend_panorama(panorama, row, column, out):  # type: ignore[no-untyped-def]
     """Write the picture [H, W, 3] at a place of `find_on_panorama` into ``out`` [3]: bilinear, wrapped in azimuth."""
     height, width = panorama.shape[:2]
-    r0, c0 = floor(row), floor(column)
+    r0, c0 = np.int64(floor(row)), np.int64(floor(column))
     tr, tc = row - np.float32(r0), column - np.float32(c0)
     top, bottom = min(max(r0, 0), height - 1), min(max(r0 + 1, 0), height - 1)
     left = width - 1 if c0 < 0 else min(c0, width - 1)
@@ -66,7 +68,7 @@ def blend_panorama(panorama, row, column, out):  # type: ignore[no-untyped-def]
         out[c] = (_ONE - tr) * above + tr * below
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LAW)
 def sample_panorama(panorama, x, y, z, out):  # type: ignore[no-untyped-def]
     """Bilinear look-up of an equirectangular picture in the direction (x, y, z), any length, into ``out`` [3]."""
     row, column = find_on_panorama(
@@ -86,7 +88,8 @@ def environment_view(
 
     Parameters
     ----------
-    environment : float32 [He, We, 3] row 0 zenith, column centre world +x, leftward columns toward +y [1]
+    environment : float32 [He, We, 3] row 0 zenith, column centre world +x, leftward columns toward +y; the view is
+        computed where it lies [1]
     viewmat : [4, 4] world to camera
     K : [3, 3] intrinsics [px]
     width, height : picture size [px]
@@ -97,29 +100,40 @@ def environment_view(
     """
     across = (np.arange(width) + 0.5 - K[0, 2]) / K[0, 0]
     down = (np.arange(height) + 0.5 - K[1, 2]) / K[1, 1]
-    seen = np.empty((height, width, 3), dtype=np.float32)
-    _view_panorama(
-        np.ascontiguousarray(environment),
-        np.ascontiguousarray(viewmat[:3, :3], dtype=np.float64),
-        across,
-        down,
-        seen,
-    )
+    rotation = np.ascontiguousarray(viewmat[:3, :3], dtype=np.float64)
+    if isinstance(environment, np.ndarray):
+        environment = np.ascontiguousarray(environment)
+        seen = np.empty((height, width, 3), dtype=np.float32)
+    else:
+        seen = environment.new_empty((height, width, 3))
+    _view_panorama(seen, environment, rotation, across, down)
     return seen
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _view_panorama(panorama, rotation, across, down, seen):  # type: ignore[no-untyped-def]
-    rows, columns = panorama.shape[:2]
+@numba.njit(**INLINED)
+def _place_pixel(i, j, rotation, across, down, rows, columns):  # type: ignore[no-untyped-def]
     right, below, ahead = rotation[0], rotation[1], rotation[2]
+    x = np.float32(across[j] * right[0] + down[i] * below[0] + ahead[0])
+    y = np.float32(across[j] * right[1] + down[i] * below[1] + ahead[1])
+    z = np.float32(across[j] * right[2] + down[i] * below[2] + ahead[2])
+    return find_on_panorama(x, y, z, rows, columns)
+
+
+@numba.njit(**INLINED)
+def _view_pixel(i, j, seen, panorama, rotation, across, down):  # type: ignore[no-untyped-def]
+    row, column = _place_pixel(i, j, rotation, across, down, panorama.shape[0], panorama.shape[1])
+    blend_panorama(panorama, row, column, seen[i, j])
+
+
+@run_on_either(_view_pixel)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _view_panorama(seen, panorama, rotation, across, down):  # type: ignore[no-untyped-def]
+    rows, columns = panorama.shape[:2]
     row, column = np.empty(len(across), dtype=np.float32), np.empty(len(across), dtype=np.float32)
     for i in range(len(down)):
         # a loop of its own, without gathers, that the compiler turns into vector code
         for j in range(len(across)):
-            x = np.float32(across[j] * right[0] + down[i] * below[0] + ahead[0])
-            y = np.float32(across[j] * right[1] + down[i] * below[1] + ahead[1])
-            z = np.float32(across[j] * right[2] + down[i] * below[2] + ahead[2])
-            row[j], column[j] = find_on_panorama(x, y, z, rows, columns)
+            row[j], column[j] = _place_pixel(i, j, rotation, across, down, rows, columns)
         for j in range(len(across)):
             blend_panorama(panorama, row[j], column[j], seen[i, j])
 

@@ -8,12 +8,14 @@ world does. A pixel's cost does not depend on the street.
 """
 
 from dataclasses import replace
+from math import ceil, floor, sqrt
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from tasks.conventions import SemanticClass
+from tasks.render.pixels import INLINED, LAW, new_picture, run_on_either
 from tasks.render.rasterise.gbuffer import GBuffer
 
 WAVES = np.array([0.008, 0.016, 0.032, 0.064, 0.128])
@@ -60,70 +62,75 @@ def add_grain(gbuffer: GBuffer, T_world_camera: NDArray[np.float64], K: NDArray[
     T_world_camera : [4, 4] pose [m]
     K : [3, 3] intrinsics, pixel centres at +0.5 [px]
     """
-    rgb = gbuffer.rgb.copy()
+    rgb = new_picture(gbuffer.rgb, 3)
+    rgb[...] = gbuffer.rgb
     pose, intrinsics = (np.ascontiguousarray(m, dtype=np.float64) for m in (T_world_camera[:3], K))
-    _modulate(rgb, gbuffer.depth, gbuffer.class_id, pose, intrinsics)
+    _modulate(rgb, gbuffer.depth, gbuffer.class_id, pose, intrinsics, _NOISE)
     return replace(gbuffer, rgb=rgb)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _modulate(rgb, depth, class_id, pose, K):  # type: ignore[no-untyped-def]
-    height, width = depth.shape
+@numba.njit(**INLINED)
+def _modulate_pixel(i, j, rgb, depth, class_id, pose, K, noise):  # type: ignore[no-untyped-def]
     coarsest = WAVES[-1]
-    for i in range(height):
-        down = (i + 0.5 - K[1, 2]) / K[1, 1]
-        for j in range(width):
-            kind = class_id[i, j]
-            deviation = _STRENGTH[kind]
-            z = np.float64(depth[i, j])
-            if deviation == 0 or not z * _PIXELS_A_WAVE < coarsest * K[0, 0]:
-                continue
-            red, green, blue = rgb[i, j]
-            light = 0.2126 * red + 0.7152 * green + 0.0722 * blue
-            deviation *= max(1 - light / BRIGHTEST, 0.0)
-            across = (j + 0.5 - K[0, 2]) / K[0, 0]
-            dx = pose[0, 0] * across + pose[0, 1] * down + pose[0, 2]
-            dy = pose[1, 0] * across + pose[1, 1] * down + pose[1, 2]
-            dz = pose[2, 0] * across + pose[2, 1] * down + pose[2, 2]
-            x, y, up = pose[0, 3] + z * dx, pose[1, 3] + z * dy, pose[2, 3] + z * dz
-            wide = z / K[0, 0]
-            if _UPRIGHT[kind]:
-                u, v, along_u, along_v = 0.8 * x + 0.6 * y, up, 0.0, 0.0
-                samples, pixel = 1, wide / _WALL_FACING
-            else:
-                steep = max(abs(dz), 1e-3)
-                facing = steep / np.sqrt(dx * dx + dy * dy + steep * steep)
-                # by how much a pixel is longer on the surface than it is wide, the squares' difference
-                u, v, along_u, along_v = x, y + up, wide * dx / steep, wide * dy / steep
-                # between the pixel's width and its length on the surface; samples lie as far apart
-                pixel = wide / np.sqrt(facing)
-                samples = int(np.ceil(2 / np.sqrt(facing)))
-            total = 0.0
-            for k in range(len(WAVES)):
-                share = min(WAVES[k] / pixel / _PIXELS_A_WAVE - 1, 1.0)
-                if share > 0:
-                    total += share * _blur_along(u, v, along_u, along_v, samples, _TEXELS_A_WAVE / WAVES[k])
-            gain = np.float32(max(1 + deviation * total, 0.3))
-            for channel in range(3):
-                rgb[i, j, channel] *= gain
+    kind = class_id[i, j]
+    deviation = _STRENGTH[kind]
+    z = np.float64(depth[i, j])
+    if deviation == 0 or not z * _PIXELS_A_WAVE < coarsest * K[0, 0]:
+        return
+    red, green, blue = rgb[i, j, 0], rgb[i, j, 1], rgb[i, j, 2]
+    light = 0.2126 * red + 0.7152 * green + 0.0722 * blue
+    deviation *= max(1 - light / BRIGHTEST, 0.0)
+    across, down = (j + 0.5 - K[0, 2]) / K[0, 0], (i + 0.5 - K[1, 2]) / K[1, 1]
+    dx = pose[0, 0] * across + pose[0, 1] * down + pose[0, 2]
+    dy = pose[1, 0] * across + pose[1, 1] * down + pose[1, 2]
+    dz = pose[2, 0] * across + pose[2, 1] * down + pose[2, 2]
+    x, y, up = pose[0, 3] + z * dx, pose[1, 3] + z * dy, pose[2, 3] + z * dz
+    wide = z / K[0, 0]
+    if _UPRIGHT[kind]:
+        u, v, along_u, along_v = 0.8 * x + 0.6 * y, up, 0.0, 0.0
+        samples, pixel = np.int64(1), wide / _WALL_FACING
+    else:
+        steep = max(abs(dz), 1e-3)
+        facing = steep / sqrt(dx * dx + dy * dy + steep * steep)
+        # by how much a pixel is longer on the surface than it is wide, the squares' difference
+        u, v, along_u, along_v = x, y + up, wide * dx / steep, wide * dy / steep
+        # between the pixel's width and its length on the surface; samples lie as far apart
+        pixel = wide / sqrt(facing)
+        samples = np.int64(ceil(2 / sqrt(facing)))
+    total = 0.0
+    for k in range(len(WAVES)):
+        share = min(WAVES[k] / pixel / _PIXELS_A_WAVE - 1, 1.0)
+        if share > 0:
+            texels = _TEXELS_A_WAVE / WAVES[k]
+            total += share * _blur_along(noise, u, v, along_u, along_v, samples, texels)
+    gain = np.float32(max(1 + deviation * total, 0.3))
+    for channel in range(3):
+        rgb[i, j, channel] *= gain
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _blur_along(u, v, along_u, along_v, samples, texels):  # type: ignore[no-untyped-def]
+@run_on_either(_modulate_pixel)
+@numba.njit(**LAW)
+def _modulate(rgb, depth, class_id, pose, K, noise):  # type: ignore[no-untyped-def]
+    for i in range(depth.shape[0]):
+        for j in range(depth.shape[1]):
+            _modulate_pixel(i, j, rgb, depth, class_id, pose, K, noise)
+
+
+@numba.njit(**LAW)
+def _blur_along(noise, u, v, along_u, along_v, samples, texels):  # type: ignore[no-untyped-def]
     """Mean of the noise at a place, over a length to either side, weighted by a triangle [1]."""
-    size = _NOISE.shape[0]
     total, weights = 0.0, 0.0
     for n in range(samples):
         t = (2 * n + 1) / samples - 1
         a, b = (u + t * along_u) * texels, (v + t * along_v) * texels
-        r, c = np.floor(a), np.floor(b)
+        r, c = floor(a), floor(b)
         ta, tb = a - r, b - c
-        r0, c0 = int(r) % size, int(c) % size
-        r1, c1 = (r0 + 1) % size, (c0 + 1) % size
+        r0, c0 = int(r) % _TILE, int(c) % _TILE
+        r1, c1 = (r0 + 1) % _TILE, (c0 + 1) % _TILE
         weight = 1 - abs(t)
         weights += weight
         total += weight * (
-            (1 - ta) * ((1 - tb) * _NOISE[r0, c0] + tb * _NOISE[r0, c1])
-            + ta * ((1 - tb) * _NOISE[r1, c0] + tb * _NOISE[r1, c1])
+            (1 - ta) * ((1 - tb) * noise[r0, c0] + tb * noise[r0, c1])
+            + ta * ((1 - tb) * noise[r1, c0] + tb * noise[r1, c1])
         )
     return total / weights

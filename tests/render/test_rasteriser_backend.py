@@ -9,13 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-import torch
 from numpy.typing import NDArray
 
 from tasks.errors import InputError
 from tasks.render.rasterise import backend
 from tasks.render.rasterise.backend import CpuBackend, compare_with_cpu, probe_scene, select_backend
-from tasks.render.rasterise.front_torch import find_first_below_half
+from tasks.render.rasterise.front import find_front
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.rasterise.rasteriser import prepare_gaussians, rasterise_view
 from tests.render.clouds import HEIGHT, WIDTH, K, camera_at, random_cloud, rotation_matrix
@@ -81,17 +80,18 @@ def test_an_unknown_backend_lists_those_that_exist() -> None:
 
 
 def test_gsplats_class_is_found_where_light_falls_below_one_half() -> None:
-    alpha = torch.tensor([0.3, 0.2, 0.9, 0.6, 0.9, 0.2, 0.2, 0.5, 0.1])
-    pixel = torch.tensor([0, 0, 0, 3, 3, 4, 4, 6, 6])
-    wanted = [False, False, True, True, False, False, False, False, True]
-    assert find_first_below_half(alpha, pixel).tolist() == wanted
-    # behind a picture's worth of other pixels, whose sum rounds
-    many = 800_000
-    before = torch.arange(100, 100 + many)
-    found = find_first_below_half(
-        torch.cat((torch.full((many,), 0.9999), alpha)), torch.cat((before, before[-1] + 1 + pixel))
-    )
-    assert found[:many].all() and found[many:].tolist() == wanted
+    """Two tiles of 4 x 4: in the first a faint splat before a solid one, in the second none that halves the light."""
+    front = np.full((4, 8), -1)
+    means, conics = np.float32([[1.5, 1.5], [1.5, 1.5], [6.5, 1.5]]), np.float32([[1, 0, 1]] * 3)
+    opacities, starts = np.float32([0.3, 0.9, 0.45]), np.int32([[0, 2]])
+    for row in range(4):
+        for column in range(8):
+            find_front(row, column, front, means, conics, opacities, starts, np.int32([0, 1, 2]), 4)
+    # half of the light is left where .3 and .9 of a normal law's height at the distance d leave half of it
+    dx, dy = np.meshgrid(np.arange(4) - 1.0, np.arange(4) - 1.0)
+    falloff = np.exp(-(dx**2 + dy**2) / 2)
+    assert (front[:, :4] == np.where((1 - 0.3 * falloff) * (1 - 0.9 * falloff) < 0.5, 1, -1)).all()
+    assert (front[:, 4:] == -1).all() and (front[:, :4] == 1).any()
 
 
 @pytest.mark.gpu
@@ -105,7 +105,7 @@ def test_gsplat_draws_the_cpus_picture() -> None:
             random_cloud(1500, sh_count, seed),
             camera_at((0.1, 0.2, 0), rotation_matrix(seed)),
         )
-        got = gpu.rasterise_view(gpu.prepare_gaussians(gaussians), viewmat, K, WIDTH, HEIGHT)
+        got = gpu.rasterise_view(gpu.prepare_gaussians(gaussians), viewmat, K, WIDTH, HEIGHT).on_host()
         wanted = cpu.rasterise_view(cpu.prepare_gaussians(gaussians), viewmat, K, WIDTH, HEIGHT)
         assert np.mean((got.rgb - wanted.rgb) ** 2) < 1e-6
         assert np.mean((got.alpha - wanted.alpha) ** 2) < 1e-6

@@ -50,7 +50,13 @@ class Backend(Protocol):
         bodies: Sequence[PlacedBody] = (),
         shade: Shade | None = None,
     ) -> GBuffer:
-        """Draw one view; see `tasks.render.rasterise.rasteriser.rasterise_view`; normals may be there unasked."""
+        """Draw one view; see `tasks.render.rasterise.rasteriser.rasterise_view`; normals may be there unasked.
+
+        The buffers lie where they are drawn: `GBuffer.on_host` brings them to the processor.
+        """
+
+    def keep(self, array: NDArray[np.float32]) -> Any:
+        """Return a picture where this backend draws, so that `tasks.render.pixels` finds it beside the buffers."""
 
 
 class CpuBackend:
@@ -60,6 +66,11 @@ class CpuBackend:
     prepare_gaussians = staticmethod(rasteriser.prepare_gaussians)
     recolour = staticmethod(recolour_prepared)
     rasterise_view = staticmethod(rasteriser.rasterise_view)
+
+    @staticmethod
+    def keep(array: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the picture itself."""
+        return array
 
 
 def select_backend(name: str = "auto") -> Backend:
@@ -122,7 +133,7 @@ def _describe_difference(
     backend: Backend, gaussians: Gaussians, viewmat: NDArray[np.float64], K: NDArray[np.float64]
 ) -> str:
     width, height = 64, 48
-    drawn = backend.rasterise_view(backend.prepare_gaussians(gaussians), viewmat, K, width, height)
+    drawn = backend.rasterise_view(backend.prepare_gaussians(gaussians), viewmat, K, width, height).on_host()
     wanted = rasteriser.rasterise_view(rasteriser.prepare_gaussians(gaussians), viewmat, K, width, height)
     differences = {
         "rgb": drawn.rgb - wanted.rgb,

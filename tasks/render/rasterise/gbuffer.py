@@ -1,14 +1,16 @@
 """The result of one rasterisation."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tasks.render.pixels import bring_to_host
+
 
 @dataclass(frozen=True, kw_only=True)
 class GBuffer:
-    """Per-pixel buffers of one view, H x W.
+    """Per-pixel buffers of one view, H x W: arrays, or tensors of the device that drew it.
 
     Parameters
     ----------
@@ -31,3 +33,7 @@ class GBuffer:
     normal: NDArray[np.float32]
     class_id: NDArray[np.uint8]
     object_id: NDArray[np.uint16]
+
+    def on_host(self) -> "GBuffer":
+        """Return the same buffers as arrays of the processor."""
+        return GBuffer(**{field.name: bring_to_host(getattr(self, field.name)) for field in fields(self)})

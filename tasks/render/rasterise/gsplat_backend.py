@@ -1,8 +1,8 @@
 """The same views drawn by gsplat 1.5 (Apache-2.0) on a CUDA device.
 
 gsplat compiles its kernels with nvcc at first use. It blends colours that are evaluated before, here
-three of light and three of the normal, and expected depth. Class and surface depth are computed from the
-list of (Gaussian, pixel) pairs that it returns.
+three of light and three of the normal, and expected depth. Class and surface depth follow from the disc at which a
+pixel's transmittance falls below one half: it is sought in the tile's list that gsplat returns.
 """
 
 from collections.abc import Sequence
@@ -15,18 +15,16 @@ import torch
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from tasks.render.pixels import run_on_device
 from tasks.render.rasterise.blending import SURFACE_RATIO
-from tasks.render.rasterise.front_torch import find_first_below_half
+from tasks.render.rasterise.front import find_front
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.rasterise.painters_bias_torch import move_nearer
 from tasks.render.rasterise.placed_body import PlacedBody, Shade
 from tasks.render.rasterise.preparation import morton_order
 from tasks.render.rasterise.projection import NEAR, low_pass
-from tasks.render.rasterise.strips import MAX_ALPHA
 from tasks.render.rasterise.view import view_of
 from tasks.scene.gaussians import Gaussians, check_gaussians
-
-_EVERY_BATCH = 2**31 - 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,7 +102,7 @@ class GsplatBackend:
         bodies: Sequence[PlacedBody] = (),
         shade: Shade | None = None,
     ) -> GBuffer:
-        """Draw one view, always with its normals; see `tasks.render.rasterise.rasteriser.rasterise_view`."""
+        """Draw one view, always with its normals, into tensors; see `Backend.rasterise_view`."""
         light = torch.ones(len(prepared.means), device=self.device)
         if shade is not None:
             light[prepared.places[self._to_tensor(shade.index)]] = self._to_tensor(shade.share)
@@ -147,7 +145,11 @@ class GsplatBackend:
         alpha = alpha[0, ..., 0]
         normal = torch.nn.functional.normalize(blended[0, ..., 3:6], dim=-1)
         expected = torch.where(alpha > 0, blended[0, ..., 6], torch.nan)
-        front = self._find_front(splats, width, height)
+        front = torch.full((height, width), -1, dtype=torch.int64, device=self.device)
+        run_on_device(
+            find_front, front, splats["means2d"][0], splats["conics"][0], splats["opacities"][0],
+            splats["isect_offsets"][0], splats["flatten_ids"], splats["tile_size"],
+        )  # fmt: skip
         seen, splat = front >= 0, front.clamp_min(0)
         pixels = np.dstack(np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5, 1.0))
         rays = self._to_tensor((pixels @ view.rays).astype(np.float32))
@@ -158,13 +160,13 @@ class GsplatBackend:
         class_id = torch.where(seen, prepared.class_id[splat], 0)
         object_id = torch.where(seen, prepared.object_id[splat], 0)
         return GBuffer(
-            rgb=blended[0, ..., :3].cpu().numpy(),
-            depth=depth.cpu().numpy(),
-            expected_depth=expected.cpu().numpy(),
-            alpha=alpha.cpu().numpy(),
-            normal=normal.cpu().numpy(),
-            class_id=class_id.cpu().numpy(),
-            object_id=object_id.cpu().numpy().astype(np.uint16),
+            rgb=blended[0, ..., :3],
+            depth=depth,  # type: ignore[arg-type]
+            expected_depth=expected,  # type: ignore[arg-type]
+            alpha=alpha,
+            normal=normal,  # type: ignore[arg-type]
+            class_id=class_id.to(torch.uint8),  # type: ignore[arg-type]
+            object_id=object_id.to(torch.uint16),  # type: ignore[arg-type]
         )
 
     def _add_bodies(self, prepared: DeviceGaussians, bodies: Sequence[PlacedBody]) -> DeviceGaussians:
@@ -195,30 +197,9 @@ class GsplatBackend:
             object_id=own.object_id + body.number,
         )
 
-    def _find_front(self, splats: dict[str, Any], width: int, height: int) -> torch.Tensor:
-        """Return the Gaussian at which each pixel's transmittance falls below one half, -1 for none; [H, W]."""
-        gaussian, pixel, _ = gsplat.rasterize_to_indices_in_range(
-            0,
-            _EVERY_BATCH,
-            torch.ones((1, height, width), device=self.device),
-            splats["means2d"],
-            splats["conics"],
-            splats["opacities"],
-            width,
-            height,
-            splats["tile_size"],
-            splats["isect_offsets"],
-            splats["flatten_ids"],
-        )
-        a, b, c = splats["conics"][0, gaussian].T
-        dx = pixel % width + 0.5 - splats["means2d"][0, gaussian, 0]
-        dy = pixel // width + 0.5 - splats["means2d"][0, gaussian, 1]
-        power = 0.5 * (a * dx * dx + c * dy * dy) + b * dx * dy
-        alpha = (splats["opacities"][0, gaussian] * torch.exp(-power)).clamp_max(MAX_ALPHA)
-        halves = find_first_below_half(alpha, pixel)
-        front = torch.full((height * width,), -1, dtype=torch.int64, device=self.device)
-        front[pixel[halves]] = gaussian[halves]
-        return front.reshape(height, width)
+    def keep(self, array: NDArray[Any]) -> torch.Tensor:
+        """Return a picture on the device, for all frames of a clip; see `Backend.keep`."""
+        return self._to_tensor(array)
 
     def _to_tensor(self, array: NDArray[Any]) -> torch.Tensor:
         return torch.from_numpy(np.ascontiguousarray(array)).to(self.device)

@@ -1,11 +1,13 @@
 """Air between the eye and the scene: light under cloud, and Koschmieder's veil over distance."""
 
 from dataclasses import dataclass
+from math import exp, sqrt
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from tasks.render.pixels import INLINED, LAW, new_picture, run_on_either
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.weather.falling.precipitation import NearField, Population, drawn_optical_depth
 from tasks.render.weather.layer import Layer
@@ -111,7 +113,7 @@ def light_layer(
     -------
     Layer
     """
-    lit = np.empty_like(picture)
+    lit = new_picture(picture, 3)
     _relight(picture, gbuffer.alpha, clear_sky, cloudy_sky, sky.relight.astype(np.float32), lit)
     return Layer(name="light", gain=np.zeros((1, 1, 1), dtype=np.float32), add=lit)
 
@@ -133,9 +135,7 @@ def air_layer(
     -------
     Layer
     """
-    height, width = gbuffer.depth.shape
-    gain = np.empty((height, width, 1), dtype=np.float32)
-    add = np.empty((height, width, 3), dtype=np.float32)
+    gain, add = new_picture(gbuffer.depth, 1), new_picture(gbuffer.depth, 3)
     table = air.drawn.astype(np.float32)
     _veil(
         gbuffer.depth, gbuffer.alpha, rays, cloudy_sky, sky.airlight.astype(np.float32),
@@ -144,42 +144,56 @@ def air_layer(
     return Layer(name="air", gain=gain, add=add)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _relight(picture, alpha, clear, cloudy, relight, lit):  # type: ignore[no-untyped-def]
-    height, width = alpha.shape
+@numba.njit(**INLINED)
+def _relight_pixel(row, column, picture, alpha, clear, cloudy, relight, lit):  # type: ignore[no-untyped-def]
     zero, one = np.float32(0), np.float32(1)
-    for row in range(height):
-        for column in range(width):
-            left = one - alpha[row, column]
-            # where nothing is drawn the picture is the sky's, to the last bit
-            own = one if left < one else zero
-            red = own * max(picture[row, column, 0] - left * clear[row, column, 0], zero)
-            green = own * max(picture[row, column, 1] - left * clear[row, column, 1], zero)
-            blue = own * max(picture[row, column, 2] - left * clear[row, column, 2], zero)
-            for c in range(3):
-                value = relight[c, 0] * red + relight[c, 1] * green + relight[c, 2] * blue
-                lit[row, column, c] = value + left * cloudy[row, column, c]
+    left = one - alpha[row, column]
+    # where nothing is drawn the picture is the sky's, to the last bit
+    own = one if left < one else zero
+    red = own * max(picture[row, column, 0] - left * clear[row, column, 0], zero)
+    green = own * max(picture[row, column, 1] - left * clear[row, column, 1], zero)
+    blue = own * max(picture[row, column, 2] - left * clear[row, column, 2], zero)
+    for c in range(3):
+        value = relight[c, 0] * red + relight[c, 1] * green + relight[c, 2] * blue
+        lit[row, column, c] = value + left * cloudy[row, column, c]
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _veil(depth, alpha, rays, cloudy, airlight, extinction, drawn, steps_per_m, gain, add):  # type: ignore[no-untyped-def]
-    height, width = depth.shape
+@run_on_either(_relight_pixel)
+@numba.njit(**LAW)
+def _relight(picture, alpha, clear, cloudy, relight, lit):  # type: ignore[no-untyped-def]
+    for row in range(alpha.shape[0]):
+        for column in range(alpha.shape[1]):
+            _relight_pixel(row, column, picture, alpha, clear, cloudy, relight, lit)
+
+
+@numba.njit(**INLINED)
+def _veil_pixel(  # type: ignore[no-untyped-def]
+    row, column, depth, alpha, rays, cloudy, airlight, extinction, drawn, steps_per_m, gain, add
+):
     zero, one = np.float32(0), np.float32(1)
     last = len(drawn) - 1
-    for row in range(height):
-        for column in range(width):
-            cover = alpha[row, column]
-            if cover == zero:
-                gain[row, column, 0] = one
-                add[row, column, 0], add[row, column, 1], add[row, column, 2] = zero, zero, zero
-                continue
-            x, y, z = rays[row, column, 0], rays[row, column, 1], rays[row, column, 2]
-            distance = depth[row, column] * np.sqrt(x * x + y * y + z * z)
-            place = min(distance * steps_per_m, np.float32(last))
-            k = min(int(place), last - 1)
-            near = drawn[k] + (place - np.float32(k)) * (drawn[k + 1] - drawn[k])
-            through = np.exp(near - extinction * distance)
-            gain[row, column, 0] = through
-            for c in range(3):
-                light = cover * airlight[c] + (one - cover) * cloudy[row, column, c]
-                add[row, column, c] = (one - through) * light
+    cover = alpha[row, column]
+    if cover == zero:
+        gain[row, column, 0] = one
+        add[row, column, 0], add[row, column, 1], add[row, column, 2] = zero, zero, zero
+        return
+    x, y, z = rays[row, column, 0], rays[row, column, 1], rays[row, column, 2]
+    distance = depth[row, column] * sqrt(x * x + y * y + z * z)
+    place = min(distance * steps_per_m, np.float32(last))
+    k = min(int(place), last - 1)
+    near = drawn[k] + (place - np.float32(k)) * (drawn[k + 1] - drawn[k])
+    through = exp(near - extinction * distance)
+    gain[row, column, 0] = through
+    for c in range(3):
+        light = cover * airlight[c] + (one - cover) * cloudy[row, column, c]
+        add[row, column, c] = (one - through) * light
+
+
+@run_on_either(_veil_pixel)
+@numba.njit(**LAW)
+def _veil(depth, alpha, rays, cloudy, airlight, extinction, drawn, steps_per_m, gain, add):  # type: ignore[no-untyped-def]
+    for row in range(depth.shape[0]):
+        for column in range(depth.shape[1]):
+            _veil_pixel(
+                row, column, depth, alpha, rays, cloudy, airlight, extinction, drawn, steps_per_m, gain, add
+            )

@@ -5,7 +5,7 @@ than a wave sees the wave's mean, so a wave fades as its length nears the footpr
 """
 
 from dataclasses import dataclass
-from math import sqrt
+from math import floor, sqrt
 
 import numba
 import numpy as np
@@ -92,7 +92,7 @@ def _smooth_noise(x, y, key):  # type: ignore[no-untyped-def]
     Corner values are blended with weights that keep the variance (their squares sum to 1), so the field has
     no grid of calm places.
     """
-    fx, fy = np.floor(x), np.floor(y)
+    fx, fy = floor(x), floor(y)
     ix, iy = np.int64(fx), np.int64(fy)
     tx, ty = x - fx, y - fy
     tx, ty = tx * tx * (3 - 2 * tx), ty * ty * (3 - 2 * ty)
@@ -102,11 +102,42 @@ def _smooth_noise(x, y, key):  # type: ignore[no-untyped-def]
     return ((1 - ty) * a + ty * b) * sqrt(12 / spread)
 
 
+@numba.njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _read_wave(x, y, footprint, wave, amplitude, key):  # type: ignore[no-untyped-def]
+    """Return one wave at a place, as far as what looks at it is narrower than the wave."""
+    seen = min(1.0, max(0.0, wave / (2 * footprint + 1e-9) - 1))
+    return seen * amplitude * _smooth_noise(x / wave, y / wave, key)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _turn_place(x, y):  # type: ignore[no-untyped-def]
+    """Turn each wave against the one before, so that their grids do not align."""
+    return 0.8 * x - 0.6 * y, 0.6 * x + 0.8 * y
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def read_field(x, y, footprint, coarsest, octaves, roughness, key):  # type: ignore[no-untyped-def]
+    """Return the field at one place; `sum_waves` returns it at many.
+
+    Parameters
+    ----------
+    x, y : world coordinates [m]
+    footprint, coarsest, octaves, roughness, key : see `sum_waves`
+    """
+    power, total = 0.0, 0.0
+    wave, amplitude = coarsest, 1.0
+    for k in range(octaves):
+        power += amplitude * amplitude
+        total += _read_wave(x, y, footprint, wave, amplitude, key + np.uint64(k))
+        x, y = _turn_place(x, y)
+        wave *= 0.5
+        amplitude *= roughness
+    return total / sqrt(power)
+
+
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def sum_waves(count, places, footprint, coarsest, octaves, roughness, key, out):  # type: ignore[no-untyped-def]
     """Write the field at the first places into ``out``, wave after wave in loops that the compiler turns into vectors.
-
-    Each wave is turned against the one before, so that their grids do not align.
 
     Parameters
     ----------
@@ -125,10 +156,9 @@ def sum_waves(count, places, footprint, coarsest, octaves, roughness, key, out):
         power += amplitude * amplitude
         own = key + np.uint64(k)
         for i in range(count):
-            seen = min(1.0, max(0.0, wave / (2 * footprint[i] + 1e-9) - 1))
             x, y = places[0, i], places[1, i]
-            out[i] += seen * amplitude * _smooth_noise(x / wave, y / wave, own)
-            places[0, i], places[1, i] = 0.8 * x - 0.6 * y, 0.6 * x + 0.8 * y
+            out[i] += _read_wave(x, y, footprint[i], wave, amplitude, own)
+            places[0, i], places[1, i] = _turn_place(x, y)
         wave *= 0.5
         amplitude *= roughness
     for i in range(count):

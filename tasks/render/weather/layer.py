@@ -7,6 +7,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from tasks.render.pixels import INLINED, LAW, new_picture, run_on_either
+
 
 @dataclass(frozen=True, kw_only=True)
 class Layer:
@@ -38,17 +40,24 @@ def recompose_layers(base: NDArray[np.float32], layers: Iterable[Layer]) -> NDAr
     """
     picture = base
     for layer in layers:
-        picture = layer.add if layer.gain.size == 1 else _cover(picture, layer.gain, layer.add)
+        below, picture = picture, layer.add
+        if layer.gain.shape[0] > 1:
+            picture = new_picture(layer.add, 3)
+            _cover(below, layer.gain, layer.add, picture)
     return picture
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _cover(picture, gain, add):  # type: ignore[no-untyped-def]
-    out = np.empty(add.shape, dtype=np.float32)
+@numba.njit(**INLINED)
+def _cover_pixel(row, column, picture, gain, add, out):  # type: ignore[no-untyped-def]
     last = gain.shape[2] - 1
+    for c in range(3):
+        below = picture[row, column, c] * gain[row, column, min(c, last)]
+        out[row, column, c] = below + add[row, column, c]
+
+
+@run_on_either(_cover_pixel)
+@numba.njit(**LAW)
+def _cover(picture, gain, add, out):  # type: ignore[no-untyped-def]
     for row in range(add.shape[0]):
         for column in range(add.shape[1]):
-            for c in range(3):
-                below = picture[row, column, c] * gain[row, column, min(c, last)]
-                out[row, column, c] = below + add[row, column, c]
-    return out
+            _cover_pixel(row, column, picture, gain, add, out)

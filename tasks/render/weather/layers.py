@@ -299,7 +299,7 @@ def apply_weather(
     if outside is None:
         return WeatherFrame(base=picture, layers=(), picture=picture)
     sky, air, film = outside.sky, outside.air, outside.look.film
-    rays = pixel_rays(shutter)
+    rays = pixel_rays(shutter, gbuffer.depth)
     view = world_to_camera(shutter.T_world_camera)
     cloudy = environment_view(outside.environment, view, shutter.K, shutter.width, shutter.height)
     layers = [light_layer(picture, gbuffer, clear_sky, cloudy, sky)]

@@ -35,7 +35,7 @@ def test_nothing_falls_on_ice_and_the_air_is_clear(parameters):
 
 def test_diffuse_reflectance_of_ice_is_the_mean_over_the_hemisphere(parameters):
     film, cosine = parameters.kinds["ice"].film, (np.arange(20000) + 0.5) / 20000
-    mean = np.mean(2 * cosine * fresnel_reflectance(cosine, film.refractive_index))
+    mean = np.mean(2 * cosine * np.vectorize(fresnel_reflectance)(cosine, film.refractive_index))
     assert film.diffuse_reflectance == pytest.approx(mean, abs=0.001)
 
 

@@ -61,12 +61,12 @@ def test_water_reflects_two_percent_straight_down_and_all_at_grazing():
     # Brewster's angle: only the perpendicular part is left, ((n^2 - 1) / (n^2 + 1))^2 / 2
     brewster = np.cos(np.arctan(1.333))
     assert fresnel_reflectance(brewster, 1.333) == pytest.approx(((1.333**2 - 1) / (1.333**2 + 1)) ** 2 / 2)
-    assert np.all(np.diff(fresnel_reflectance(np.linspace(0, 1, 100), 1.333)) < 0)
+    assert np.all(np.diff(np.vectorize(fresnel_reflectance)(np.linspace(0, 1, 100), 1.333)) < 0)
 
 
 def test_diffuse_reflectance_of_water_is_the_mean_over_the_hemisphere(parameters):
     cosine = (np.arange(20000) + 0.5) / 20000
-    mean = np.mean(2 * cosine * fresnel_reflectance(cosine, 1.333))
+    mean = np.mean(2 * cosine * np.vectorize(fresnel_reflectance)(cosine, 1.333))
     assert parameters.kinds["rain"].film.diffuse_reflectance == pytest.approx(mean, abs=0.001)
 
 

@@ -7,7 +7,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.render.weather.coverage_field import FieldParameters, sum_waves
+from tasks.render.pixels import INLINED, LAW, new_picture, run_on_either
+from tasks.render.weather.coverage_field import FieldParameters, read_field, sum_waves
 from tasks.render.weather.random_streams import stream_key
 from tasks.render.weather.wet.road_view import RoadView
 
@@ -103,9 +104,9 @@ def water_surface(
     """
     p = parameters
     surface = WaterSurface(
-        smooth=np.zeros(view.road.shape, dtype=np.float32),
-        normal=np.zeros((*view.road.shape, 3), dtype=np.float32),
-        cosine=np.zeros(view.road.shape, dtype=np.float32),
+        smooth=new_picture(view.depth),
+        normal=new_picture(view.depth, 3),
+        cosine=new_picture(view.depth),
     )
     _water(
         view.depth, view.rays, view.normal, view.road, view.mirrors, view.T_world_camera[:3, 3], float(view.K[1, 1]),
@@ -117,6 +118,54 @@ def water_surface(
     return surface
 
 
+@numba.njit(**INLINED)
+def _place_water(row, column, depth, rays, normal, eye, focal):  # type: ignore[no-untyped-def]
+    """World x and y of a road pixel [m], its width on the road [m] and the cosine at which it is seen [1]."""
+    z, rx, ry, rz = depth[row, column], rays[row, column, 0], rays[row, column, 1], rays[row, column, 2]
+    nx, ny, nz = normal[row, column, 0], normal[row, column, 1], normal[row, column, 2]
+    stretch = sqrt(rx * rx + ry * ry + rz * rz)
+    facing = max(-(rx * nx + ry * ny + rz * nz) / stretch, 0.01)
+    return eye[0] + z * rx, eye[1] + z * ry, z * stretch / (focal * facing), min(facing, 1.0)
+
+
+@numba.njit(**INLINED)
+def _smooth_share(level, wet, texture, spread):  # type: ignore[no-untyped-def]
+    return wet * 0.5 * (1 + erf((level - texture) / (spread * sqrt(2.0))))
+
+
+@numba.njit(**INLINED)
+def _tilt_water(row, column, normal, slope, along, across, water):  # type: ignore[no-untyped-def]
+    wx = normal[row, column, 0] - slope * along
+    wy = normal[row, column, 1] - slope * across
+    wz = normal[row, column, 2]
+    length = sqrt(wx * wx + wy * wy + wz * wz)
+    water[row, column, 0] = wx / length
+    water[row, column, 1] = wy / length
+    water[row, column, 2] = wz / length
+
+
+RIPPLE_OCTAVES, RIPPLE_ROUGHNESS = 2, 0.6
+_ALONG, _ACROSS = np.uint64(1000), np.uint64(2000)
+"""What the keys of the ripples' two slopes have over that of the level."""
+
+
+@numba.njit(**LAW)
+def _water_pixel(  # type: ignore[no-untyped-def]
+    row, column, depth, rays, normal, road, mirrors, eye, focal, film, wet, texture, spread, uneven, coarsest,
+    octaves, roughness, ripple_slope, ripple, key, smooth, water, cosine,
+):  # fmt: skip
+    if not road[row, column]:
+        return
+    x, y, size, cosine[row, column] = _place_water(row, column, depth, rays, normal, eye, focal)
+    level = film + uneven * read_field(x, y, size, coarsest, octaves, roughness, key)
+    smooth[row, column] = _smooth_share(level, wet, texture, spread)
+    if mirrors[row, column]:
+        along = read_field(x, y, size, ripple, RIPPLE_OCTAVES, RIPPLE_ROUGHNESS, key + _ALONG)
+        across = read_field(x, y, size, ripple, RIPPLE_OCTAVES, RIPPLE_ROUGHNESS, key + _ACROSS)
+        _tilt_water(row, column, normal, ripple_slope, along, across, water)
+
+
+@run_on_either(_water_pixel)
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _water(  # type: ignore[no-untyped-def]
     depth, rays, normal, road, mirrors, eye, focal, film, wet, texture, spread, uneven, coarsest, octaves, roughness,
@@ -132,18 +181,9 @@ def _water(  # type: ignore[no-untyped-def]
         for column in range(width):
             if not road[row, column]:
                 continue
-            z, rx, ry, rz = (
-                depth[row, column],
-                rays[row, column, 0],
-                rays[row, column, 1],
-                rays[row, column, 2],
+            places[0, count], places[1, count], size[count], cosine[row, column] = _place_water(
+                row, column, depth, rays, normal, eye, focal
             )
-            nx, ny, nz = normal[row, column, 0], normal[row, column, 1], normal[row, column, 2]
-            stretch = sqrt(rx * rx + ry * ry + rz * rz)
-            facing = max(-(rx * nx + ry * ny + rz * nz) / stretch, 0.01)
-            places[0, count], places[1, count] = eye[0] + z * rx, eye[1] + z * ry
-            size[count] = z * stretch / (focal * facing)
-            cosine[row, column] = min(facing, 1.0)
             columns[count] = column
             count += 1
         _copy_places(count, places, turned)
@@ -151,8 +191,7 @@ def _water(  # type: ignore[no-untyped-def]
         mirroring = 0
         for i in range(count):
             column = columns[i]
-            level = film + uneven * along[i]
-            smooth[row, column] = wet * 0.5 * (1 + erf((level - texture) / (spread * sqrt(2.0))))
+            smooth[row, column] = _smooth_share(film + uneven * along[i], wet, texture, spread)
             if mirrors[row, column]:
                 places[0, mirroring], places[1, mirroring], size[mirroring] = (
                     places[0, i],
@@ -161,19 +200,11 @@ def _water(  # type: ignore[no-untyped-def]
                 )
                 columns[mirroring] = column
                 mirroring += 1
-        _copy_places(mirroring, places, turned)
-        sum_waves(mirroring, turned, size, ripple, 2, 0.6, key + np.uint64(1000), along)
-        _copy_places(mirroring, places, turned)
-        sum_waves(mirroring, turned, size, ripple, 2, 0.6, key + np.uint64(2000), across)
+        for own, out in ((_ALONG, along), (_ACROSS, across)):
+            _copy_places(mirroring, places, turned)
+            sum_waves(mirroring, turned, size, ripple, RIPPLE_OCTAVES, RIPPLE_ROUGHNESS, key + own, out)
         for i in range(mirroring):
-            column = columns[i]
-            wx = normal[row, column, 0] - ripple_slope * along[i]
-            wy = normal[row, column, 1] - ripple_slope * across[i]
-            wz = normal[row, column, 2]
-            length = sqrt(wx * wx + wy * wy + wz * wz)
-            water[row, column, 0] = wx / length
-            water[row, column, 1] = wy / length
-            water[row, column, 2] = wz / length
+            _tilt_water(row, columns[i], normal, ripple_slope, along[i], across[i], water)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.render.environment import sample_panorama
+from tasks.render.pixels import INLINED, LAW, new_picture, run_on_either
 from tasks.render.weather.wet.road_view import RoadView
 
 STEPS = 26
@@ -49,7 +50,7 @@ def mirrored_scene(
     -------
     float32 [H, W, 3] radiance; 0 elsewhere [1]
     """
-    out = np.zeros_like(picture)
+    out = new_picture(picture, 3)
     K = view.K
     R = np.ascontiguousarray(view.T_world_camera[:3, :3], dtype=np.float32)
     camera = np.array((K[0, 0], K[1, 1], K[0, 2], K[1, 2]), dtype=np.float32)
@@ -60,27 +61,27 @@ def mirrored_scene(
     return out
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LAW)
 def _gap(u, v, z, depth):  # type: ignore[no-untyped-def]
     """Return the distance of a point of the ray behind the surface seen at its pixel [m]; negative in front of it."""
     surface = depth[int(v), int(u)]
     return z - surface if surface == surface else np.float32(-1e9)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _blend_pixel(picture, u, v, out):  # type: ignore[no-untyped-def]
+@numba.njit(**INLINED)
+def _blend_pixel(picture, u, v, c):  # type: ignore[no-untyped-def]
+    """Return one channel of the picture between the centres of four pixels."""
     height, width = picture.shape[:2]
     x = min(max(u - np.float32(0.5), np.float32(0)), np.float32(width - 1.001))
     y = min(max(v - np.float32(0.5), np.float32(0)), np.float32(height - 1.001))
     c0, r0 = int(x), int(y)
     tx, ty = x - c0, y - r0
-    for c in range(3):
-        above = (1 - tx) * picture[r0, c0, c] + tx * picture[r0, c0 + 1, c]
-        below = (1 - tx) * picture[r0 + 1, c0, c] + tx * picture[r0 + 1, c0 + 1, c]
-        out[c] = (1 - ty) * above + ty * below
+    above = (1 - tx) * picture[r0, c0, c] + tx * picture[r0, c0 + 1, c]
+    below = (1 - tx) * picture[r0 + 1, c0, c] + tx * picture[r0 + 1, c0 + 1, c]
+    return np.float32((1 - ty) * above + ty * below)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LAW)
 def _place(origin, direction, t, camera):  # type: ignore[no-untyped-def]
     """Return pixel coordinates and camera z of a point of the ray."""
     z = origin[2] + t * direction[2]
@@ -90,7 +91,7 @@ def _place(origin, direction, t, camera):  # type: ignore[no-untyped-def]
     return u, v, z
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LAW)
 def _beyond_edge(origin, direction, t, u, v, depth, camera):  # type: ignore[no-untyped-def]
     """Return u, v, t and weight where a ray that left the picture meets the extended surface at the edge (u, v)."""
     height, width = depth.shape
@@ -105,7 +106,7 @@ def _beyond_edge(origin, direction, t, u, v, depth, camera):  # type: ignore[no-
     return edge_u, edge_v, t, np.float32(exp(-beyond / (EDGE_FADE * height)))
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LAW)
 def _march(origin, direction, climb, depth, camera):  # type: ignore[no-untyped-def]
     """Follow a ray through the depth picture; return pixel (u, v) and length t where it meets a surface, and a weight.
 
@@ -146,36 +147,65 @@ def _march(origin, direction, climb, depth, camera):  # type: ignore[no-untyped-
     return hidden_u, hidden_v, hidden_t, np.float32(hidden)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**INLINED)
+def _turn(R, vector):  # type: ignore[no-untyped-def]
+    """Return a vector of the world in camera axes."""
+    x = R[0, 0] * vector[0] + R[1, 0] * vector[1] + R[2, 0] * vector[2]
+    y = R[0, 1] * vector[0] + R[1, 1] * vector[1] + R[2, 1] * vector[2]
+    z = R[0, 2] * vector[0] + R[1, 2] * vector[1] + R[2, 2] * vector[2]
+    return x, y, z
+
+
+@numba.njit(**INLINED)
+def _mirror_pixel(  # type: ignore[no-untyped-def]
+    row, column, picture, depth, normal, mirrors, environment, R, camera, extinction, airlight, out
+):
+    if not mirrors[row, column]:
+        return
+    z = depth[row, column]
+    origin = (
+        np.float32((column + np.float32(0.5) - camera[2]) / camera[0] * z),
+        np.float32((row + np.float32(0.5) - camera[3]) / camera[1] * z),
+        z,
+    )
+    away = np.float32(sqrt(origin[0] * origin[0] + origin[1] * origin[1] + z * z))
+    ahead = (origin[0] / away, origin[1] / away, z / away)
+    up = _turn(R, normal[row, column])
+    facing = ahead[0] * up[0] + ahead[1] * up[1] + ahead[2] * up[2]
+    direction = (
+        np.float32(ahead[0] - 2 * facing * up[0]),
+        np.float32(ahead[1] - 2 * facing * up[1]),
+        np.float32(ahead[2] - 2 * facing * up[2]),
+    )
+    u, v, t, belief = _march(origin, direction, -facing, depth, camera)
+    if belief < 1:
+        x = R[0, 0] * direction[0] + R[0, 1] * direction[1] + R[0, 2] * direction[2]
+        y = R[1, 0] * direction[0] + R[1, 1] * direction[1] + R[1, 2] * direction[2]
+        z = R[2, 0] * direction[0] + R[2, 1] * direction[1] + R[2, 2] * direction[2]
+        sample_panorama(environment, x, y, z, out[row, column])
+    through = np.float32(exp(-extinction * t))
+    for c in range(3):
+        colour = _blend_pixel(picture, u, v, c) if belief > 0 else np.float32(0)
+        seen = through * colour + (1 - through) * airlight[c]
+        out[row, column, c] = belief * seen + (1 - belief) * out[row, column, c]
+
+
+@run_on_either(_mirror_pixel)
+@numba.njit(**LAW)
 def _mirror(picture, depth, normal, mirrors, environment, R, camera, extinction, airlight, out):  # type: ignore[no-untyped-def]
-    height, width = depth.shape
-    origin, direction = np.zeros(3, dtype=np.float32), np.zeros(3, dtype=np.float32)
-    colour, sky = np.zeros(3, dtype=np.float32), np.zeros(3, dtype=np.float32)
-    for row in range(height):
-        for column in range(width):
-            if not mirrors[row, column]:
-                continue
-            z = depth[row, column]
-            origin[0] = (column + np.float32(0.5) - camera[2]) / camera[0] * z
-            origin[1] = (row + np.float32(0.5) - camera[3]) / camera[1] * z
-            origin[2] = z
-            away = np.float32(sqrt(origin[0] ** 2 + origin[1] ** 2 + z * z))
-            up = normal[row, column]
-            facing = np.float32(0)
-            for i in range(3):
-                facing += origin[i] / away * (R[0, i] * up[0] + R[1, i] * up[1] + R[2, i] * up[2])
-            for i in range(3):
-                across = R[0, i] * up[0] + R[1, i] * up[1] + R[2, i] * up[2]
-                direction[i] = origin[i] / away - 2 * facing * across
-            u, v, t, belief = _march(origin, direction, -facing, depth, camera)
-            if belief < 1:
-                x = R[0, 0] * direction[0] + R[0, 1] * direction[1] + R[0, 2] * direction[2]
-                y = R[1, 0] * direction[0] + R[1, 1] * direction[1] + R[1, 2] * direction[2]
-                z = R[2, 0] * direction[0] + R[2, 1] * direction[1] + R[2, 2] * direction[2]
-                sample_panorama(environment, x, y, z, sky)
-            if belief > 0:
-                _blend_pixel(picture, u, v, colour)
-            through = np.float32(exp(-extinction * t))
-            for c in range(3):
-                seen = through * colour[c] + (1 - through) * airlight[c]
-                out[row, column, c] = belief * seen + (1 - belief) * sky[c]
+    for row in range(depth.shape[0]):
+        for column in range(depth.shape[1]):
+            _mirror_pixel(
+                row,
+                column,
+                picture,
+                depth,
+                normal,
+                mirrors,
+                environment,
+                R,
+                camera,
+                extinction,
+                airlight,
+                out,
+            )

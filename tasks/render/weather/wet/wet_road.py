@@ -8,13 +8,22 @@ Refraction moves the texture below by under a tenth of a pixel at 480x320: it is
 from dataclasses import dataclass, replace
 from math import sqrt
 
-import cv2
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.render.composition import LUMINANCE
+from tasks.render.pixels import (
+    INLINED,
+    LAW,
+    blur,
+    bring_to_host,
+    find_classes,
+    find_namespace,
+    new_picture,
+    run_on_either,
+)
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.weather.falling.particles import Shutter
 from tasks.render.weather.falling.precipitation import Population
@@ -102,15 +111,15 @@ def fresnel_reflectance(cosine, refractive_index):  # type: ignore[no-untyped-de
 
     Parameters
     ----------
-    cosine : number or array, cosine of the angle of incidence, in air [1]
+    cosine : cosine of the angle of incidence, in air [1]
     refractive_index : of the medium below [1]
 
     Returns
     -------
-    number or array, reflectance [1]
+    float, reflectance [1]
     """
     n = refractive_index
-    inside = np.sqrt(n * n - 1 + cosine * cosine)
+    inside = sqrt(n * n - 1 + cosine * cosine)
     across = (cosine - inside) / (cosine + inside)
     along = (n * n * cosine - inside) / (n * n * cosine + inside)
     return (across * across + along * along) / 2
@@ -163,14 +172,15 @@ def wet_layer(
     """
     p, sky = film.parameters, light.sky
     focal_px = float(shutter.K[1, 1])
-    road, share = soften_mask(np.isin(gbuffer.class_id, ROAD_CLASSES) & (gbuffer.alpha > 0.5))
-    road &= np.isfinite(gbuffer.depth)  # a single pixel of sky between those of a road mirrors nothing
+    xp = find_namespace(picture)
+    road, share = soften_mask(find_classes(gbuffer.class_id, ROAD_CLASSES) & (gbuffer.alpha > 0.5))
+    road &= xp.isfinite(gbuffer.depth)  # a single pixel of sky between those of a road mirrors nothing
     window = 2 * round(p.normal_window * shutter.height / 2) + 1
     # a slope s along the line of sight turns the mirrored ray by 2 s: a lobe is as high as its slopes, and
     # narrow across at grazing angles
     struck_slope = compute_struck_slope(film.rate_mm_h, p.water)
     smooth_reach, rough_reach = (round(slope * focal_px) for slope in (struck_slope, p.rough_slope))
-    mirrors = road.copy()
+    mirrors = xp.asarray(road, copy=True)
     if smooth_reach >= LEAST_REACH:
         mirrors[1::2] &= ~road[: shutter.height // 2 * 2 : 2]
     view = RoadView(
@@ -190,8 +200,8 @@ def wet_layer(
         average_over_lobe(mirrored, view, reach, slope * focal_px * water.cosine)
         for reach, slope in ((smooth_reach, struck_slope), (rough_reach, p.rough_slope))
     )
-    gain = np.ones((*road.shape, 1), dtype=np.float32)
-    add = np.zeros_like(picture)
+    gain, add = new_picture(picture, 1), new_picture(picture, 3)
+    gain += 1
     drained = soaked_share(gbuffer, road)
     _wet(
         picture, road, drained, water.smooth, water.cosine, sharp, rough, compute_wetness(film.depth_mm, p.water),
@@ -203,9 +213,8 @@ def wet_layer(
         below = see_through_film(picture, view, shift) - picture
         add += gain * water.smooth[..., None] * below
     if p.impacts is not None and film.falling is not None:
-        struck = visible_impacts(
-            film.falling, p.impacts, shutter, gbuffer.depth, road, water.smooth, film.seed
-        )
+        seen = (bring_to_host(one) for one in (gbuffer.depth, road, water.smooth))
+        struck = visible_impacts(film.falling, p.impacts, shutter, *seen, film.seed)
         bright = np.broadcast_to(p.impacts.light * sky.white, (len(struck), 3))
         splashed = draw_streaks(struck, bright, gbuffer.depth, shutter.K, 0.0)
         _cover_where(splashed.alpha, splashed.rgb, gain, add)
@@ -225,8 +234,9 @@ def soften_mask(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.
     share : float32 [H, W] rising from a half at its edge to 1; 0 outside
     """
     width = 2 * round(EDGE_WINDOW * len(mask) / 2) + 1
-    smooth = cv2.blur(mask.astype(np.float32), (width, width)) > 0.5
-    return smooth, np.where(smooth, cv2.blur(smooth.astype(np.float32), (3, 3)), np.float32(0))
+    xp = find_namespace(mask)
+    smooth = blur(xp.asarray(mask, dtype=xp.float32), width) > 0.5
+    return smooth, xp.where(smooth, blur(xp.asarray(smooth, dtype=xp.float32), 3), 0.0)
 
 
 def soaked_share(gbuffer: GBuffer, road: NDArray[np.bool_]) -> NDArray[np.float32]:
@@ -241,11 +251,12 @@ def soaked_share(gbuffer: GBuffer, road: NDArray[np.bool_]) -> NDArray[np.float3
     -------
     float32 [H, W] share; 0 on the road [1]
     """
-    facing = np.clip(gbuffer.normal[..., 2] / STEEPEST_SOAKED, 0, 1)
-    drained = np.isin(gbuffer.class_id, DRAINED_CLASSES)
+    xp = find_namespace(road)
+    facing = xp.clip(gbuffer.normal[..., 2] / STEEPEST_SOAKED, 0, 1)
+    drained = find_classes(gbuffer.class_id, DRAINED_CLASSES)
     # the outline of what stands on wet ground shows ground in part
-    soaked = cv2.blur(np.where(drained, facing, np.float32(0)), (3, 3))
-    return np.where(road, np.float32(0), soaked)
+    soaked = blur(xp.where(drained, facing, 0.0), 3)
+    return xp.where(road, 0.0, soaked)
 
 
 EDGE_WINDOW = 0.014
@@ -261,9 +272,9 @@ ALBEDO_RANGE = (0.02, 0.9)
 """Reflectances that a road's own paint and stone can have; beyond them it is the light that was misread."""
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _wet(  # type: ignore[no-untyped-def]
-    picture, road, drained, smooth, cosine, sharp, rough, wet, ripple_slope, rough_slope, index, diffuse,
+@numba.njit(**INLINED)
+def _wet_pixel(  # type: ignore[no-untyped-def]
+    row, column, picture, road, drained, smooth, cosine, sharp, rough, wet, ripple_slope, rough_slope, index, diffuse,
     to_albedo, on_road, gain, add,
 ):  # fmt: skip
     """Mirror lobes of smooth water and of wet texture over the darkened road.
@@ -273,73 +284,99 @@ def _wet(  # type: ignore[no-untyped-def]
     At the road's edge a pixel is road in part.
     """
     one = np.float32(1)
+    soaked = wet if road[row, column] else wet * drained[row, column]
+    if soaked <= 0:
+        return
+    albedo = 0.0
+    for c in range(3):
+        albedo += to_albedo[c] * picture[row, column, c]
+    albedo = min(max(albedo, ALBEDO_RANGE[0]), ALBEDO_RANGE[1])
+    darker = 1 - soaked * (1 - wet_albedo_ratio(albedo, index, diffuse))
+    if not road[row, column]:
+        gain[row, column, 0] = darker
+        return
+    share, steep = smooth[row, column], cosine[row, column] * cosine[row, column]
+    mirror = share * fresnel_reflectance(min(1.0, sqrt(steep + ripple_slope * ripple_slope)), index)
+    sheen = (wet - share) * fresnel_reflectance(min(1.0, sqrt(steep + rough_slope * rough_slope)), index)
+    part = on_road[row, column]
+    gain[row, column, 0] = one - part * (one - np.float32((1 - mirror - sheen) * darker))
+    for c in range(3):
+        mirrored = mirror * sharp[row, column, c] + sheen * rough[row, column, c]
+        add[row, column, c] = np.float32(mirrored) * part
+
+
+@run_on_either(_wet_pixel)
+@numba.njit(**LAW)
+def _wet(  # type: ignore[no-untyped-def]
+    picture, road, drained, smooth, cosine, sharp, rough, wet, ripple_slope, rough_slope, index, diffuse,
+    to_albedo, on_road, gain, add,
+):  # fmt: skip
     for row in range(road.shape[0]):
         for column in range(road.shape[1]):
-            soaked = wet if road[row, column] else wet * drained[row, column]
-            if soaked <= 0:
-                continue
-            albedo = 0.0
-            for c in range(3):
-                albedo += to_albedo[c] * picture[row, column, c]
-            albedo = min(max(albedo, ALBEDO_RANGE[0]), ALBEDO_RANGE[1])
-            darker = 1 - soaked * (1 - wet_albedo_ratio(albedo, index, diffuse))
-            if not road[row, column]:
-                gain[row, column, 0] = darker
-                continue
-            share, steep = smooth[row, column], cosine[row, column] ** 2
-            mirror = share * fresnel_reflectance(min(1.0, sqrt(steep + ripple_slope**2)), index)
-            sheen = (wet - share) * fresnel_reflectance(min(1.0, sqrt(steep + rough_slope**2)), index)
-            part = on_road[row, column]
-            gain[row, column, 0] = one - part * (one - np.float32((1 - mirror - sheen) * darker))
-            for c in range(3):
-                mirrored = mirror * sharp[row, column, c] + sheen * rough[row, column, c]
-                add[row, column, c] = np.float32(mirrored) * part
+            _wet_pixel(
+                row, column, picture, road, drained, smooth, cosine, sharp, rough, wet, ripple_slope, rough_slope,
+                index, diffuse, to_albedo, on_road, gain, add,
+            )  # fmt: skip
 
 
 def _road_normals(normal: NDArray[np.float32], road: NDArray[np.bool_], window: int) -> NDArray[np.float32]:
     """Road normals averaged over a window of the road alone; up where there is no road."""
-    mean = np.zeros(normal.shape, dtype=np.float32)
+    mean = new_picture(normal, 3)
     mean[..., 2] = 1
-    rows = np.flatnonzero(road.any(axis=1))
+    rows = np.flatnonzero(bring_to_host(road.any(1)))
     if len(rows):
         # the window reaches no further than this; a road fills half of the picture at most
         near = slice(max(rows[0] - window, 0), rows[-1] + window + 1)
-        on_road = np.zeros_like(normal[near])
+        on_road = new_picture(normal[near], 3)
         _copy_where(road[near], normal[near], on_road)
-        _normalise_where(road[near], cv2.blur(on_road, (window, window)), mean[near])
+        _normalise_where(road[near], blur(on_road, window), mean[near])
     return mean
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _cover_where(alpha, light, gain, add):  # type: ignore[no-untyped-def]
+@numba.njit(**INLINED)
+def _cover_pixel(row, column, alpha, light, gain, add):  # type: ignore[no-untyped-def]
     """Put what hides a share of the layer before it."""
+    if alpha[row, column] > 0:
+        through = 1 - alpha[row, column]
+        gain[row, column, 0] *= through
+        for c in range(3):
+            add[row, column, c] = through * add[row, column, c] + light[row, column, c]
+
+
+@run_on_either(_cover_pixel)
+@numba.njit(**LAW)
+def _cover_where(alpha, light, gain, add):  # type: ignore[no-untyped-def]
     for row in range(alpha.shape[0]):
         for column in range(alpha.shape[1]):
-            if alpha[row, column] > 0:
-                through = 1 - alpha[row, column]
-                gain[row, column, 0] *= through
-                for c in range(3):
-                    add[row, column, c] = through * add[row, column, c] + light[row, column, c]
+            _cover_pixel(row, column, alpha, light, gain, add)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**INLINED)
+def _copy_pixel(row, column, road, normal, out):  # type: ignore[no-untyped-def]
+    if road[row, column]:
+        for c in range(3):
+            out[row, column, c] = normal[row, column, c]
+
+
+@run_on_either(_copy_pixel)
+@numba.njit(**LAW)
 def _copy_where(road, normal, out):  # type: ignore[no-untyped-def]
     for row in range(road.shape[0]):
         for column in range(road.shape[1]):
-            if road[row, column]:
-                for c in range(3):
-                    out[row, column, c] = normal[row, column, c]
+            _copy_pixel(row, column, road, normal, out)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**INLINED)
+def _normalise_pixel(row, column, road, normal, out):  # type: ignore[no-untyped-def]
+    if road[row, column]:
+        x, y, z = normal[row, column, 0], normal[row, column, 1], normal[row, column, 2]
+        length = sqrt(x * x + y * y + z * z)
+        out[row, column, 0], out[row, column, 1], out[row, column, 2] = x / length, y / length, z / length
+
+
+@run_on_either(_normalise_pixel)
+@numba.njit(**LAW)
 def _normalise_where(road, normal, out):  # type: ignore[no-untyped-def]
     for row in range(road.shape[0]):
         for column in range(road.shape[1]):
-            if road[row, column]:
-                x, y, z = normal[row, column, 0], normal[row, column, 1], normal[row, column, 2]
-                length = np.sqrt(x * x + y * y + z * z)
-                out[row, column, 0], out[row, column, 1], out[row, column, 2] = (
-                    x / length,
-                    y / length,
-                    z / length,
-                )
+            _normalise_pixel(row, column, road, normal, out)

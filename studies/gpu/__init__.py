@@ -1,0 +1,1 @@
+"""Clips on a GPU: agreement with the processor, and time."""
