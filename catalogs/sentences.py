@@ -119,7 +119,7 @@ def _describe_rule(problem: Any, known: Callable[[KeyPath], Iterable[str]]) -> s
 
 
 def _suggest_form(rule: str, value: object) -> str:
-    """Return what to write in place of a number given as text, or the reverse; empty where nobody can tell."""
+    """Return what to write in place of a number given as text, or the reverse; empty where that is not clear."""
     if rule == "string_type" and isinstance(value, bool | int | float):
         return ": put it in quotes"
     if rule not in {"float_type", "int_type"} or not isinstance(value, str):

@@ -14,7 +14,7 @@ VARIANTS: dict[Variant, str] = {
 
 
 def warn_of_variant(variant: Variant) -> str:
-    """Return the sentence that tells a dataset with a cut coupling from a sound one; empty where nothing is cut.
+    """Return the sentence that marks a dataset with a cut coupling; empty where nothing is cut.
 
     Parameters
     ----------

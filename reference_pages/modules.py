@@ -90,7 +90,7 @@ PAGES: dict[str, tuple[str, str, tuple[str, ...]]] = {
             "studies.evaluation.metrics.road_edit",
             "studies.evaluation.metrics.severity",
             "tasks.eval.image_quality",
-            "tasks.eval.physics.laws",
+            "studies.physics_judge.laws.law",
         ),
     ),
     "measured-runs": (

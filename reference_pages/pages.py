@@ -7,11 +7,10 @@ from reference_pages import (
     campaign_checks,
     catalogues,
     commands,
-    effects,
-    fmu,
     grids,
     modules,
     schema,
+    vehicle,
     verdict_rules,
 )
 
@@ -23,7 +22,7 @@ WRITERS: dict[str, Callable[[], str]] = {
 """Pages, by their path below ``docs/``."""
 TABLES: dict[str, Callable[[], str]] = {
     name: write
-    for module in (campaign_checks, commands, effects, fmu, grids, schema, verdict_rules)
+    for module in (campaign_checks, commands, grids, schema, vehicle, verdict_rules)
     for name, write in module.TABLES.items()
 }
 """Tables of pages that people write, by the name under which a page asks for them."""

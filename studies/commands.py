@@ -2,6 +2,8 @@
 
 from collections import Counter
 
+from flows.commands.audits import GROUP as AUDITS
+from flows.commands.audits import VERIFIED
 from flows.commands.command import (
     CAMPAIGN_VEHICLE,
     DATASET,
@@ -28,6 +30,7 @@ WIDE_COLUMNS = {
     "rate_correlation",
     "no_dive_rmse",
 }
+LAW_COLUMNS = ("label", "passed", "laws", "column", "tightest", "not_judged")
 BUMP_FIGURES = ("rate_rmse", "rate_rms", "rate_correlation", "vertical_correlation", "peak_pitch")
 
 
@@ -71,7 +74,21 @@ def shorten_controls(result: Result) -> Result:
     return {key: result[key] for key in ("all_detected", "undetected")} | {"controls": controls}
 
 
+def shorten_law_rows(result: Result) -> Result:
+    """Return the result of a physics audit with the main columns of each clip."""
+    return result | {"clips": [{key: row[key] for key in LAW_COLUMNS} for row in result["clips"]]}
+
+
 COMMANDS = (
+    Command(
+        name="lab audit-physics",
+        group=AUDITS,
+        sentence="Compute every telemetry column and pose again; name law, tick, size and column of each break.",
+        function="studies.physics_judge.audit_physics:audit_physics",
+        options=(DATASET, OUT),
+        brief=shorten_law_rows,
+        passed=VERIFIED,
+    ),
     Command(
         name="lab brake-protocol",
         group=MEASURED,
@@ -281,9 +298,9 @@ COMMANDS = (
             define_option(
                 "brake",
                 list[str] | None,
-                "blind, friction or driver; by default each.",
+                "blind, friction, driver or picture; by default each but picture.",
                 None,
-                known=("blind", "friction", "driver"),
+                known=("blind", "friction", "driver", "picture"),
             ),
             define_option(
                 "policy",

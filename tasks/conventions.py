@@ -53,6 +53,15 @@ class Channel:
     standard_name: str = ""
 
 
+def _add_percentiles(name: str, unit: str, symbol: str, description: str) -> tuple[Channel, ...]:
+    """Return the channels of a figure's percentiles."""
+    bounds = "under the paper's bounds of the surface parameters (Appendix E)"
+    return tuple(
+        Channel(name=f"{name}_{short}", unit=unit, symbol=symbol, description=f"{title}, {bounds}, of: {description}")
+        for short, title in (("p05", "5th percentile"), ("p50", "median"), ("p95", "95th percentile"))
+    )  # fmt: skip
+
+
 TICK_CHANNELS: tuple[Channel, ...] = (
     Channel(name="t_ns", unit="ns", symbol="t", description="time since the start of the clip", standard_name="time"),
     Channel(name="station", unit="m", symbol="s", description="front-axle route coordinate"),
@@ -117,15 +126,9 @@ CLIP_CHANNELS: tuple[Channel, ...] = (
     Channel(name="stop_time", unit="s", symbol="t_s", description="time of the stop since the start of the clip"),
     Channel(name="stopping_distance", unit="m", symbol="d_stop", description="distance from brake onset to the stop"),
     Channel(name="peak_pitch", unit="rad", symbol="", description="largest nose-down pitch of the clip"),
-    Channel(name="surface_friction_p05", unit="1", symbol="mu_c", description="5th percentile, under the paper's bounds of the surface parameters (Appendix E), of: reference surface coefficient"),
-    Channel(name="surface_friction_p50", unit="1", symbol="mu_c", description="median, under the paper's bounds of the surface parameters (Appendix E), of: reference surface coefficient"),
-    Channel(name="surface_friction_p95", unit="1", symbol="mu_c", description="95th percentile, under the paper's bounds of the surface parameters (Appendix E), of: reference surface coefficient"),
-    Channel(name="stopping_distance_p05", unit="m", symbol="d_stop", description="5th percentile, under the paper's bounds of the surface parameters (Appendix E), of: distance from brake onset to the stop; null where the clip ends before it"),
-    Channel(name="stopping_distance_p50", unit="m", symbol="d_stop", description="median, under the paper's bounds of the surface parameters (Appendix E), of: distance from brake onset to the stop; null where the clip ends before it"),
-    Channel(name="stopping_distance_p95", unit="m", symbol="d_stop", description="95th percentile, under the paper's bounds of the surface parameters (Appendix E), of: distance from brake onset to the stop; null where the clip ends before it"),
-    Channel(name="peak_pitch_p05", unit="rad", symbol="", description="5th percentile, under the paper's bounds of the surface parameters (Appendix E), of: largest nose-down pitch of the clip"),
-    Channel(name="peak_pitch_p50", unit="rad", symbol="", description="median, under the paper's bounds of the surface parameters (Appendix E), of: largest nose-down pitch of the clip"),
-    Channel(name="peak_pitch_p95", unit="rad", symbol="", description="95th percentile, under the paper's bounds of the surface parameters (Appendix E), of: largest nose-down pitch of the clip"),
+    *_add_percentiles("surface_friction", "1", "mu_c", "reference surface coefficient"),
+    *_add_percentiles("stopping_distance", "m", "d_stop", "distance from brake onset to the stop; null where the clip ends before it"),
+    *_add_percentiles("peak_pitch", "rad", "", "largest nose-down pitch of the clip"),
     Channel(name="wheel_lift_time_f", unit="s", symbol="", description="time for which the front axle is off the road; above 0 the unilateral contact acts, and the sum of road and brake response (paper mode) is an approximation"),
     Channel(name="wheel_lift_time_r", unit="s", symbol="", description="time for which the rear axle is off the road; above 0 the unilateral contact acts, and the sum of road and brake response (paper mode) is an approximation"),
     Channel(name="peak_deceleration", unit="m s-2", symbol="", description="largest deceleration of the clip; 0 where the car never slows down"),
@@ -138,6 +141,10 @@ CLIP_CHANNELS: tuple[Channel, ...] = (
     Channel(name="min_ttc", unit="s", symbol="", description="smallest time to collision, gap over closing speed, with a road user in the path; 0 where one was met, null where no gap closed"),
     Channel(name="clearance", unit="m", symbol="", description="smallest gap from the front to a road user in the path; 0 where one was met, null where none was in the path"),
     Channel(name="avoided_speed", unit="m s-1", symbol="", description="impact speed of a car that keeps its speed, less impact_speed; null for tracks by world_m"),
+    *_add_percentiles("impact_speed", "m s-1", "", "impact_speed; a policy's pressures stay those that it asked for"),
+    *_add_percentiles("min_ttc", "s", "", "min_ttc"),
+    *_add_percentiles("clearance", "m", "", "clearance"),
+    *_add_percentiles("avoided_speed", "m s-1", "", "avoided_speed"),
     Channel(name="static_pitch", unit="rad", symbol="theta_0", description="pitch of the resting body, not contained in the pitch column"),
 )  # fmt: skip
 
@@ -153,7 +160,7 @@ IDENTITY_CHANNELS: tuple[Channel, ...] = (
 )  # fmt: skip
 
 CHECK_CHANNELS: tuple[Channel, ...] = (
-    Channel(name="quarantined", unit="", symbol="", description="the pose check failed: kept and told, left out of training windows unless asked for"),
+    Channel(name="quarantined", unit="", symbol="", description="the pose check failed: kept and marked, left out of training windows unless asked for"),
     Channel(name="check_method", unit="", symbol="", description="pose check that judged the finished frames"),
     Channel(name="check_passed", unit="", symbol="", description="every judged figure keeps its threshold; null without frames, and where the check sees too little to judge (check_method is set)"),
     Channel(name="check_pitch_rmse_deg", unit="deg", symbol="", description="RMSE of recovered against claimed pitch, both from frame 0"),
@@ -188,11 +195,11 @@ PAIR_CHANNELS: tuple[Channel, ...] = (
 OBJECT_CHANNELS: tuple[Channel, ...] = (
     Channel(name="object", unit="1", symbol="", description="number of the road user in its clip, from 1 on, and in the array of instances"),
     Channel(name="kind", unit="", symbol="", description="kind of the road user"),
-    Channel(name="box_left", unit="px", symbol="", description="left edge of the pixels that show it; null where none does, as the other edges"),
+    Channel(name="box_left", unit="px", symbol="", description="left edge of the pixels that show it; null where none does, as the other edges, and in tables of frames that are not stored"),
     Channel(name="box_top", unit="px", symbol="", description="upper edge of these pixels"),
     Channel(name="box_right", unit="px", symbol="", description="right edge of these pixels, behind the last"),
     Channel(name="box_bottom", unit="px", symbol="", description="lower edge of these pixels, behind the last"),
-    Channel(name="visible_pixels", unit="1", symbol="", description="number of these pixels"),
+    Channel(name="visible_pixels", unit="1", symbol="", description="number of these pixels; 0 in tables of frames that are not stored"),
     Channel(name="visibility", unit="1", symbol="", description="share of its surface towards the camera, inside the picture, that nothing else hides; null where none is inside"),
     Channel(name="truncation", unit="1", symbol="", description="share of its surface towards the camera that lies outside the picture"),
     Channel(name="size", unit="m", symbol="", description="length, width and height of its box"),

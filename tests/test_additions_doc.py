@@ -82,7 +82,7 @@ def test_the_diff_of_an_addition_applies_to_the_source_and_has_as_many_files_as_
 def test_a_source_with_all_additions_drives_generates_audits_and_exports_and_reads_an_older_dataset(tmp_path):
     """What it must do stands in ``tests.grown_tree``, which runs in the copy that the diffs changed."""
     tree, work = tmp_path / "tree", tmp_path / "work"
-    for package in (*SOURCE_PACKAGES, "musync", "tests"):
+    for package in (*SOURCE_PACKAGES, "musync", "studies", "tests"):
         shutil.copytree(SOURCE_ROOT / package, tree / package, ignore=shutil.ignore_patterns("__pycache__"))
     work.mkdir()
     grid = write_toy_grid(work, GRID)

@@ -34,7 +34,7 @@ def _assume(name: str) -> Any:
 
 
 class RunTolerances(CatalogueEntry):
-    """One-sigma doubts about a single run."""
+    """One-sigma tolerances of a single run."""
 
     initial_speed_m_s: Sigma = _assume("initial_speed_m_s")
     friction: Share = _assume("friction")
@@ -43,7 +43,7 @@ class RunTolerances(CatalogueEntry):
 
 
 class Tolerances(CatalogueEntry):
-    """One-sigma doubts about a session, relative save the grade."""
+    """One-sigma tolerances of a session, relative but for the grade."""
 
     pressure_gain: Share = _assume("pressure_gain")
     mass: Share = _assume("mass")

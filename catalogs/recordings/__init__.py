@@ -124,7 +124,7 @@ def summarise_signals(path: Path, channel_map: ChannelMap | None) -> list[Signal
     Parameters
     ----------
     path : a file of one of the forms, or a ROS 2 bag folder
-    channel_map : tells the clock of tables, and the form of text; None if there is no map yet
+    channel_map : gives the clock of tables, and the form of text; None if there is no map yet
 
     Raises
     ------

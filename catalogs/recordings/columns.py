@@ -113,7 +113,7 @@ def _advise(wrong: pd.Series, where: NDArray[np.bool_], spelling: Spelling) -> s
     if grouped.all() and not broken.all():
         return f'give csv: {{thousands: "{mark[-1]}"}} in the map'
     if grouped.all():
-        # 1,066 is 1066, or 1.066: other numbers of the column tell it where there are any
+        # 1,066 is 1066, or 1.066: other numbers of the column show which
         return (
             f'give csv: {{thousands: "{mark[-1]}"}} in the map where the mark parts thousands, and decimal:'
             f" '{mark[-1]}' where it begins a fraction"
@@ -182,7 +182,7 @@ def read_clock(
 
 def _parse_dates(text: pd.Series) -> pd.Series:
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of the order of day and month, which a day's log does not tell
+        warnings.simplefilter("ignore")  # of the order of day and month, which a day's log does not show
         try:
             return pd.to_datetime(text, utc=True, format="ISO8601")
         except ValueError:

@@ -60,7 +60,7 @@ class Form:
     Parameters
     ----------
     read : returns the signals of a file that a map names
-    summarise : returns a row for each signal of a file; a map, if there is one, tells the clock and the form of text
+    summarise : returns a row for each signal of a file; a map, if there is one, gives the clock and the form of text
     """
 
     read: Callable[[Path, ChannelMap], dict[str, Signal]]

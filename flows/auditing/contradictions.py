@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from catalogs.documents import parse_json
-from catalogs.sentences import shorten
+from catalogs.sentences import cap_problems, shorten
 from flows.auditing.grid_again import find_grid_contradictions
 from flows.auditing.stored_frames import compare_frame_metadata, compare_sheet
 from flows.auditing.stored_tables import compare_tables
@@ -32,8 +32,6 @@ from tasks.conventions import ESSENTIAL
 from tasks.errors import InputError
 
 GRID = "inputs/grid.json"
-SHOWN = 8
-"""Sentences about one kind of contradiction."""
 
 
 def find_contradictions(
@@ -80,12 +78,7 @@ def find_contradictions(
             )
         else:
             others.append(path)
-    sentences = [
-        sentence
-        for kind in found
-        for sentence in [*kind[:SHOWN], *([f"and {len(kind) - SHOWN} more"] if len(kind) > SHOWN else [])]
-    ]
-    return sentences, others
+    return [sentence for kind in found for sentence in cap_problems(kind)], others
 
 
 def list_remade(plan: Plan) -> list[str]:

@@ -1,7 +1,5 @@
 """Commands that compare a dataset with its manifest, its physical laws, and other datasets."""
 
-from typing import Any
-
 from flows.commands.command import (
     DATASET,
     OUT,
@@ -17,12 +15,6 @@ KEY = define_option(
     "key", str | None, "File with the signer's Ed25519 public key (PEM), to check the signature.", None
 )
 VERIFIED = require_key("verified")
-LAW_COLUMNS = ("label", "passed", "laws", "column", "tightest", "not_judged")
-
-
-def shorten_law_rows(result: dict[str, Any]) -> dict[str, Any]:
-    """Return the result of a physics audit with the main columns of each clip."""
-    return result | {"clips": [{key: row[key] for key in LAW_COLUMNS} for row in result["clips"]]}
 
 
 COMMANDS = (
@@ -87,15 +79,6 @@ COMMANDS = (
             ),
             define_option("dry_run", bool, "List these files and remove nothing.", False),
         ),
-    ),
-    Command(
-        name="lab audit-physics",
-        group=GROUP,
-        sentence="Compute every telemetry column and pose again; name law, tick, size and column of each break.",
-        function="flows.auditing.physics:audit_physics",
-        options=(DATASET, OUT),
-        brief=shorten_law_rows,
-        passed=VERIFIED,
     ),
     Command(
         name="lab diff",

@@ -120,7 +120,7 @@ def select_keys(*keys: str) -> Callable[[Result], Result]:
 
 
 def require_key(key: str) -> Callable[[Result], bool]:
-    """Return a function that tells whether this value of a result is true."""
+    """Return a function that returns whether this value of a result is true."""
     return lambda result: bool(result[key])
 
 

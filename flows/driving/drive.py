@@ -103,7 +103,7 @@ def _drive_clips(
         for label, scenario in grid.scenarios:
             simulator = Simulator(
                 replace(scenario, scene=scenario.scene or settings.scene), vehicle=entries.vehicle,
-                surface=entries.surface, rate_hz=rate_hz, duration_s=settings.telemetry_s,
+                surface=entries.surface, rate_hz=rate_hz, duration_s=settings.telemetry_s, camera=policy.camera,
             )  # fmt: skip
             pressures = drive_with(policy, simulator, f"clip {label}")
             if not driven and drive_with(policy, simulator, f"clip {label}") != pressures:

@@ -29,11 +29,13 @@ class Policy:
     name : ``module:function``
     source : of the module
     begin : gives what one drive asks at each step: the function, or a new object of the class
+    camera : name or file of the camera whose pictures it reads: the ``camera`` of function or class; None for none
     """
 
     name: str
     source: bytes
     begin: Callable[[], Act]
+    camera: str | None = None
 
     @property
     def source_sha256(self) -> str:
@@ -62,16 +64,20 @@ def load_policy(name: str) -> Policy:
     try:
         module = importlib.import_module(module_name)
     except Exception as error:
-        raise InputError(f"policy {name}: the module cannot be imported: {_tell(error)}") from None
+        raise InputError(f"policy {name}: the module cannot be imported: {_describe_error(error)}") from None
     found = getattr(module, attribute, None)
     if not callable(found):
         raise InputError(f"policy {name}: {module_name} has no function or class {attribute}")
     file = getattr(module, "__file__", None)
     if file is None:
         raise InputError(f"policy {name}: {module_name} has no source file, whose hash could be kept")
+    camera = getattr(found, "camera", None)
+    if not isinstance(camera, str | None):
+        raise InputError(f"policy {name}: camera must be the name or file of a camera; it is {camera!r:.80}")
     return Policy(
-        name=name, source=Path(file).read_bytes(), begin=found if isinstance(found, type) else lambda: found
-    )
+        name=name, source=Path(file).read_bytes(), begin=found if isinstance(found, type) else lambda: found,
+        camera=camera,
+    )  # fmt: skip
 
 
 def drive_with(
@@ -92,11 +98,11 @@ def drive_with(
         If the policy raises, says no pressure, or takes longer than `LONGEST_CALL_S`.
     """
     pressures: list[float] = []
-    with _told_of(policy, place, 0.0):
+    with _report_failures(policy, place, 0.0):
         act = policy.begin()
     seen = simulator.reset()
     while not (seen.ends or (is_over is not None and is_over(seen))):
-        with _told_of(policy, place, seen.time):
+        with _report_failures(policy, place, seen.time):
             pressure = float(act(seen))
         try:
             seen = simulator.step(pressure)
@@ -107,8 +113,8 @@ def drive_with(
 
 
 @contextmanager
-def _told_of(policy: Policy, place: str, at: float) -> Iterator[None]:
-    """Tell in a sentence where a policy raises or takes too long."""
+def _report_failures(policy: Policy, place: str, at: float) -> Iterator[None]:
+    """Report in a sentence where a policy raises or takes too long."""
     where = f"policy {policy.name}: {place}: at {at:g} s"
     began = time.monotonic()
     late = f"{where}: took longer than {LONGEST_CALL_S:g} s for one step: make it faster"
@@ -126,7 +132,7 @@ def _told_of(policy: Policy, place: str, at: float) -> Iterator[None]:
     except TimeoutError:
         raise InputError(late) from None
     except Exception as error:
-        raise InputError(f"{where}: raised {_tell(error)}") from None
+        raise InputError(f"{where}: raised {_describe_error(error)}") from None
     finally:
         if wakes:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
@@ -135,6 +141,6 @@ def _told_of(policy: Policy, place: str, at: float) -> Iterator[None]:
         raise InputError(late)
 
 
-def _tell(error: BaseException) -> str:
+def _describe_error(error: BaseException) -> str:
     lines = str(error).splitlines()
     return f"{type(error).__name__}: {lines[0][:200]}" if lines else type(error).__name__

@@ -1,7 +1,8 @@
 """``musync.Simulator``: one drive, step by step, with what a controller sees at each."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from functools import cached_property, partial
 from math import inf
 from typing import Any
 
@@ -22,7 +23,7 @@ from tasks.driving.stepped import DriveSettings, SteppedDrive
 from tasks.driving.targets import Target, TargetTrack, follow_track, see_targets
 from tasks.errors import InputError
 from tasks.surface.road_profile import LEVEL_ROAD
-from tasks.surface.state import SurfaceParameters
+from tasks.surface.state import SurfaceParameters, SurfaceState
 from tasks.vehicle.model.simulation import COLUMNS
 from tasks.vehicle.parameters import Vehicle
 from tasks.vehicle.rollout import Rollout
@@ -47,8 +48,8 @@ class Observation:
     stands : whether the car has come to rest
     ends : whether the drive is over
     targets : road users ahead that the air does not hide, in the order in which they were given
-    frame : uint8 [H, W, 3] sRGB picture, where frames are asked for
     truth : every column of the model and the friction that the road has, where the truth is asked for [their units]
+    look : draws the picture, where the drive has a camera
     """
 
     time: float
@@ -60,8 +61,13 @@ class Observation:
     stands: bool
     ends: bool
     targets: tuple[Target, ...] = ()
-    frame: NDArray[np.uint8] | None = None
     truth: Mapping[str, float] | None = None
+    look: Callable[[], NDArray[np.uint8]] | None = field(default=None, repr=False, compare=False)
+
+    @cached_property
+    def frame(self) -> NDArray[np.uint8] | None:
+        """The picture, drawn when it is first read, uint8 [H, W, 3] sRGB; None without a camera."""
+        return self.look() if self.look else None
 
 
 class Simulator:
@@ -75,8 +81,7 @@ class Simulator:
     duration_s : longest drive, whole steps [s]
     targets : tracks of road users ahead, beside the ``objects`` of the scenario
     truth : whether observations have the truth
-    camera : name or file of the camera whose picture observations have, in the scenario's scene; a step then takes
-        about as long as two pictures. None for no pictures
+    camera : name or file of the camera whose picture observations have, in the scenario's scene; None for no pictures
 
     Raises
     ------
@@ -103,27 +108,38 @@ class Simulator:
             if isinstance(surface, SurfaceParameters)
             else load("wet friction").apply(load("surface", surface))
         )
-        self.state = surface_of(asked, pavement)
+        state = surface_of(asked, pavement)
         grade = LEVEL_ROAD if asked.scene in (None, LEVEL_SCENE) else grade_of(str(asked.scene))
-        sizes = load("road user sizes") if asked.objects else {}
-        objects = [
-            follow_track(user.build_track(size := user.choose_size(sizes)), size, self.state.friction)
-            for user in asked.objects
-        ]
-        self.rate_hz, self._targets, self._truth = float(rate_hz), (*objects, *targets), truth
-        self._overhang, _ = load("road user sizes")[EGO]
-        self._visual_range_m = find_visual_range(self.state, load_weather()) if self._targets else inf
-        settings = DriveSettings(
+        self.rate_hz, self._given, self._truth, self._car = float(rate_hz), targets, truth, car
+        self._sizes = load("road user sizes")
+        self._overhang, _ = self._sizes[EGO]
+        self._settings = DriveSettings(
             initial_speed=asked.initial_speed_km_h / 3.6, duration_s=duration_s, rate_hz=rate_hz,
             hold_speed=asked.hold_speed, hazard=hazard_of(asked), grade=grade,
         )  # fmt: skip
-        self._drive = SteppedDrive(car, self.state, settings)
+        self.take_road(state)
+        self._visual_range_m = find_visual_range(state, load_weather()) if self._targets else inf
         self._camera: StepCamera | None = None
         if camera is not None:
             scene = asked.scene or LEVEL_SCENE
             self._camera = StepCamera(
-                asked, self.state, pavement, car, scene=scene, camera=camera, rate_hz=rate_hz
+                asked, state, pavement, car, scene=scene, camera=camera, rate_hz=rate_hz
             )
+
+    def take_road(self, state: SurfaceState) -> None:
+        """Begin anew on another road, of which pictures and sight know nothing.
+
+        Parameters
+        ----------
+        state : of the road, whose friction bounds the road users too
+        """
+        self.state = state
+        objects = [
+            follow_track(user.build_track(size := user.choose_size(self._sizes)), size, state.friction)
+            for user in self.scenario.objects
+        ]
+        self._targets = (*objects, *self._given)
+        self._drive = SteppedDrive(self._car, state, self._settings)
 
     def reset(self) -> Observation:
         """Begin anew."""
@@ -179,16 +195,16 @@ class Simulator:
             targets=see_targets(
                 (track.find(time) for track in self._targets), read("station") + self._overhang, self._visual_range_m
             ),
-            frame=self._see(), truth=self._read_truth() if self._truth else None,
+            truth=self._read_truth() if self._truth else None,
+            look=self._aim(self._camera) if self._camera else None,
         )  # fmt: skip
 
-    def _see(self) -> NDArray[np.uint8] | None:
-        if self._camera is None:
-            return None
+    def _aim(self, camera: StepCamera) -> Callable[[], NDArray[np.uint8]]:
+        """Return what draws the picture of this instant, however far the drive goes on."""
         now, per_step = self._drive.step_count, self._drive.ticks_per_step
         ticks = [max(now - 1, 0) * per_step, now * per_step]
-        return self._camera.see(
-            now, *(self.read_column(name)[ticks] for name in ("station", "heave", "pitch"))
+        return partial(
+            camera.see, now, *(self.read_column(name)[ticks] for name in ("station", "heave", "pitch"))
         )
 
     def _read_truth(self) -> dict[str, float]:

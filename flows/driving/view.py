@@ -86,7 +86,7 @@ class StepCamera:
             self._scenario, self.road_user_sizes, self._scene, self._conditions.state.friction, time
         )
         motion = RigMotion(
-            T_world_rig=poses, frame_rate_hz=self._rate, first_frame=step - 1,
+            T_world_rig=poses, frame_rate_hz=self._rate, first_frame=step - 1, shown=range(1, 2),
             bodies=build_moving_bodies(
                 self._scenario, self, motions, poses @ self.camera.T_rig_camera, float(self.camera.K[0, 0])
             ),

@@ -75,7 +75,7 @@ class ExportedClip:
 
     @cached_property
     def ticks(self) -> Columns:
-        """Columns of the tick table."""
+        """The telemetry of each tick, by column [its unit]; NaN where an older dataset lacks a column."""
         return self._read(self.ticks_file, TICK_COLUMNS, self.plan.ticks_per_clip)
 
     @cached_property
@@ -116,7 +116,8 @@ class ExportedClip:
         return {name: to_json_value(self.frames[name][frame]) for name in ("frame", "tick", *TICK_COLUMNS)}
 
     def _read(self, file: str, names: Sequence[str], rows: int) -> Columns:
-        return read_columns(self.source.layout.root / file, self.clip_id, names, most=rows)
+        stored = read_columns(self.source.layout.root / file, self.clip_id, names, most=rows)
+        return {name: stored[name] for name in names}
 
 
 @dataclass(frozen=True, kw_only=True)

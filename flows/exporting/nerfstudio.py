@@ -31,7 +31,7 @@ from tasks.render.contact_sheet import encode_png
 OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
 """Camera axes of nerfstudio in ours."""
 MILLIMETRE = np.float32(1000)
-"""In one metre: nerfstudio multiplies depth by 0.001 unless it is told otherwise."""
+"""In one metre: nerfstudio multiplies depth by 0.001 by default."""
 
 
 def write_nerfstudio(dataset: ExportedDataset, folder: Path) -> None:

@@ -16,19 +16,20 @@ from numpy.typing import NDArray
 
 from catalogs.studies.ablation import cut_coupling
 from flows.making.catalogue import Catalogue, catalogue_of
-from flows.making.driven import drive_by_pressures, driven_ranges_of
+from flows.making.driven import drive_by_pressures
 from flows.making.driving import (
+    collect_ranged_figures,
     collect_surface_figures,
     peak_lateral_demand,
-    ranges_of,
     simulate_drive,
     surface_of,
+    weather_of,
 )
 from flows.making.gate import judge_motion, nothing_to_judge
 from flows.making.locations import note_location
 from flows.making.pictures import frame_rows, gather_motion, render_frames, rig_of
 from flows.making.plan import ClipPlan, Plan, read_plan
-from flows.making.road_users import judge_road_users
+from flows.making.road_users import RANGED, judge_road_users
 from flows.making.traced import replay_drive, unknown_ranges
 from flows.running.processors import measure_peak_memory
 from flows.store.address import find_local, send_files
@@ -40,6 +41,7 @@ from manifests.canonical import sha256_of_file
 from tasks.errors import InputError
 from tasks.render.camera import Camera, measure_mount
 from tasks.render.object_truth import measure_objects
+from tasks.studies.label_ranges import label_ranges, sampled_friction
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.rollout import Rollout, compute_lift_times, compute_peaks
 
@@ -156,31 +158,34 @@ def map_surface(work: ClipWork) -> SurfaceState:
 
 
 def roll_out(work: ClipWork) -> tuple[Rollout, dict[str, float]]:
-    """Step 2: the motion, and the range of each label under the bounds of the surface parameters."""
-    catalogue, plan = work.catalogue, work.plan
+    """Step 2: the motion, and the range of each label under the bounds of the surface parameters.
+
+    The snow's depth stays nominal, and the pressures those of a policy that braked.
+    """
+    scenario, catalogue = work.clip.scenario, work.catalogue
     if catalogue.traces is not None:
         return _move_car(work), unknown_ranges()
-    if catalogue.driven is not None:
-        return _move_car(work), driven_ranges_of(
-            work.clip.scenario, work.clip.label, catalogue, plan.duration_s
-        )
-    return _move_car(work), ranges_of(
-        cut_coupling(work.clip.scenario, plan.settings.variant, catalogue.families), catalogue.vehicle,
-        catalogue.surface, catalogue.study, plan.settings.vehicle_mode, plan.duration_s, catalogue.steady,
-        catalogue.grade,
-    )  # fmt: skip
+
+    def measure(friction: float) -> dict[str, float]:
+        ride = _move_car(work, friction)
+        judged = _judge_approach(work, friction, ride)
+        return collect_ranged_figures(ride) | {name: judged[name] for name in RANGED if name in judged}
+
+    felt = weather_of(cut_coupling(scenario, work.plan.settings.variant, catalogue.families))
+    friction = sampled_friction(felt, catalogue.surface, catalogue.study)
+    return _move_car(work), label_ranges(friction, measure)
 
 
-def _move_car(work: ClipWork) -> Rollout:
-    """The motion of the vehicle, of a variant of it, or of the dataset's trace."""
+def _move_car(work: ClipWork, friction: float | None = None) -> Rollout:
+    """The motion of the vehicle, of a variant of it, or of a trace; a friction replaces the weather's [1]."""
     scenario, catalogue, plan = work.clip.scenario, work.catalogue, work.plan
     if catalogue.traces is not None:
         return replay_drive(scenario, catalogue.surface, catalogue.traces, plan.duration_s)
     if catalogue.driven is not None:
-        return drive_by_pressures(scenario, work.clip.label, catalogue, plan.duration_s)
+        return drive_by_pressures(scenario, work.clip.label, catalogue, plan.duration_s, friction)
     _, ride = simulate_drive(
         cut_coupling(scenario, plan.settings.variant, catalogue.families), catalogue.vehicle,
-        catalogue.surface, plan.settings.vehicle_mode, plan.duration_s, catalogue.steady, catalogue.grade,
+        catalogue.surface, plan.settings.vehicle_mode, plan.duration_s, catalogue.steady, catalogue.grade, friction,
     )  # fmt: skip
     return ride
 
@@ -255,7 +260,7 @@ def commit_clip(
             "lateral_demand": peak_lateral_demand(ride, work.catalogue.scene.route),
             **(measure_mount(work.camera) if work.camera.varies else {}),
             "static_pitch": ride.static_pitch,
-            **_judge_approach(work, surface, ride),
+            **_judge_approach(work, surface.friction, ride),
             "calibration_extrapolated": ride.calibration_extrapolated,
         } | ranges),
         "verdict": _json_numbers(verdict),
@@ -279,13 +284,13 @@ def _observe_objects(
     return measure_objects(buffers, work.camera, motion)
 
 
-def _judge_approach(work: ClipWork, surface: SurfaceState, ride: Rollout) -> dict[str, float | bool]:
+def _judge_approach(work: ClipWork, friction: float, ride: Rollout) -> dict[str, float | bool]:
     """Return the outcome columns of a clip of a dataset with road users."""
     if not work.plan.settings.has_objects:
         return {}
     catalogue = work.catalogue
     return judge_road_users(
-        work.clip.scenario, catalogue.road_user_sizes, catalogue.scene.route, surface.friction, ride.columns
+        work.clip.scenario, catalogue.road_user_sizes, catalogue.scene.route, friction, ride.columns
     )
 
 

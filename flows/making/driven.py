@@ -1,4 +1,4 @@
-"""Clips that a policy braked: the motion that its pressures give, and what they would give on other surfaces."""
+"""Clips that a policy braked: the motion that its pressures give."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -6,17 +6,15 @@ from dataclasses import replace
 from catalogs.driven import PRESSURES
 from catalogs.scenario import Scenario
 from flows.making.catalogue import Catalogue
-from flows.making.driving import hazard_of, surface_of, weather_of
+from flows.making.driving import hazard_of, surface_of
 from manifests.manifest import is_driven
 from tasks.driving.stepped import DriveSettings, simulate_pressures
 from tasks.errors import InputError
-from tasks.studies.label_ranges import label_ranges, sampled_friction
-from tasks.surface.state import SurfaceState
 from tasks.vehicle.rollout import Rollout
 
 
 def drive_by_pressures(
-    scenario: Scenario, label: str, catalogue: Catalogue, duration_s: float, state: SurfaceState | None = None
+    scenario: Scenario, label: str, catalogue: Catalogue, duration_s: float, friction: float | None = None
 ) -> Rollout:
     """Return the motion of a clip that a policy braked.
 
@@ -25,7 +23,7 @@ def drive_by_pressures(
     scenario, label : of the clip
     catalogue : entries of the dataset, with what the policy asked for
     duration_s : length of the telemetry [s]
-    state : surface that is driven on; None takes the scenario's
+    friction : mu of the road in place of the weather's [1]
 
     Raises
     ------
@@ -39,26 +37,10 @@ def drive_by_pressures(
         initial_speed=scenario.initial_speed_km_h / 3.6, duration_s=duration_s, rate_hz=driven.entry.rate_hz,
         hold_speed=scenario.hold_speed, hazard=hazard_of(scenario), grade=catalogue.grade,
     )  # fmt: skip
-    surface = state or surface_of(scenario, catalogue.surface)
+    surface = surface_of(scenario, catalogue.surface)
+    if friction is not None:
+        surface = replace(surface, friction=friction)
     return simulate_pressures(catalogue.vehicle, surface, settings, driven.pressures[label])
-
-
-def driven_ranges_of(
-    scenario: Scenario, label: str, catalogue: Catalogue, duration_s: float
-) -> dict[str, float]:
-    """Percentiles of the clip's labels under the bounds of the surface parameters; the pressures stay the policy's.
-
-    Parameters
-    ----------
-    scenario, label, catalogue, duration_s : as of `drive_by_pressures`
-    """
-    state = surface_of(scenario, catalogue.surface)
-
-    def again(friction: float) -> tuple[float, float]:
-        ride = drive_by_pressures(scenario, label, catalogue, duration_s, replace(state, friction=friction))
-        return ride.stopping_distance, float(ride.columns["pitch"].max())
-
-    return label_ranges(sampled_friction(weather_of(scenario), catalogue.surface, catalogue.study), again)
 
 
 def refuse_driven(inputs: Iterable[str], origin: object, command: str) -> None:

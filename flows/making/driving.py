@@ -11,8 +11,6 @@ from tasks.render.weather.named_sky import NamedSky
 from tasks.render.weather.parameters import WeatherParameters
 from tasks.scene.route import Route
 from tasks.scene.route_shape import find_lateral_demand
-from tasks.studies.label_ranges import label_ranges, sampled_friction
-from tasks.studies.sensitivity import StudyProtocol
 from tasks.surface.road_profile import LEVEL_ROAD, RoadGrade, RoadHazard
 from tasks.surface.state import SurfaceParameters, SurfaceState
 from tasks.surface.weather import Weather, surface_state
@@ -71,25 +69,9 @@ def peak_lateral_demand(ride: Rollout, route: Route) -> float:
     return float(np.nanmax(demand, initial=0.0))
 
 
-def ranges_of(
-    scenario: Scenario,
-    vehicle: Vehicle,
-    surface: SurfaceParameters,
-    study: StudyProtocol,
-    mode: Mode,
-    duration_s: float,
-    steady: SteadyStop | None = None,
-    grade: RoadGrade = LEVEL_ROAD,
-) -> dict[str, float]:
-    """Percentiles of the clip's labels under the bounds of the surface parameters; the snow's depth stays nominal."""
-
-    def again(friction: float) -> tuple[float, float]:
-        _, ride = simulate_drive(
-            scenario, vehicle, surface, mode, duration_s, steady, grade, friction=friction
-        )
-        return ride.stopping_distance, float(ride.columns["pitch"].max())
-
-    return label_ranges(sampled_friction(weather_of(scenario), surface, study), again)
+def collect_ranged_figures(ride: Rollout) -> dict[str, float]:
+    """Return the figures of a drive that every dataset gives with their percentiles."""
+    return {"stopping_distance": ride.stopping_distance, "peak_pitch": float(ride.columns["pitch"].max())}
 
 
 def weather_of(scenario: Scenario) -> Weather:

@@ -9,6 +9,7 @@ from typing import Any
 from catalogs.entries import entry_names, load
 from catalogs.grids import Grid, GridFile, expand_grid
 from catalogs.grids.form import BEFORE
+from catalogs.sentences import cap_problems
 from catalogs.studies.ablation import cut_coupling
 from flows.making.driving import simulate_drive
 from flows.making.generate import generate_dataset
@@ -37,7 +38,6 @@ from manifests.provenance import describe_processor
 from manifests.records import FrozenRun
 from tasks.errors import InputError
 
-SHOWN_DIFFERENCES = 8
 RULES = ("low_speed", "duration_s", "hazard_marking", "wet_friction")
 """Settings that grids gained after runs of them were frozen."""
 
@@ -217,10 +217,8 @@ def reproduce_run(
     frozen = read_frozen(manifest)
     problems = problems_of(frozen)
     if problems:
-        rest = len(problems) - SHOWN_DIFFERENCES
         raise InputError([
-            *(f"manifest {manifest}: {problem}" for problem in problems[:SHOWN_DIFFERENCES]),
-            *([f"manifest {manifest}: and {rest} more differences"] if rest > 0 else []),
+            *(f"manifest {manifest}: {problem}" for problem in cap_problems(problems)),
             f"manifest {manifest}: what to do: musync generate GRID makes a dataset with what is here; musync lab"
             f" freeze freezes it anew; source {frozen['made_with']['code']['source_sha256'][:12]} of version"
             f" {frozen['made_with']['code']['version']} makes it as it was",

@@ -18,8 +18,7 @@ from tasks.eval.poses.checks import (
     hide_moving,
     prepare_clip,
 )
-from tasks.eval.poses.halving import halve_camera, halve_frames
-from tasks.eval.poses.undistort import undistort_frames
+from tasks.eval.poses.resampling import halve_camera, halve_frames, undistort_frames
 from tasks.render.camera import PIXEL_CENTRE, Camera
 
 

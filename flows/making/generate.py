@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from catalogs.grids import Grid
 from catalogs.scenes import load_scene
-from catalogs.sentences import name_some
+from catalogs.sentences import cap_problems, name_some
 from flows.making.catalogue import Catalogue
 from flows.making.clip import make_clip, warm_up
 from flows.making.input_changes import frozen_inputs, restore_inputs
@@ -45,9 +45,6 @@ from manifests.manifest import is_quarantined
 from tasks.errors import InputError
 from tasks.render.camera import Camera
 from tasks.render.rasterise.backend import select_backend
-
-SHOWN = 8
-"""Differences reported when a folder holds another run."""
 
 
 def generate_dataset(
@@ -186,10 +183,8 @@ def _refuse_other_plan(layout: Layout, plan: Plan, inputs: Mapping[str, bytes]) 
         return
     theirs = frozen_inputs(layout, existing.inputs)
     differences = plan_differences(existing.as_json(), plan.as_json(), theirs, inputs)
-    raise InputError(
-        [f"{layout}: holds the dataset of another run: {difference}" for difference in differences[:SHOWN]]
-        + [f"{layout}: give an empty folder, or go on there with what made it"]
-    )
+    shown = cap_problems([f"{layout}: holds the dataset of another run: {one}" for one in differences])
+    raise InputError([*shown, f"{layout}: give an empty folder, or go on there with what made it"])
 
 
 def create_frame_arrays(layout: Layout, plan: Plan) -> None:

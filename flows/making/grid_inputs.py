@@ -1,4 +1,4 @@
-"""A grid held against its catalogue entries and its scene: what the grid alone cannot tell to be wrong."""
+"""A grid held against its catalogue entries and its scene: faults that the grid alone does not show."""
 
 from collections.abc import Set
 from typing import Any

@@ -26,6 +26,7 @@ from tasks.render.weather.layers import ClipConditions
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.scene import Scene
 from tasks.scene.street.cars.near import detail_cars
+from tasks.scene.street.houses.near import detail_fronts
 from tasks.surface.anchors import adjacent_anchors
 from tasks.surface.road_profile import RoadHazard, road_elevation, road_slope
 from tasks.surface.state import SurfaceState
@@ -119,11 +120,11 @@ def gather_motion(
 def _make_clear_scene(
     catalogue: Catalogue, relief: RoadRelief | None, camera: Camera, T_world_rig: NDArray[np.float64]
 ) -> Scene:
-    """Return the scene with near cars in detail and the road feature in it."""
+    """Return the scene with near cars and fronts in detail and the road feature in it."""
     scene = catalogue.scene
     if (street := catalogue.street) is not None:
-        T_world_camera, focal_px = T_world_rig @ camera.T_rig_camera, float(camera.K[0, 0])
-        scene = replace(scene, gaussians=detail_cars(scene.gaussians, *street, T_world_camera, focal_px))
+        seen = *street, T_world_rig @ camera.T_rig_camera, float(camera.K[0, 0])
+        scene = replace(scene, gaussians=detail_fronts(detail_cars(scene.gaussians, *seen), *seen))
     albedo = catalogue.weather_parameters.sky.asphalt_albedo
     return replace(scene, gaussians=edit_scene(scene, relief, catalogue.marking, albedo))
 

@@ -26,6 +26,8 @@ Sizes = Mapping[str, tuple[float, ...]]
 
 OUTCOMES = ("collided", "impact_speed", "min_ttc", "clearance", "avoided_speed")
 """Columns of clips that say what became of the approach to road users."""
+RANGED = OUTCOMES[1:]
+"""Those of them that are given with their percentiles."""
 CHECK_STEP_S = 0.05
 """Time between the poses that are held against the street [s]."""
 

@@ -22,13 +22,12 @@ from tasks.render.rasterise.backend import select_backend
 from tasks.scene.scene import Scene
 from tasks.scene.soundness import find_faults, measure_soundness
 from tasks.scene.street.build import build_street
+from tasks.scene.street.layout import EYE_HEIGHT
 
 SEEDS = 4
 """Streets of each kind where none are named [1]."""
 SHOWN = (0.05, 0.35, 0.65)
 """Places of the pictures, as shares of the route [1]."""
-EYE_HEIGHT = 1.4
-"""Of the camera above the road [m]."""
 SHEET, SMALL = (480, 320), (120, 80)
 """Width and height of the pictures of a sheet, and of those that are checked and compared [px]."""
 GRAIN = (24, 16)

@@ -16,8 +16,7 @@ from flows.pages.figures import Figure, Line, Panel, Style
 from flows.pages.static import as_svg
 from flows.pages.writer import Section, Table, write_page
 from flows.store.outputs import Outputs
-from tasks.eval.agreement_groups import summarise_cases, summarise_groups
-from tasks.eval.state_agreement import CaseAgreement, case_agreement
+from tasks.eval.state_agreement import CaseAgreement, case_agreement, summarise_cases, summarise_groups
 from tasks.eval.stop_agreement import STOP_FIGURES, stop_agreement
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.parameters import Vehicle

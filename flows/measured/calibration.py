@@ -12,7 +12,7 @@ from catalogs.documents import parse_yaml
 from catalogs.entries import find_entry, load
 from catalogs.names import find_name_problem
 from catalogs.references import ReferenceCase, Traces, read_reference, trace_file
-from catalogs.vehicles import open_vehicle
+from catalogs.vehicles import VehicleFile, open_vehicle
 from catalogs.vehicles.frozen import frozen_text
 from flows.measured.agreement import agreement_of
 from flows.measured.grown_vehicle import tyre_beside
@@ -60,9 +60,10 @@ def calibrate_on_traces(
     """
     if problem := find_name_problem(name):
         raise InputError(f"--name must {problem}")
-    beside = tyre_beside(vehicle)
+    base = open_vehicle(vehicle)
+    beside = tyre_beside(base)
     results = Outputs(out, "vehicle calibrate", f"{name}.yaml", "calibration.json", *beside)
-    start = load("vehicle", vehicle)
+    start = base.build()
     steps, interval = load("calibration procedure", procedure)
     reference = read_reference(Path(traces), split=split)
     before = agreement_of(start, reference, steps.mode)
@@ -76,7 +77,7 @@ def calibrate_on_traces(
     data = {case.case: sha256_of_file(trace_file(Path(traces), case.case)) for case, _ in reference}
     for file, content in beside.items():
         results.write(file, content)
-    results.write(f"{name}.yaml", _frozen(fitted, vehicle, procedure, steps, split, data))
+    results.write(f"{name}.yaml", _frozen(fitted, base, procedure, steps, split, data))
     frozen = load("vehicle", target)
     after = agreement_of(frozen, reference, steps.mode)
     result = {
@@ -164,12 +165,15 @@ def _rounded(vehicle: Vehicle, procedure: Procedure) -> Vehicle:
 
 
 def _frozen(
-    fitted: Vehicle, base: str, procedure_name: str, procedure: Procedure, split: str, data: dict[str, str]
+    fitted: Vehicle,
+    base: VehicleFile,
+    procedure_name: str,
+    procedure: Procedure,
+    split: str,
+    data: dict[str, str],
 ) -> str:
     """Return the frozen file: the base's entry with the calibrated values and their provenance."""
-    file = open_vehicle(base)
-    source, content = file.source, file.content
-    entry = parse_yaml(content, source, "vehicle")
+    entry = parse_yaml(base.content, base.source, "vehicle")
     before = entry.pop("provenance", None) or {"bounds": {}}
     note = f"calibrated by {Path(procedure_name).stem} on {len(data)} {split} cases, see provenance"
     for group in procedure.groups:
@@ -188,8 +192,8 @@ def _frozen(
             tables[group] |= {"value": list(getattr(fitted.families[family], group)), "source": note}
     provenance = {
         "mode": procedure.mode,
-        "base": source.stem,
-        "base_sha256": sha256_of([content]),
+        "base": base.source.stem,
+        "base_sha256": sha256_of([base.content]),
         "procedure": Path(procedure_name).stem,
         "procedure_sha256": sha256_of_file(find_entry("calibration procedure", procedure_name)),
         "version": code_version()["version"],

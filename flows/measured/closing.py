@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from catalogs.campaigns import read_campaign
 from catalogs.entries import find_entry, load
-from catalogs.vehicles import open_vehicle
+from catalogs.vehicles import VehicleFile, open_vehicle
 from flows.measured.closing_ledger import count_readings, record_reading
 from flows.measured.friction_pulls import compute_friction_pulls, describe_friction_pulls
 from flows.measured.grown_vehicle import grown_vehicle, tyre_beside
@@ -55,29 +55,30 @@ def close_loop(
     """
     measured = read_campaign(Path(campaign))
     name = vehicle or measured.vehicle
-    model, road = load("vehicle", name), load("surface", surface)
+    judged, library = open_vehicle(name), load("library of effects")
+    model, road = judged.build(), load("surface", surface)
     measured = estimate_disc_temperatures(measured, model.mass)
-    grown = f"{Path(name).stem}-grown.yaml"
-    beside = tyre_beside(name)
+    grown = f"{judged.source.stem}-grown.yaml"
+    beside = tyre_beside(judged)
     results = Outputs(out, "close-loop", "split.json", "verdict.json", "report.html", grown, *beside)
     results.write_json("split.json", split_of(measured))
     count_readings(measured)  # a faulty ledger is reported before the fit
-    measured = replace(measured, tolerances=measured.tolerances.with_session(session_tolerances(name)))
-    outcome = judge_runs(measured, model, road, load("library of effects"), load("set of decision rules"))
-    earlier = record_reading(measured, sha256_of([open_vehicle(name).content]))
-    result = verdict_json(outcome.verdict) | describe_search(outcome)
+    measured = replace(measured, tolerances=measured.tolerances.with_session(session_tolerances(judged)))
+    outcome = judge_runs(measured, model, road, library, load("set of decision rules"))
+    earlier = record_reading(measured, sha256_of([judged.content]))
+    result = verdict_json(outcome.verdict, library) | describe_search(outcome, library)
     result = describe_friction_pulls(result, measured.tolerances.friction)
     result["held_out_readings_before"] = earlier
     if earlier:
         result["reasons"].append(
             f"the held-out runs of this campaign have been read {earlier} time(s) before: this is no first look"
         )
-    if held := find_unused_tolerances(name):
+    if held := find_unused_tolerances(judged):
         result["reasons"].append(
             f"the file's tolerances of {', '.join(held)} move nothing: a verdict holds these numbers"
         )
     found = replace(outcome.verdict, effects=(*outcome.verdict.effects, *outcome.calibrated))
-    text, missing = grown_vehicle(name, found, _reached_ranges(outcome))
+    text, missing = grown_vehicle(judged, found, _reached_ranges(outcome))
     result["vehicle_file"] = None
     if text is not None:
         for file, content in beside.items():
@@ -92,16 +93,16 @@ def close_loop(
     return result
 
 
-def session_tolerances(vehicle: str) -> dict[str, float]:
+def session_tolerances(file: VehicleFile) -> dict[str, float]:
     """Return the tolerances that a vehicle file gives the numbers that a session may be off by.
 
     A file that says how well it knows its own numbers knows it better than a campaign does.
 
     Parameters
     ----------
-    vehicle : catalogue name or file
+    file : of the vehicle
     """
-    given = open_vehicle(vehicle).tolerances
+    given = file.tolerances
     return {
         name: max(given[f] for f in fields if f in given)
         for name, fields in CARRIED.items()
@@ -109,15 +110,15 @@ def session_tolerances(vehicle: str) -> dict[str, float]:
     }
 
 
-def find_unused_tolerances(vehicle: str) -> list[str]:
+def find_unused_tolerances(file: VehicleFile) -> list[str]:
     """Return the numbers and effects of a vehicle file whose tolerances are those of no number that a session moves.
 
     Parameters
     ----------
-    vehicle : catalogue name or file
+    file : of the vehicle
     """
     moved = set().union(*CARRIED.values())
-    return [name for name in open_vehicle(vehicle).tolerances if name not in moved]
+    return [name for name in file.tolerances if name not in moved]
 
 
 def _reached_ranges(outcome: Outcome) -> dict[str, tuple[float, float]]:
@@ -127,14 +128,15 @@ def _reached_ranges(outcome: Outcome) -> dict[str, tuple[float, float]]:
     return {variable: find_reached_range(runs, verdict.theta, verdict.slots, variable) for variable in forms}
 
 
-def describe_search(outcome: Outcome) -> dict[str, Any]:
+def describe_search(outcome: Outcome, library: Sequence[Effect]) -> dict[str, Any]:
     """Return what a search says beside its verdict, as plain values: in words, and what is left over.
 
     Parameters
     ----------
     outcome : the verdict and what it stands on
+    library : of effects
     """
-    library, verdict = load("library of effects"), outcome.verdict
+    verdict = outcome.verdict
     train, held_out = predict_runs(outcome)
     planned_for = verdict.experiment.between[0] if verdict.experiment else None
     suggested = next((effect for effect in verdict.tried if effect.name == planned_for), None)
@@ -187,9 +189,9 @@ def split_of(campaign: Campaign) -> dict[str, Any]:
     }
 
 
-def verdict_json(verdict: Verdict) -> dict[str, Any]:
+def verdict_json(verdict: Verdict, library: Sequence[Effect]) -> dict[str, Any]:
     """Return a verdict as plain values."""
-    experiment, library = verdict.experiment, load("library of effects")
+    experiment = verdict.experiment
     return {
         "campaign": verdict.campaign,
         "verdict": verdict.verdict,

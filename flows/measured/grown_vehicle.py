@@ -5,7 +5,7 @@ from typing import Any
 
 from catalogs.documents import parse_yaml
 from catalogs.entries import entry_folder, find_entry
-from catalogs.vehicles import open_vehicle
+from catalogs.vehicles import VehicleFile
 from catalogs.vehicles.frozen import frozen_text
 from manifests.canonical import sha256_of, sha256_of_file
 from manifests.provenance import code_version
@@ -18,25 +18,25 @@ from tasks.vehicle.effects.table import PARAMETERS, EffectParameter
 from tasks.vehicle.parameters import Vehicle
 
 
-def tyre_beside(name: str) -> dict[str, bytes]:
+def tyre_beside(file: VehicleFile) -> dict[str, bytes]:
     """Return the tyre's property file beside a vehicle's file, or beside one that it extends.
 
     A vehicle that is grown from it needs this file too.
 
     Parameters
     ----------
-    name : catalogue name or file of the vehicle
+    file : of the vehicle
 
     Returns
     -------
     One file by its name; none if the vehicle names no tyre, or one of the catalogue.
     """
-    tyre = open_vehicle(name).tyre
+    tyre = file.tyre
     return {} if tyre is None or tyre[0].parent == entry_folder("tyre") else {tyre[0].name: tyre[1]}
 
 
 def grown_vehicle(
-    name: str, verdict: Verdict, reached: Mapping[str, tuple[float, float]]
+    file: VehicleFile, verdict: Verdict, reached: Mapping[str, tuple[float, float]]
 ) -> tuple[str | None, list[str]]:
     """Return the text of the grown vehicle's file: the vehicle with the effects that were found.
 
@@ -45,7 +45,7 @@ def grown_vehicle(
 
     Parameters
     ----------
-    name : catalogue name or file of the judged vehicle
+    file : of the judged vehicle
     verdict : the verdict
     reached : range of the variable of each form that the runs reached [unit of the variable]
 
@@ -53,7 +53,6 @@ def grown_vehicle(
     -------
     The text, or None if nothing was added; and the parameters that no vehicle can carry.
     """
-    file = open_vehicle(name)
     source, content = file.source, file.content
     entry: dict[str, Any] = parse_yaml(content, source, "vehicle")
     before = entry.pop("provenance", None) or {"bounds": {}}

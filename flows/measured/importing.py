@@ -45,7 +45,7 @@ def import_measurements(
     source : a recording of one of the forms of ``catalogs.recordings``, or a folder of them
     map : channel map by name or YAML file
     out : campaign folder to make; new or empty
-    list_signals : list the signals and write nothing; a map, as far as it is written, then tells the clock of tables
+    list_signals : list the signals and write nothing; a map, as far as it is written, then gives the clock of tables
 
     Returns
     -------

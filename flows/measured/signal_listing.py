@@ -16,7 +16,7 @@ def list_recorded_signals(source: str, map: str | None) -> dict[str, Any]:
     Parameters
     ----------
     source : a recording, or a folder of them
-    map : channel map by name or YAML file, as far as it is written: it tells the clock of tables and the form of text
+    map : channel map by name or YAML file, as far as it is written: it gives the clock of tables and the form of text
 
     Returns
     -------

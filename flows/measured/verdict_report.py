@@ -19,10 +19,9 @@ from flows.measured.verdict_figures import (
 from flows.pages.writer import Cell, Command, Part, Section, Table, write_page
 from tasks.campaign.campaign import Campaign
 from tasks.identification.decision.verdict import Outcome
+from tasks.identification.decision.words import MOST_WORDS
 from tasks.vehicle.effects.library import Effect
 
-MOST_WORDS = 30
-"""Of the sentence that a page opens with."""
 IMPORT = "musync import-measurements RECORDINGS --map MAP.yaml --out CAMPAIGN"
 MEANING = {
     "FOUND": "the model lacks this",

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from html import escape
+from math import isfinite
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -205,6 +206,5 @@ def _plain(values: Values | None, digits: int | None) -> Any:
     """Return numbers with some digits; JSON has no infinity."""
     if values is None or digits is None:
         return values
-    return [
-        float(f"{value:.{digits}g}") if np.isfinite(value) else None for value in np.asarray(values, float)
-    ]
+    # numbers of Python: those of NumPy take three times as long to write
+    return [float(f"{x:.{digits}g}") if isfinite(x) else None for x in np.asarray(values, float).tolist()]

@@ -1,4 +1,4 @@
-"""How a notebook shows a dataset and a clip: small pictures and the figures that tell them from others."""
+"""How a notebook shows a dataset and a clip: small pictures and the figures in which they differ from others."""
 
 from collections.abc import Mapping, Sequence
 from math import degrees

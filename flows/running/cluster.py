@@ -123,7 +123,7 @@ class JoiningCheck(WorkerPlugin):
         self.here = here
 
     async def setup(self, worker: Any) -> None:
-        """Hold the worker's facts against the driver's, and have the scheduler tell of each difference."""
+        """Hold the worker's facts against the driver's, and have the scheduler report each difference."""
         problems = find_version_problems(self.here, {worker.address: facts_here()})
         if problems:
             worker.status = Status.closing_gracefully  # begins nothing from here on

@@ -92,7 +92,7 @@ def prefect_api(*, pages: bool) -> Iterator[None]:
 
     Parameters
     ----------
-    pages : whether it shows its pages and starts what is due; False only keeps what runs tell it
+    pages : whether it shows its pages and starts what is due; False only keeps what runs report to it
     """
     set_up_prefect()  # before Prefect is imported anywhere: it reads its settings then
     if API in os.environ:

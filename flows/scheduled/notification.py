@@ -11,7 +11,7 @@ from typing import Any
 from urllib.parse import parse_qsl, unquote, urlsplit
 
 EVENTS = ("failed", "late", "done")
-"""Events that a schedule can tell of."""
+"""Events that a schedule can report."""
 WHEN_NONE_IS_NAMED = "failed,late"
 TIMEOUT_S = 60.0
 FROM_ENVIRONMENT = "env:"

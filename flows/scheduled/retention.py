@@ -76,7 +76,7 @@ def _made_in_store(root: str, grid: str) -> Iterator[str]:
 
 
 def _is_of_record(record: RunRecord | None, manifest: bytes | None) -> bool:
-    """Whether a dataset is finished, and the one that the record tells of."""
+    """Whether a dataset is finished, and the one that the record names."""
     if record is None or manifest is None:
         return False
     run_id = find_run_id(manifest, "manifest")

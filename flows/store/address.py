@@ -17,6 +17,7 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from catalogs.documents import parse_json
+from catalogs.sentences import cap_problems
 from flows.store.layout import Layout
 from flows.store.lease import LOCK
 from flows.store.links import refuse_foreign_entries
@@ -28,7 +29,6 @@ from tasks.errors import InputError
 from tasks.kernel_cache import cache_root
 
 Wanted = Callable[[str], bool]
-SHOWN = 5
 PREPARED = ("inputs/", "frames.zarr/", ".staging/")
 """Files that are sent before the plan, and mean nothing without it."""
 
@@ -54,7 +54,7 @@ def want_plan(name: str) -> bool:
 
 
 def want_record(name: str) -> bool:
-    """Whether a file tells how far a dataset is, or was staged by a killed run."""
+    """Whether a file records how far a dataset is, or was staged by a killed run."""
     return name in {"plan.json", "manifest.json"} or name.startswith(".staging/")
 
 
@@ -100,12 +100,13 @@ def open_for_reading(address: str | Path, wanted: Wanted = want_everything) -> L
     for name in wrong:
         (layout.root / name).unlink()
     if absent or wrong:
-        problems = [f"{name}: missing" for name in absent] + [
-            f"{name}: not the recorded bytes" for name in wrong
+        problems = [(name, "missing") for name in absent] + [
+            (name, "not the recorded bytes") for name in wrong
         ]
-        rest = [f"and {len(problems) - SHOWN} more"] if len(problems) > SHOWN else []
         raise InputError(
-            [f"{layout}/{problem}: musync lab repair makes it again" for problem in problems[:SHOWN]] + rest
+            cap_problems(
+                [f"{layout}/{name}: {fault}: musync lab repair makes it again" for name, fault in problems]
+            )
         )
     objects.fetch(["manifest.json"], layout.root)
     return layout

@@ -18,6 +18,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from catalogs.documents import parse_json
+from catalogs.sentences import cap_problems
 from flows.store.layout import PARTIAL, list_abandoned, write_atomically, write_json
 from tasks.errors import InputError
 
@@ -25,7 +26,6 @@ MARKER = ".musync-written"
 FORMAT = "musync-written/1"
 MOST_BYTES = 64 * 2**20
 """Size of the largest marker that is read [B]: half a million names."""
-SHOWN = 8
 NAME_BYTES = 220
 """Longest name of a file [B]: file systems take 255, and a file that is being written has a longer name."""
 
@@ -153,8 +153,7 @@ class Outputs:
         found = (_in_the_way(folder, name, known, self.command) for name in self.names)
         strangers = list(dict.fromkeys(problem for problem in found if problem is not None))
         if strangers:
-            rest = [f"{folder}: and {len(strangers) - SHOWN} more"] if len(strangers) > SHOWN else []
-            raise InputError(strangers[:SHOWN] + rest)
+            raise InputError(cap_problems(strangers))
 
     @property
     def _title(self) -> str:

@@ -1,4 +1,4 @@
-"""Parquet files that may be a stranger's: what their footers tell is bounded before a row of them is read."""
+"""Parquet files that may be a stranger's: what their footers say is bounded before a row of them is read."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -30,7 +30,7 @@ def call_reader(
     path : of the file
     read : the reader
     arguments, options : what it gets
-    remedy : what the sentence tells to do
+    remedy : what the sentence advises
     """
     try:
         return read(*arguments, **options)
@@ -49,7 +49,7 @@ def refuse_footer(path: Path, most: int, remedy: str = SEALED) -> None:
     ----------
     path : of a Parquet file
     most : rows that it may have by its dataset's plan [1]
-    remedy : what the sentence tells to do
+    remedy : what the sentence advises
 
     Raises
     ------

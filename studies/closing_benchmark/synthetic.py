@@ -13,7 +13,12 @@ from numpy.typing import NDArray
 
 from tasks.campaign.campaign import SESSION, Campaign, Run, Tolerances
 from tasks.campaign.planned_runs import RunPlan, make_planned_run
-from tasks.identification.inference.forward import compute_instrument_readings, prepare_run, simulate_run
+from tasks.identification.inference.forward import (
+    SENSED,
+    compute_instrument_readings,
+    prepare_run,
+    simulate_run,
+)
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.effects.slots import Slot
 from tasks.vehicle.effects.table import PARAMETER_INDEX, build_parameter_vector
@@ -114,7 +119,7 @@ def _measure_run(
     driven = simulate_run(
         model, own, slots=(*slots, *disturbed), initial_speed=speed, refinement=GENERATOR_REFINEMENT
     )
-    y = compute_instrument_readings(model, own, driven)
+    y = compute_instrument_readings(model, own, driven.history[:, SENSED])
     y[:, 1] += TOLERANCES.acceleration_bias * rng.standard_normal()
     y[:, 4] += TOLERANCES.pitch_offset * rng.standard_normal()
     for j in range(y.shape[1]):

@@ -1,4 +1,4 @@
-"""Readers of a dataset while it is written: each is told that it is unfinished, or gets right values."""
+"""Readers of a dataset while it is written: each gets the answer that it is unfinished, or right values."""
 
 import re
 import subprocess

@@ -3,12 +3,14 @@
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import chain, islice, product
-from math import inf
+from math import inf, nan
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from catalogs.entries import load
 from catalogs.road_users import EGO
@@ -42,12 +44,15 @@ from tasks.driving.outcome import (
 from tasks.driving.stepped import DriveSettings, SteppedDrive
 from tasks.driving.targets import see_targets
 from tasks.errors import InputError
-from tasks.studies.label_ranges import sampled_friction
+from tasks.studies.label_ranges import PERCENTILES, label_ranges, sampled_friction
 from tasks.surface.state import SurfaceParameters, SurfaceState
 from tasks.surface.wet_friction import ANY_SPEED, compute_wet_share
 from tasks.vehicle.parameters import Vehicle, compute_surface_response
 
-PERCENTILES = (5, 50, 95)
+RANGED = ("impact_speed_km_h", "min_ttc_s", "clearance_m", "avoided_km_h")
+"""Figures that are given with their percentiles under the surface bounds."""
+PICTURE = "picture"
+"""The brake that reads the friction from a picture; it drives where it is named."""
 LONGEST_S = 30.0
 """A drive in which nothing is decided by then ends [s]."""
 ROAD = "street"
@@ -58,23 +63,23 @@ def compare_brakes(
     *, vehicle: str = "bmw-320i", protocol: list[str] | None = None, weather: list[str] | None = None,
     brake: list[str] | None = None, policy: str | None = None, bounds: bool = True, out: str | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Drive every approach of the protocols in every weather with every brake, without pictures.
+    """Drive every approach of the protocols in every weather with every brake.
 
     Parameters
     ----------
     vehicle : catalogue name or file of the car
-    protocol, weather, brake : names of `emergency_braking.yaml`; None takes all. A protocol may also be an
-        OpenSCENARIO file with one road user
+    protocol, weather, brake : names of `emergency_braking.yaml`; None takes all, but of the brakes not ``picture``,
+        for which each approach is drawn once. A protocol may also be an OpenSCENARIO file with one road user
     policy : ``module:function`` of a brake of the user's, as of `flows.driving.policy`, driven beside the others
-    bounds : drive each of the catalogue's at the 5th, 50th and 95th percentile of friction under the surface bounds too
+    bounds : drive each again at percentiles of friction under the surface bounds (`tasks.studies.label_ranges`)
     out : folder for aeb.json, the page, and each approach as an OpenSCENARIO file
 
     Returns
     -------
-    ``rows[]`` with protocol, approach, ``speed_km_h``, weather, brake, friction, ``collided``,
-    ``impact_speed_km_h`` with its ``p05``, ``p50`` and ``p95``, ``min_ttc_s``, ``clearance_m``, ``avoided_km_h`` and
-    ``allowed_km_h``;
-    ``summary[]`` by protocol, weather and brake; ``sources`` of the protocols.
+    ``rows[]`` with protocol, approach, ``speed_km_h``, weather, brake, friction, ``friction_seen`` by ``picture``,
+    ``collided``, ``impact_speed_km_h`` with its ``p05``, ``p50`` and ``p95``, ``min_ttc_s``, ``clearance_m`` and
+    ``avoided_km_h`` with theirs (``clearance_m_p05``), and ``allowed_km_h``; ``summary[]`` by protocol, weather and
+    brake; ``sources`` of the protocols; ``sha256`` of the network's weights and the policy's source.
 
     Raises
     ------
@@ -88,21 +93,35 @@ def compare_brakes(
     scenarios = {f"openscenario/{_name_file(case)}": case for case in cases}
     results = Outputs(out, "lab aeb", "aeb.json", "aeb.html", *scenarios, f"openscenario/{ROAD}.xodr")
     car, pavement = load("vehicle", vehicle), load("wet friction").apply(load("surface", "dense-asphalt"))
-    study = load("sensitivity study")[0]
+    study, hashes = load("sensitivity study")[0], {name: one.source_sha256 for name, one in own.items()}
+    if PICTURE in chosen["brake"]:
+        from studies.emergency_braking.seeing import load_reader  # torch is slow to load
+
+        reader = load_reader()
+        hashes[PICTURE] = reader.sha256
     rows = []
     with progress_bar("weathers", len(chosen["weather"])) as advance:
         for name in chosen["weather"]:
             scenario = Scenario(**table.list_weathers()[name])
             state = surface_of(scenario, pavement)
             visual_range_m = find_visual_range(state, load_weather())
-            frictions = np.percentile(sampled_friction(weather_of(scenario), pavement, study), PERCENTILES)
+            sampled = sampled_friction(weather_of(scenario), pavement, study) if bounds else None
             for case, kind in product(cases, (*chosen["brake"], *own)):
+                asked = replace(
+                    scenario, initial_speed_km_h=case.scenario.initial_speed_km_h, hold_speed=True,
+                    objects=case.scenario.objects,
+                )  # fmt: skip
+                found: dict[str, Any] = {"friction": round(state.friction, 4)}
                 if kind in own:
-                    outcome = _drive_policy(own[kind], case, scenario, car, pavement)
-                    found = {"friction": round(state.friction, 4), **describe_outcome(outcome)}
+                    drive = partial(_drive_policy, own[kind], case, asked, car, pavement)
                 else:
-                    spread = frictions.tolist() if bounds else []
-                    found = _drive_case(car, state, case, kind, table, spread, visual_range_m)
+                    seen = reader.look(asked, car, pavement) if kind == PICTURE else None
+                    if seen is not None:
+                        found["friction_seen"] = round(seen, 4)
+                    drive = partial(_drive_brake, car, state, case, kind, table, visual_range_m, seen)
+                found |= describe_outcome(drive(state.friction))
+                if sampled is not None:
+                    found |= find_bounds(sampled, drive)
                 rows.append(
                     {
                         "protocol": case.protocol,
@@ -123,6 +142,7 @@ def compare_brakes(
             Path(name).stem: table.protocols[name].source if name in table.protocols else name
             for name in chosen["protocol"]
         },
+        "sha256": hashes,
     }
     _write_scenarios(results, scenarios, car)
     results.write_json("aeb.json", result)
@@ -186,14 +206,15 @@ def drive_approach(
 
 
 def make_brake(
-    kind: str, car: Vehicle, state: SurfaceState, table: EmergencyBraking
+    kind: str, car: Vehicle, friction_at: Callable[[float], float], table: EmergencyBraking
 ) -> tuple[Trigger, BrakeLine]:
     """Return a brake of a kind for a car on a road.
 
     Parameters
     ----------
-    kind : blind, friction or driver
-    car, state : the car and the road, of which only the one that knows friction is told
+    kind : blind, friction, picture or driver
+    car : that it brakes
+    friction_at : speed [m/s] to the tyres' friction [1], as far as ``friction`` and ``picture`` know it
     table : numbers of the brakes
     """
     brakes, line = table.brakes, table.brake_line
@@ -208,7 +229,6 @@ def make_brake(
     pipes = BrakeLine(full_mpa=full * lock_mpa, delay=line.delay_s.value, build_up=line.build_up_s.value)
     if kind == "blind":
         return BlindTrigger(time_to_collision=brakes.blind.time_to_collision_s.value), pipes
-    friction_at = find_tyre_friction(car, state)
     rise = line.build_up_s.value * min(friction_at(0.0) / full, 1.0)
     trigger = FrictionTrigger(
         friction_at, gravity=car.gravity, share=brakes.friction.share.value, margin=brakes.friction.margin_m.value,
@@ -249,26 +269,35 @@ def summarise(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def _drive_case(
-    car: Vehicle,
-    state: SurfaceState,
-    case: Case,
-    kind: str,
-    table: EmergencyBraking,
-    frictions: Sequence[float],
-    visual_range_m: float,
-) -> dict[str, Any]:
-    def drive_on(road: SurfaceState) -> Outcome:
-        return drive_approach(car, road, case, *make_brake(kind, car, road, table), table, visual_range_m)
+def find_bounds(sampled: NDArray[np.float64], drive: Callable[[float], Outcome]) -> dict[str, float | None]:
+    """Return percentiles of the figures of an outcome under the surface bounds; those of the impact as ``p05``.
 
-    outcome = drive_on(state)
-    spread = [drive_on(replace(state, friction=float(mu))).impact_speed * 3.6 for mu in frictions]
-    ends = sorted(spread) if spread else []
+    Parameters
+    ----------
+    sampled : friction under the bounds, float64 [N] [1]
+    drive : friction [1] to the outcome there
+    """
+
+    def measure(friction: float) -> dict[str, float]:
+        found = describe_outcome(drive(friction))
+        return {name: nan if found[name] is None else found[name] for name in RANGED}
+
+    found = label_ranges(sampled, measure, PERCENTILES)
     return {
-        "friction": round(state.friction, 4),
-        **describe_outcome(outcome),
-        **{f"p{p:02d}": round(v, 2) for p, v in zip(PERCENTILES, ends, strict=False)},
+        name.removeprefix("impact_speed_km_h_"): round(value, 3) if np.isfinite(value) else None
+        for name, value in found.items()
+        if not name.startswith("surface_friction")
     }
+
+
+def _drive_brake(
+    car: Vehicle, state: SurfaceState, case: Case, kind: str, table: EmergencyBraking, visual_range_m: float,
+    seen: float | None, friction: float,
+) -> Outcome:  # fmt: skip
+    """Drive an approach with a brake of the catalogue on a road of some friction [1]."""
+    road = replace(state, friction=friction)
+    friction_at = find_tyre_friction(car, road) if seen is None else lambda _: seen
+    return drive_approach(car, road, case, *make_brake(kind, car, friction_at, table), table, visual_range_m)
 
 
 def _open_protocol(table: EmergencyBraking, name: str) -> list[Case]:
@@ -298,13 +327,11 @@ def _write_scenarios(results: Outputs, scenarios: Mapping[str, Case], car: Vehic
 
 
 def _drive_policy(
-    policy: Policy, case: Case, weather: Scenario, car: Vehicle, pavement: SurfaceParameters
+    policy: Policy, case: Case, asked: Scenario, car: Vehicle, pavement: SurfaceParameters, friction: float
 ) -> Outcome:
-    """Drive an approach with a user's brake until it has an outcome."""
-    asked = replace(
-        weather, initial_speed_km_h=case.scenario.initial_speed_km_h, hold_speed=True, objects=case.scenario.objects
-    )  # fmt: skip
-    simulator = Simulator(asked, vehicle=car, surface=pavement, duration_s=LONGEST_S)
+    """Drive an approach with a user's brake on a road of some friction [1] until it has an outcome."""
+    simulator = Simulator(asked, vehicle=car, surface=pavement, duration_s=LONGEST_S, camera=policy.camera)
+    simulator.take_road(replace(simulator.state, friction=friction))
     overhang, _ = load("road user sizes")[EGO]
     track = case.follow(simulator.state.friction)
 
@@ -313,7 +340,7 @@ def _drive_policy(
         met = seen.station + overhang >= target.station
         return met or seen.stands or (seen.speed <= target.speed and seen.time >= track.settles_at)
 
-    drive_with(policy, simulator, f"{case.protocol}, {case.name}, {weather.weather}", is_over)
+    drive_with(policy, simulator, f"{case.protocol}, {case.name}, {asked.weather}", is_over)
     (outcome,) = simulator.judge()
     return outcome
 
@@ -321,10 +348,11 @@ def _drive_policy(
 def _choose(
     table: EmergencyBraking, protocol: list[str] | None, weather: list[str] | None, brake: list[str] | None
 ) -> dict[str, list[str]]:
+    brakes = list(type(table.brakes).model_fields)
     known = {
         "protocol": (protocol, list(table.protocols)),
         "weather": (weather, list(table.weathers)),
-        "brake": (brake, list(type(table.brakes).model_fields)),
+        "brake": (brake, [*brakes, PICTURE]),
     }
     problems = [
         f"--{name} {one}: there is none of this name; there are {', '.join(all_names)}"
@@ -334,4 +362,5 @@ def _choose(
     ]
     if problems:
         raise InputError(problems)
-    return {name: asked or all_names for name, (asked, all_names) in known.items()}
+    chosen = {name: asked or all_names for name, (asked, all_names) in known.items()}
+    return chosen | {"brake": brake or brakes}

@@ -27,6 +27,13 @@ def draw_page(result: dict[str, Any]) -> str:
             ],
         )
     ]
+    if looks := [row for row in rows if "friction_seen" in row]:
+        note = "Friction that `picture` reads when an approach begins, and that of the road."
+        sections.append(
+            Section(
+                title="Read from the picture", parts=[Table(rows=_tabulate_looks(looks), note=note, digits=2)]
+            )
+        )
     for protocol, source in result["sources"].items():
         some = [row for row in rows if row["protocol"] == protocol]
         impacts = Table(
@@ -42,8 +49,9 @@ def draw_page(result: dict[str, Any]) -> str:
         "Emergency brakes by approach and weather",
         sections,
         lead=[
-            f"{result['vehicle']} in coupled mode, without pictures: the brake knows where its target is. Blind brakes"
-            " at a time to collision, friction at the way that the road asks for, driver after a reaction."
+            f"{result['vehicle']} in coupled mode. Every brake knows where its target is, as far as the air lets it"
+            " see. Blind brakes at a time to collision, friction at the way that the road asks for, picture at the way"
+            " that the road seems to ask for, driver after a reaction."
         ],
     )
 
@@ -56,6 +64,20 @@ def _tabulate_collisions(summary: Sequence[dict[str, Any]], weathers: Sequence[s
         )
         line[row["weather"]] = f"{row['collided']} of {row['approaches']}"
     return list(table.values())
+
+
+def _tabulate_looks(rows: Sequence[dict[str, Any]]) -> list[Any]:
+    lines: list[Any] = []
+    for weather in dict.fromkeys(row["weather"] for row in rows):
+        some = [row for row in rows if row["weather"] == weather]
+        read = [row["friction_seen"] for row in some]
+        lines.append(
+            {
+                "weather": weather, "road": some[0]["friction"],
+                "read, mean": sum(read) / len(read), "least": min(read), "largest": max(read),
+            }
+        )  # fmt: skip
+    return lines
 
 
 def _tabulate_impacts(rows: Sequence[dict[str, Any]], brakes: Sequence[str]) -> list[Any]:

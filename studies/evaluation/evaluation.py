@@ -6,7 +6,6 @@ from typing import Any, get_args
 
 import pyarrow as pa
 
-from flows.auditing.physics import clip_facts
 from flows.making.locations import refuse_changed_scene
 from flows.running.orchestration import run_as_stage
 from flows.store.address import open_for_reading
@@ -27,6 +26,7 @@ from studies.evaluation.road_edit_rows import road_edit_rows
 from studies.evaluation.rows import figure_row, group_weather_families
 from studies.evaluation.standards import find_reference_cases, own_telemetry, reference_traces
 from studies.foreign_video.trajectories import trajectory_files
+from studies.physics_judge.audit_physics import clip_facts
 from tasks.errors import InputError
 
 NOT_RUN = {

@@ -9,7 +9,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from flows.auditing.physics import clip_columns
 from flows.making.catalogue import catalogue_of
 from flows.making.gate import prepare_for_checks
 from flows.making.plan import read_plan
@@ -18,12 +17,13 @@ from flows.store.layout import Layout
 from studies.evaluation.film import through_film
 from studies.evaluation.metrics.no_reference import piqe, temporal_error
 from studies.evaluation.metrics.severity import measure_image, sampled_frames
+from studies.foreign_video.outside_trajectory import motion_from_trajectory
 from studies.foreign_video.trajectories import read_trajectory
+from studies.physics_judge.audit_physics import clip_columns
 from tasks.conventions import ROAD_CLASSES
 from tasks.eval.poses.checks import POSE_CHECKS, hide_moving
 from tasks.eval.poses.motion import RecoveredMotion
-from tasks.eval.poses.outside_trajectory import motion_from_trajectory
-from tasks.eval.poses.undistort import undistort_frames
+from tasks.eval.poses.resampling import undistort_frames
 from tasks.render.camera import PIXEL_CENTRE
 
 Row = dict[str, Any]

@@ -128,7 +128,7 @@ def score_pictures(
     ----------
     frames : uint8 [F, H, W, 3] sRGB
     judges : from `studies.evaluation.learned_judges.load_judges`
-    kinds : of weather that CLIP tells from dry: ``clip_KIND`` is its similarity less the dry one
+    kinds : of weather that CLIP separates from dry: ``clip_KIND`` is its similarity less the dry one
     """
     scores: dict[str, float] = {}
     if (dover := judges["dover"].network) is not None:

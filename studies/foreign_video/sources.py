@@ -13,12 +13,12 @@ from scipy.spatial.transform import Rotation
 from catalogs.documents import LARGEST_YAML, parse_yaml, read_content
 from catalogs.sentences import cap_problems, shorten, shorten_value
 from studies.foreign_video.film_length import READ_ONLY, measure_missing_end
+from studies.foreign_video.outside_trajectory import motion_from_trajectory
 from studies.foreign_video.trajectories import SUFFIXES, read_trajectory
 from tasks.errors import InputError
 from tasks.eval.poses.essential import recover_motion_essential
 from tasks.eval.poses.motion import RecoveredMotion
-from tasks.eval.poses.outside_trajectory import motion_from_trajectory
-from tasks.eval.poses.undistort import COEFFICIENTS, undistort_frames
+from tasks.eval.poses.resampling import COEFFICIENTS, undistort_frames
 
 MOST_FRAMES, LEAST_FRAMES = 3000, 5
 MOST_PIXELS = 960 * 540

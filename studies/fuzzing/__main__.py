@@ -43,7 +43,7 @@ def list_findings(readings: dict[str, list[Reading]]) -> list[Reading]:
 
 
 def reproduce_input(name: str, number: int, seed: int, keep: str | None) -> int:
-    """Make and read one input, and tell of it; 1 if it is a finding."""
+    """Make and read one input, and report it; 1 if it is a finding."""
     with tempfile.TemporaryDirectory() as shelf, tempfile.TemporaryDirectory() as place:
         write_documents([BY_NAME[name]], Path(shelf))
         made, outcome, detail = Desk(Path(shelf), Path(place)).read(name, seed, number)

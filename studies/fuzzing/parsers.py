@@ -10,7 +10,6 @@ from catalogs.scenes.gaussian_files import read_gaussians
 from catalogs.scenes.route_files import read_route
 from catalogs.scenes.stereo_folder import read_stereo_folder
 from catalogs.scenes.street import load_street_layout
-from flows.auditing.physics_constants import read_constants
 from flows.making.plan import read_plan
 from flows.making.seal import seal_dataset
 from flows.reading.describe import validate_grid
@@ -47,6 +46,7 @@ from studies.fuzzing.rules import (
 )
 from studies.measured_drives.drives import read_drives
 from studies.measured_drives.plans import load_plan
+from studies.physics_judge.frozen_constants import read_constants
 
 NUMBERS_OF_A_GRID = (
     limit_values("precipitation_mm_h", -1, 50_000, 1e308),

@@ -8,13 +8,13 @@ from catalogs.entries import load
 from catalogs.recordings import read_signals, summarise_signals
 from catalogs.weather.grip import WeatherFolder
 from catalogs.weather.look import load_weather
-from flows.auditing.physics import clip_columns, clip_facts
 from flows.auditing.signing import signature_findings
 from flows.auditing.verify import verify_dataset
 from flows.making.scenes import scene_import
 from flows.reading.describe import describe_dataset
 from flows.reading.query import VIEWS, query_dataset
 from flows.store.layout import Layout
+from studies.physics_judge.audit_physics import clip_columns, clip_facts
 from tasks.errors import InputError
 
 

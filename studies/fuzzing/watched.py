@@ -89,13 +89,13 @@ def read_watched(
 
 
 def _list_ready(staff: "list[_Worker]") -> "list[_Worker]":
-    """The workers that have something to tell, or are silent for too long."""
+    """The workers that have a result, or are silent for too long."""
     speaking = wait([worker.line for worker in staff], timeout=LOOKED_AT_S)
     return [worker for worker in staff if worker.line in speaking or worker.is_late]
 
 
 class _Worker:
-    """A process that reads one input after the other and tells of each."""
+    """A process that reads one input after the other and reports each."""
 
     def __init__(self, shelf: Path, seed: int):
         context = get_context(START)

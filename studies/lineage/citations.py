@@ -24,7 +24,7 @@ def find_works(source: str) -> dict[str, str]:
     Returns
     -------
     Name of a work to its DOI or an empty text: works cited by author and year, a DOI that stands alone, and the heads
-    of `HEADS`. Empty where a source is told in words alone.
+    of `HEADS`. Empty where a source is given in words alone.
     """
     source = source[:LONGEST]
     cited = list(_CITED.finditer(source))

@@ -14,10 +14,10 @@ from catalogs.variants import Variant
 from catalogs.weather.grip import GRIP_SECTIONS
 from flows.making.catalogue import Catalogue
 from flows.making.driving import (
+    collect_ranged_figures,
     collect_surface_figures,
     hazard_of,
     peak_lateral_demand,
-    ranges_of,
     simulate_drive,
     surface_of,
     weather_of,
@@ -31,6 +31,7 @@ from tasks.errors import InputError
 from tasks.explanation import Step, force_steps, pitch_steps, surface_steps
 from tasks.render.camera import body_poses
 from tasks.scene.route import Route
+from tasks.studies.label_ranges import label_ranges, sampled_friction
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.parameters import compute_surface_response
 from tasks.vehicle.rollout import Mode, Rollout, compute_lift_times
@@ -99,7 +100,10 @@ def drive_clip(asked: Asked, entries: Catalogue) -> Drive:
     driven = cut_coupling(asked.scenario, asked.variant, entries.families)
     how = asked.mode, asked.duration_s, entries.steady, entries.grade
     state, ride = simulate_drive(driven, vehicle, surface, *how)
-    ranges = ranges_of(driven, vehicle, surface, entries.study, *how)
+    ranges = label_ranges(
+        sampled_friction(weather_of(driven), surface, entries.study),
+        lambda mu: collect_ranged_figures(simulate_drive(driven, vehicle, surface, *how, friction=mu)[1]),
+    )
     seen = surface_of(asked.scenario, surface)
     station = ride.columns["station"]
     route = asked.route or lay_straight_route(float(station.max()))

@@ -10,7 +10,6 @@ from catalogs.entries import load
 from catalogs.grids.form import TICK_RATE_HZ
 from catalogs.studies.ablation import cut_coupling
 from catalogs.variants import VARIANTS, Variant
-from flows.auditing.physics import clip_facts
 from flows.making.catalogue import Catalogue, catalogue_of
 from flows.making.driven import refuse_driven
 from flows.making.driving import simulate_drive
@@ -37,6 +36,7 @@ from studies.negative_controls.claims import (
 )
 from studies.negative_controls.false_rigs import FALSE_RIGS
 from studies.negative_controls.figure import draw_roc
+from studies.physics_judge.audit_physics import clip_facts
 from tasks.errors import InputError
 from tasks.eval.body_agreement import BodyClaim
 from tasks.eval.motion_agreement import PoseThresholds

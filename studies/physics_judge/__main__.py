@@ -14,10 +14,10 @@ import numpy as np
 from catalogs.scenario import Scenario
 from studies.physics_judge.clips import StudyClip, draw_clip, draw_vehicle, make_clip
 from studies.physics_judge.errors import ERRORS, state_outcome
+from studies.physics_judge.laws.audit import evaluate_laws
+from studies.physics_judge.laws.law import Law
+from studies.physics_judge.laws.route import RouteLine
 from tasks.errors import InputError
-from tasks.eval.physics.audit import evaluate_laws
-from tasks.eval.physics.laws import Law
-from tasks.eval.physics.route import RouteLine
 from tasks.vehicle.rollout import Mode
 
 

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from catalogs.entries import find_entry, load
 from catalogs.scenario import Scenario, find_scenario_problems
 from catalogs.tyres import tyre_entries
-from flows.auditing.physics_constants import make_constants
 from flows.making.clip import collect_motion_figures
 from flows.making.driving import collect_surface_figures, simulate_drive
-from tasks.eval.physics.constants import Constants
+from studies.physics_judge.frozen_constants import make_constants
+from studies.physics_judge.laws.constants import Constants
 from tasks.render.camera import body_poses
 from tasks.scene.route import Route, route_from_positions
 from tasks.scene.route_shape import sample_grade
@@ -154,7 +154,7 @@ def draw_vehicle(draw: np.random.Generator, mode: Mode) -> Vehicle:
             f.name: getattr(vehicle, f.name) * float(draw.uniform(0.9, 1.1))
             for f in fields(vehicle) if f.name not in kept and isinstance(getattr(vehicle, f.name), float)
         }  # fmt: skip
-        vehicle = replace(vehicle, **{k: v for k, v in scaled.items() if not k.startswith("abs_")})  # type: ignore[arg-type]
+        vehicle = replace(vehicle, **{k: v for k, v in scaled.items() if not k.startswith("abs_")})
     if draw.random() < 0.3:
         vehicle = replace(vehicle, tyre=load("tyre", TYRE))
     if mode == "coupled" and draw.random() < 0.2:

@@ -17,11 +17,16 @@ SURFACE = ("film_depth_mm", "snow_depth_mm", "snow_coverage", "surface_friction"
 Error = Callable[[StudyClip], Tables]
 
 
-def edit(clip: StudyClip, *, poses: bool = False, **columns: NDArray[Any]) -> Tables:
-    """Return both tables with other columns; with ``poses`` the rig follows them."""
-    ticks, frames = clip.ticks | columns, dict(clip.frames)
-    frames |= {name: column[frames["tick"]] for name, column in columns.items()}
-    return ticks, frames | ({"T_world_rig": pose(clip, frames)} if poses else {})
+def edit(clip: StudyClip, **columns: NDArray[Any]) -> Tables:
+    """Return both tables with other columns; the rig stays where it was."""
+    shown = {name: column[clip.frames["tick"]] for name, column in columns.items()}
+    return clip.ticks | columns, clip.frames | shown
+
+
+def edit_with_poses(clip: StudyClip, **columns: NDArray[Any]) -> Tables:
+    """Return both tables with other columns, which the rig follows."""
+    ticks, frames = edit(clip, **columns)
+    return ticks, frames | {"T_world_rig": pose(clip, frames)}
 
 
 def pose(clip: StudyClip, frames: dict[str, NDArray[Any]], more_pitch: float = 0.0) -> NDArray[np.float64]:
@@ -37,7 +42,7 @@ def pose(clip: StudyClip, frames: dict[str, NDArray[Any]], more_pitch: float = 0
 def drive(clip: StudyClip, scenario: dict[str, Any] | None = None, **car: float) -> Tables:
     """Return the tables of another scenario, or of a car whose numbers are scaled."""
     stated, vehicle, mode = clip.rides
-    other = replace(vehicle, **{name: getattr(vehicle, name) * factor for name, factor in car.items()})  # type: ignore[arg-type]
+    other = replace(vehicle, **{name: getattr(vehicle, name) * factor for name, factor in car.items()})
     seconds = (len(clip.ticks["speed"]) - 1) / 1000
     made = make_clip(replace(stated, **(scenario or {})), other, mode, duration_s=seconds)
     return made.ticks, made.frames | {name: clip.frames[name] for name in SURFACE}
@@ -92,7 +97,7 @@ def _drift_while_held(clip: StudyClip) -> Tables:
     time = t["t_ns"] * 1e-9
     speed = t["speed"] - 0.01 * np.minimum(time, clip.facts["brake_onset_s"]) * (t["speed"] > 1)
     station = t["station"] + np.concatenate([[0.0], np.cumsum(np.diff(time) * (speed - t["speed"])[1:])])
-    return edit(clip, speed=speed, station=station, poses=True)
+    return edit_with_poses(clip, speed=speed, station=station)
 
 
 def _freeze_scale(clip: StudyClip) -> Tables:
@@ -126,7 +131,7 @@ def _count_wheels(clip: StudyClip) -> Tables:
     t = clip.ticks
     rolled = clip.constants.car["wheel_radius"] * t["wheel_speed_r"]
     way = np.concatenate([[0.0], np.cumsum(0.0005 * (rolled[1:] + rolled[:-1]))])
-    return edit(clip, station=way, poses=True)
+    return edit_with_poses(clip, station=way)
 
 
 def _show_next_tick(clip: StudyClip) -> Tables:
@@ -156,10 +161,8 @@ ERRORS: dict[str, Error] = {
     "torque 3 % high": lambda c: edit(c, brake_torque_f=c.ticks["brake_torque_f"] * 1.03),
     "load moves to the wrong side": _mirror_loads,
     "axles swapped": _swap_axles,
-    "pitch nose-up": lambda c: edit(
-        c, pitch=-c.ticks["pitch"], pitch_rate=-c.ticks["pitch_rate"], poses=True
-    ),
-    "heave 1 cm off": lambda c: edit(c, heave=c.ticks["heave"] + 0.01, poses=True),
+    "pitch nose-up": lambda c: edit_with_poses(c, pitch=-c.ticks["pitch"], pitch_rate=-c.ticks["pitch_rate"]),
+    "heave 1 cm off": lambda c: edit_with_poses(c, heave=c.ticks["heave"] + 0.01),
     "camera 5 cm too high": lambda c: move_poses(c, lambda p: _shift(p, slice(None), (0, 0, 0.05))),
     "jump of 2 cm": lambda c: move_poses(c, lambda p: _shift(p, 3, (0.02, 0, 0))),
     "time stamps a tick late": _stamp_late,

@@ -55,7 +55,6 @@ def cheap_clips() -> Iterator[None]:
         mock.patch.object(
             flows.making.clip, "simulate_drive", _memoise_function(flows.making.driving.simulate_drive)
         ),
-        mock.patch.object(flows.making.clip, "ranges_of", _memoise_function(flows.making.driving.ranges_of)),
         mock.patch.object(flows.making.clip, "render_frames", _draw_noise),
         mock.patch.object(flows.making.clip, "judge_motion", _judge_nothing),
     ):

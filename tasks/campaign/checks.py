@@ -45,13 +45,13 @@ class Check:
     Parameters
     ----------
     name : of the check
-    fault : whose fault it tells
+    fault : whose fault it reports
     channels : that it needs
     measure : its function
     conditions : numbers that the function needs, by name
     lowest, highest : limits of its figures
     sentence : with the names of a figure's words, ``value``, ``channel``, ``places``, ``lowest`` and ``highest``
-    unless : checks that tell the same fault of a channel better
+    unless : checks that report the same fault of a channel better
     """
 
     name: str
@@ -93,7 +93,7 @@ class CheckTable:
 
 @dataclass(frozen=True, kw_only=True)
 class Violation:
-    """A fault that a check tells.
+    """A fault that a check reports.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ class Channelled:
 
 
 def apply_checks(checks: Sequence[Check], view: Channelled) -> list[Violation]:
-    """Return what the checks tell of a signal, a run or a session.
+    """Return what the checks report of a signal, a run or a session.
 
     Of the figures of one check and channel that break its limits the worst is reported, with the places of all.
 

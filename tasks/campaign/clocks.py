@@ -88,7 +88,7 @@ def measure_fall(
     ----------
     time : float64 [N] ascending [s]
     speed : float64 [N] [m/s]
-    least_fall : of the speed from which its rate tells of its unit, and of the clock's [m/s]
+    least_fall : of the speed from which its rate shows its unit, and that of the clock [m/s]
     rare : share of the samples that must belong to such a fall [1]
     """
     step = 1

@@ -233,7 +233,7 @@ def _compare_speed_units(
 def _compare_sizes(
     run: MeasuredRun, channel: str, other: NDArray[np.float64], correlation: float
 ) -> Iterator[Figure]:
-    """Return the ratio of a channel to what it must equal, where both tell of each other [1]."""
+    """Return the ratio of a channel to what it must equal, where both are correlated [1]."""
     found, ratio = _regress(run.smooth[channel], other)
     if abs(found) >= correlation:
         taken = run.unit_of(channel)
@@ -269,7 +269,7 @@ def _measure_dive(
     pressed: float,
     fewest_samples: float,
 ) -> Iterator[Figure]:
-    """Return the pitch that the body gives per deceleration [deg per m/s^2], where both tell of each other.
+    """Return the pitch that the body gives per deceleration [deg per m/s^2], where both are correlated.
 
     Changes over a short span are the body's response to the brake, without the slow slope of the road.
     """

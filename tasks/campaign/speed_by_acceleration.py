@@ -121,7 +121,7 @@ def estimate_slopes(
     drift : standard deviation over the runs of a session of an accelerometer's zero [m/s^2]
     fewest_runs : of which a deviation is reported [1]
     steepest : sine beyond which no slope is believed: the accelerometer is off by something else [1]
-    shortest : time in motion that a run needs to tell its mean [s]
+    shortest : time in motion that a run needs for a mean [s]
     """
     apart = measure_apart(runs, shortest)
     if len(apart) < fewest_runs:

@@ -1,6 +1,6 @@
-"""The coupled model driven step by step: the pressure of each step is told when the step begins.
+"""The coupled model driven step by step: the pressure of each step is given when the step begins.
 
-The brake has the pressure a millisecond after it is told, and goes to it in the second half of that. `trace_pressures`
+The brake has the pressure a millisecond after it is given, and goes to it in the second half of that. `trace_pressures`
 writes this down, and the rollout of that trace is the stepped drive bit for bit.
 """
 
@@ -25,7 +25,7 @@ TICKS_PER_S = 1000
 PER_TICK = 2
 """Internal steps of a tick [1]."""
 LATE = 2
-"""Internal steps after which the brake has the pressure that is told [1]."""
+"""Internal steps after which the brake has the pressure that is given [1]."""
 HIGHEST_PRESSURE_MPA = 50.0
 
 
@@ -59,8 +59,8 @@ def trace_pressures(
     pressures : of the steps [MPa]
     ticks_per_step : ticks of a step [1]
     """
-    told = np.repeat(np.asarray(pressures, np.float64), PER_TICK * ticks_per_step)
-    return np.concatenate([np.zeros(LATE), told])
+    given = np.repeat(np.asarray(pressures, np.float64), PER_TICK * ticks_per_step)
+    return np.concatenate([np.zeros(LATE), given])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,7 +72,7 @@ class DriveSettings:
     initial_speed : [m/s]
     duration_s : length of the drive, whole steps [s]
     rate_hz : of the steps [Hz]
-    hold_speed : keep the speed until a pressure above 0 is told
+    hold_speed : keep the speed until a pressure above 0 is given
     hazard : road feature
     grade : of the road
 
@@ -118,7 +118,7 @@ class DriveSettings:
 
 
 class SteppedDrive:
-    """A drive of the coupled model whose brake is told step by step.
+    """A drive of the coupled model whose brake is commanded step by step.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ class SteppedDrive:
 
         Parameters
         ----------
-        pressure_mpa : that the brake is told when the step begins [MPa]
+        pressure_mpa : that the brake is given when the step begins [MPa]
         steps : how many, at least 1
 
         Raises
@@ -221,9 +221,9 @@ def simulate_pressures(
     vehicle, surface, settings : as of `SteppedDrive`
     pressures : of the steps [MPa]
     """
-    per_step, told = settings.ticks_per_step, np.flatnonzero(np.asarray(pressures) > 0)
+    per_step, braked = settings.ticks_per_step, np.flatnonzero(np.asarray(pressures) > 0)
     # half a step early: time is a whole number of steps, but for rounding
-    onset = (PER_TICK * per_step * int(told[0]) - 0.5) * INTERNAL_STEP_S if told.size else inf
+    onset = (PER_TICK * per_step * int(braked[0]) - 0.5) * INTERNAL_STEP_S if braked.size else inf
     drive = make_trace_input(trace_pressures(pressures, per_step), INTERNAL_STEP_S)
     run = simulate(
         vehicle, compute_surface_response(vehicle, surface.kind, surface.friction),

@@ -1,6 +1,6 @@
-"""How sure a clip's labels are: friction, stop and peak pitch under the paper's bounds of the surface parameters."""
+"""How sure the figures of a drive are: their percentiles under the bounds of the surface parameters."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import isfinite, nan
 from typing import Any
@@ -14,7 +14,7 @@ from tasks.surface.weather import Weather, surface_state
 
 PERCENTILES = (5, 50, 95)
 DRIVEN_PERCENTILES = (5, 25, 50, 75, 95)
-"""Percentiles of the sampled friction at which the clip is driven again: the whole cost of its ranges.
+"""Percentiles of the sampled friction at which the car is driven again: the whole cost of the ranges.
 
 Samples beyond the outer ones count as these, which moves no percentile within them."""
 
@@ -49,39 +49,49 @@ def sampled_friction(
 
 
 def label_ranges(
-    friction: NDArray[np.float64], drive: Callable[[float], tuple[float, float]]
+    friction: NDArray[np.float64],
+    drive: Callable[[float], Mapping[str, float]],
+    driven_at: Sequence[int] = DRIVEN_PERCENTILES,
 ) -> dict[str, float]:
-    """Percentiles of friction, stopping distance and peak pitch over samples of the surface.
+    """Percentiles of friction, and of the figures of a drive, over samples of the surface.
 
-    The surface reaches the vehicle through mu_c, with the nominal dependence on speed, so the clip is driven at
-    `DRIVEN_PERCENTILES` of mu_c, and each sample's stop and pitch lie between those of its neighbours.
+    The surface reaches the vehicle through mu_c, with the nominal dependence on speed, so the car is driven at
+    some percentiles of mu_c, and each sample's figures lie between those of its neighbours.
 
     Parameters
     ----------
     friction : mu_c of each sample, shape (n,) [1]
-    drive : mu_c [1] to stopping distance, NaN where the clip ends first [m], and peak pitch [rad]
+    drive : mu_c [1] to figures by name; one that is not finite is more than the drive contains, such as the stopping
+        distance of a car that does not stop
+    driven_at : percentiles of the friction at which it is driven; `PERCENTILES` serve figures that rise or fall with it
 
     Returns
     -------
-    ``surface_friction_p05``, ``_p50``, ``_p95`` [1], ``stopping_distance_...`` [m], ``peak_pitch_...`` [rad]; a
-    percentile of the stop that the clip does not contain is NaN
+    ``surface_friction_p05``, ``_p50``, ``_p95`` [1], and those of each figure [its unit]; a percentile that the drives
+    do not contain is NaN
     """
-    driven = np.unique(np.percentile(friction, DRIVEN_PERCENTILES))
-    stops, pitches = (np.array(values) for values in zip(*(drive(float(mu)) for mu in driven), strict=True))
-    stopped = np.isfinite(stops)
-    sampled_stops = np.interp(friction, driven, np.where(stopped, stops, 0.0))
-    # between a drive that stops and one that does not, nobody knows: counted as the longer
-    sampled_stops[np.interp(friction, driven, stopped.astype(float)) < 1.0] = np.inf
-    samples = {
-        "surface_friction": friction,
-        "stopping_distance": sampled_stops,
-        "peak_pitch": np.interp(friction, driven, pitches),
+    driven = np.unique(np.percentile(friction, driven_at))
+    drives = [drive(float(mu)) for mu in driven]
+    samples = {"surface_friction": friction}
+    samples |= {
+        name: _interpolate(friction, driven, np.array([figures[name] for figures in drives], np.float64))
+        for name in drives[0]
     }
     return {
         f"{name}_p{percentile:02d}": _percentile(values, percentile)
         for name, values in samples.items()
         for percentile in PERCENTILES
     }
+
+
+def _interpolate(
+    friction: NDArray[np.float64], driven: NDArray[np.float64], values: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    known = np.isfinite(values)
+    found = np.interp(friction, driven, np.where(known, values, 0.0))
+    # between a drive that contains it and one that does not, nobody knows: counted as more
+    found[np.interp(friction, driven, known.astype(float)) < 1.0] = np.inf
+    return found
 
 
 def _percentile(values: NDArray[np.float64], percentile: float) -> float:

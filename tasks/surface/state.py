@@ -36,7 +36,7 @@ class SurfaceParameters:
     wet_planing_exponent : of that film [1]
     wet_tyre_pressure_kpa : inflation pressure, from which that onset follows [kPa]
     wet_planing_friction : friction that is left where water carries the tyre [1]
-    wet_reference_speed : speed that the friction of the surface state is told for [m/s]
+    wet_reference_speed : speed at which the friction of the surface state holds [m/s]
     bounds : declared range of each parameter that the sensitivity study varies, by field name
     """
 

@@ -3,7 +3,7 @@
 A row says what a scenario of its kind gives and which laws follow. Its numbers stand in the pavement's entry and, under
 its own name, in ``catalogs/weather/``: particles with their extinction, film or snow cover, exposure, and a tyre family
 for vehicles that have none of their own. To add a kind is one row here, one entry there, and one closed form in
-``tasks.eval.physics``, where the judge has a table of its own.
+``studies.physics_judge.laws``, where the judge has a table of its own.
 """
 
 from collections.abc import Callable, Mapping

@@ -21,7 +21,7 @@ class WetGrip(NamedTuple):
     carried : share of the load that the film carries from the onset of hydroplaning on [1]
     onset : speed at which a deep film carries the whole tyre [m/s]
     floor : friction that is left on a film that carries all, over that on wet texture at rest [1]
-    reference : friction at the speed that mu_c is told for, over that on wet texture at rest [1]
+    reference : friction at the speed for which mu_c holds, over that on wet texture at rest [1]
     """
 
     decay: float = 0.0

@@ -8,7 +8,11 @@ from collections.abc import Callable, Mapping
 from math import degrees, nan, pi, sqrt
 from typing import NamedTuple
 
-from tasks.vehicle.effects.equations import compute_engine_torque, compute_resistance
+from tasks.vehicle.effects.equations import (
+    compute_engine_torque,
+    compute_resistance,
+    compute_rolling_resistance,
+)
 from tasks.vehicle.effects.table import pack_effect_values
 from tasks.vehicle.parameters import Vehicle
 
@@ -110,7 +114,7 @@ def compute_road_load(vehicle: Vehicle) -> float:
     vehicle : the vehicle, whose effects roll, meet the air and drag; its wheels add their inertia to the mass
     """
     v, effects, speed = vehicle, pack_effect_values(vehicle.effects), COASTING_SPEED
-    rolling = (effects.rolling_coefficient + effects.rolling_speed * speed) * v.gravity
+    rolling = compute_rolling_resistance(effects, speed) * v.gravity
     engine = compute_engine_torque(effects, speed / v.wheel_radius, v.wheel_radius)
     force = v.mass * (v.coast_deceleration + rolling) + compute_resistance(effects, speed, 1.0, 0.0)
     force += (engine + effects.pad_drag) / v.wheel_radius

@@ -9,7 +9,7 @@ import pytest
 
 import musync
 from flows.making.generate import generate_dataset
-from flows.making.road_users import OUTCOMES
+from flows.making.road_users import OUTCOMES, RANGED
 from manifests.provenance import SOURCE_ROOT
 from tasks.driving.outcome import Outcome, join_outcomes
 from tasks.driving.targets import locate_body
@@ -17,6 +17,7 @@ from tasks.scene.road_users.motion import move_on_track
 from tasks.scene.road_users.track import Track
 from tests.scene.test_route_shape import helix
 
+QUERIES = (SOURCE_ROOT / "docs" / "how-to" / "query-a-dataset.md").read_text()
 GRID = """
 name: meetings
 pictures: false
@@ -74,11 +75,24 @@ def test_clips_say_what_became_of_their_road_users_and_null_where_there_are_none
     assert 0 < braked["min_ttc"] < 24 / speed
 
 
+def test_outcomes_have_percentiles_under_the_surface_bounds(data):
+    rows = {row["label"]: row for row in musync.open(str(data)).pandas("clips").to_dict("records")}
+    assert all(np.isnan(rows["nobody"][f"{name}_p50"]) for name in RANGED)
+    braked, standing = rows["braked"], rows["standing"]
+    for name in ("clearance", "min_ttc"):
+        assert braked[f"{name}_p05"] < braked[f"{name}_p50"] < braked[f"{name}_p95"]
+        assert braked[f"{name}_p05"] < braked[name] < braked[f"{name}_p95"]
+    # nobody brakes there: no road changes the impact
+    assert {standing[f"impact_speed_p{p}"] for p in ("05", "50", "95")} == {standing["impact_speed"]}
+    (asked,) = re.findall(r'musync sql datasets/demo "(SELECT label, clearance.*)"', QUERIES)
+    answer = {row[0]: row[1:] for row in musync.open(str(data)).sql(asked).fetchall()}
+    assert answer["braked"] == pytest.approx([braked[f"clearance{part}"] for part in ("_p05", "", "_p95")])
+
+
 def test_outcome_columns_have_units_and_answer_the_documented_query(data, toy_dataset):
     field = pq.read_schema(data / "telemetry" / "clips.parquet").field("impact_speed")
     assert field.metadata[b"units"] == b"m s-1" and b"road user" in field.metadata[b"description"]
-    page = (SOURCE_ROOT / "docs" / "how-to" / "query-a-dataset.md").read_text()
-    (asked,) = re.findall(r'musync sql datasets/demo "(.* FILTER \(collided\).*)"', page)
+    (asked,) = re.findall(r'musync sql datasets/demo "(.* FILTER \(collided\).*)"', QUERIES)
     assert musync.open(str(data)).sql(asked).fetchall()[0] == pytest.approx(("dry", 2, 50.0), abs=1e-4)
     # a dataset without road users has the columns in the views, without values
     assert {row[1:] for row in musync.open(str(toy_dataset.root)).sql(asked).fetchall()} == {(0, None)}

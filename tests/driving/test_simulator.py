@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,12 +12,13 @@ import musync
 from catalogs.entries import load
 from catalogs.road_users import EGO
 from flows.auditing.explain import explain_frame
-from flows.auditing.physics import audit_physics
 from flows.driving import policy as policies
 from flows.driving.drive import drive_grid
 from flows.driving.simulator import Simulator
+from flows.driving.view import StepCamera
 from flows.store.layout import Layout
 from flows.store.sealed import read_manifest
+from studies.physics_judge.audit_physics import audit_physics
 from tasks.driving.targets import TargetTrack
 from tasks.errors import InputError
 from tests.toy_street import write_toy_grid
@@ -110,6 +112,36 @@ def test_pictures_are_those_of_the_drive_and_the_same_again(tmp_path):
     assert first[0].shape == (64, 96, 3) and first[0].dtype == np.uint8
     assert all((a == b).all() for a, b in zip(first, again, strict=True))
     assert np.abs(first[2].astype(int) - first[0]).mean() > 1.0
+
+
+def test_a_policy_with_a_camera_reads_pictures_and_only_those_that_it_reads_are_drawn(tmp_path, monkeypatch):
+    write_toy_grid(tmp_path, frames=3)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    look = "    def __call__(self, seen):\n        return 2.0 if seen.time == 0.1 and seen.frame.std() > 1 else 0.0\n"
+    Path("looking.py").write_text(
+        f"class Looks:\n    camera = 'camera.yaml'\n{look}class Odd:\n    camera = 3\n"
+    )
+    looks, drawn, see = policies.load_policy("looking:Looks"), [], StepCamera.see
+    monkeypatch.setattr(StepCamera, "see", lambda *given: drawn.append(given[1]) or see(*given))
+    given = {"scene": str(tmp_path / "scene"), "initial_speed_km_h": 40.0}
+    simulator = Simulator(given, duration_s=0.3, rate_hz=10, camera=looks.camera)
+    assert policies.drive_with(looks, simulator, "here") == [0.0, 2.0, 0.0] and drawn == [1]
+    late = simulator.reset()
+    simulator.step(0.0)
+    assert (late.frame == simulator.reset().frame).all()
+    with pytest.raises(InputError, match="camera must be the name or file of a camera; it is 3"):
+        policies.load_policy("looking:Odd")
+
+
+def test_another_road_is_felt_from_the_start_on():
+    simulator = Simulator(WET | {"objects": [{"kind": "car", "track": {"gap_m": 20.0}}]}, duration_s=1.0)
+    speeds = []
+    for friction in (simulator.state.friction, 0.2):
+        simulator.take_road(replace(simulator.state, friction=friction))
+        simulator.reset()
+        speeds.append([simulator.step(9.0) for _ in range(20)][-1].speed)
+    assert 70 / 3.6 - speeds[1] == pytest.approx(0.2 * 9.80665, rel=0.25) and speeds[0] < speeds[1] - 2
 
 
 def test_a_road_user_comes_out_of_the_fog_at_the_visual_range():

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tasks.eval.poses.checks import JudgeCamera
-from tasks.eval.poses.halving import halve_camera, halve_frames
+from tasks.eval.poses.resampling import halve_camera, halve_frames
 from tasks.eval.poses.rigid import viewing_rays
 
 CAMERA = JudgeCamera(

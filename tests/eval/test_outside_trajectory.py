@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from studies.foreign_video.outside_trajectory import motion_from_trajectory
 from studies.synthetic_street import Clip
 from tasks.errors import InputError
-from tasks.eval.poses.outside_trajectory import motion_from_trajectory
 from tests.eval.scoring import normalised_progress_rmse, pitch_rmse_deg, progress_rmse
 
 

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
-from tasks.eval.agreement_groups import summarise_groups
 from tasks.eval.state_agreement import (
     FIGURES,
     MODEL_COLUMNS,
     CaseFacts,
     case_agreement,
+    summarise_groups,
 )
 from tasks.eval.stop_agreement import stop_agreement
 

@@ -15,7 +15,6 @@ import musync
 from flows.auditing.audit import audit_dataset
 from flows.auditing.dataset_diff import compare_datasets
 from flows.auditing.explain import explain_frame
-from flows.auditing.physics import audit_physics
 from flows.auditing.repair import repair_dataset
 from flows.auditing.signing import sign_dataset
 from flows.auditing.verify import collect_garbage, verify_dataset
@@ -26,6 +25,7 @@ from flows.reading.query import query_dataset
 from flows.reading.report import make_report
 from flows.store.layout import Layout
 from studies.paper.sheets import draw_sheets
+from studies.physics_judge.audit_physics import audit_physics
 from tasks.errors import InputError
 
 SECONDS = 60

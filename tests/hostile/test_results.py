@@ -13,7 +13,6 @@ from typer.testing import CliRunner
 from flows.auditing.audit import audit_dataset
 from flows.auditing.dataset_diff import compare_datasets
 from flows.auditing.explain import explain_frame
-from flows.auditing.physics import audit_physics
 from flows.auditing.repair import repair_dataset
 from flows.auditing.verify import verify_dataset
 from flows.cli import app
@@ -21,6 +20,7 @@ from flows.reading.previews import make_films
 from flows.reading.report import make_report
 from flows.store.outputs import FORMAT, MARKER
 from studies.paper.sheets import draw_sheets
+from studies.physics_judge.audit_physics import audit_physics
 from tasks.errors import InputError
 from tests.flows.reseal import reseal
 from tests.hostile.stage import COMMANDS, Stage, endure, listing

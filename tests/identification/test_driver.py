@@ -11,7 +11,12 @@ from tasks.campaign.planned_runs import plan_experiments
 from tasks.identification.decision import experiment
 from tasks.identification.decision.verdict import judge_runs
 from tasks.identification.inference.driver import begin_at_brake, find_brake_onset, measure_drive
-from tasks.identification.inference.forward import compute_instrument_readings, prepare_run, simulate_run
+from tasks.identification.inference.forward import (
+    SENSED,
+    compute_instrument_readings,
+    prepare_run,
+    simulate_run,
+)
 from tasks.vehicle.effects.grown import apply_effects
 from tasks.vehicle.effects.table import EFFECT_TABLE, build_parameter_vector
 from tests.identification.synthetic import NOISE, SURFACE, TOLERANCES, VEHICLE, plain_run
@@ -50,7 +55,7 @@ def make_campaign(effects, *, held: bool, seconds: float = 3.0) -> Campaign:
         drive = held * torque * np.clip((0.95 - 0.01 * np.arange(len(run.pressure))) / 0.1, 0.0, 1.0)
         driven = replace(clear, run=replace(run, drive_torque=drive))
         simulated = simulate_run(driven, theta, initial_speed=speed)
-        y = compute_instrument_readings(clear, theta, simulated)
+        y = compute_instrument_readings(clear, theta, simulated.history[:, SENSED])
         y += NOISE * rng.standard_normal(y.shape)
         runs.append(replace(run, pressure=run.pressure[: len(y)], response=np.where(SEEN, y, 0.0)))
     return Campaign(

@@ -8,7 +8,7 @@ from catalogs.entries import find_entry
 from catalogs.grids import GridFile
 from catalogs.scenario import OPTIONAL_FIELDS, SCENARIO_FIELDS, Scenario, find_range_problems, list_ranges
 from flows.registry import COMMANDS
-from reference_pages import commands, effects, grids
+from reference_pages import commands, grids, vehicle
 from tasks.vehicle.effects.table import PARAMETERS
 
 
@@ -33,8 +33,8 @@ def test_every_command_stands_in_its_section_with_all_its_options() -> None:
 
 def test_every_effect_and_every_number_of_a_fit_has_its_row() -> None:
     library = yaml.safe_load(find_entry("library of effects").read_text())
-    assert list(rows_of(effects.write_effect_table())) == [entry["name"] for entry in library]
-    rows = rows_of(effects.write_number_table())
+    assert list(rows_of(vehicle.write_effect_table())) == [entry["name"] for entry in library]
+    rows = rows_of(vehicle.write_number_table())
     assert list(rows) == list(PARAMETERS)
     assert rows["drag_area"][1:3] == ["m2", "0 to 10"] and rows["drag_area"][4] == "under `effects`"
     assert rows["mass"][4] == "`sprung_mass`, `pitch_inertia`, by a share of it" and rows["slope"][4] == ""

@@ -7,7 +7,7 @@ import yaml
 
 from catalogs.entries import find_entry, load
 from tasks.errors import InputError
-from tasks.eval.poses.undistort import undistort_frames as seen_by_pinhole
+from tasks.eval.poses.resampling import undistort_frames as seen_by_pinhole
 from tasks.render.lens import Lens, distort_rays, pixel_directions, undistort_points
 
 LENS = Lens(k1=-0.37, k2=0.197, p1=1.4e-3, p2=5.7e-4, k3=-0.068)

@@ -10,7 +10,8 @@ from tasks.conventions import SemanticClass
 from tasks.errors import InputError
 from tasks.scene.gaussians import check_gaussians
 from tasks.scene.street.build import build_street
-from tasks.scene.street.cars.near import LEVELS, detail_cars, measure_approach
+from tasks.scene.street.cars.near import LEVELS, detail_cars
+from tasks.scene.street.near import measure_approach
 from tests.scene.test_street import viewmat_at
 
 SHORT = replace(load_street_layout(), route_length=12.0, behind=5.0, beyond=20.0, crossing_station=4.0)

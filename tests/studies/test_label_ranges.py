@@ -7,8 +7,8 @@ import pytest
 
 from catalogs.entries import load
 from catalogs.scenario import Scenario
-from flows.making.driving import controls_of, hazard_of, ranges_of, weather_of
-from tasks.studies.label_ranges import DRIVEN_PERCENTILES, label_ranges, sampled_friction
+from flows.making.driving import collect_ranged_figures, controls_of, hazard_of, simulate_drive, weather_of
+from tasks.studies.label_ranges import DRIVEN_PERCENTILES, PERCENTILES, label_ranges, sampled_friction
 from tasks.studies.sensitivity import latin_hypercube
 from tasks.surface.state import SurfaceState
 from tasks.vehicle.rollout import simulate_scenario
@@ -25,7 +25,12 @@ def entries():
 
 def ranges(scenario: Scenario, entries, duration_s: float = 8.0) -> dict[str, float]:
     vehicle, surface, study = entries
-    return ranges_of(scenario, vehicle, surface, study, "paper", duration_s)
+
+    def drive(friction: float) -> dict[str, float]:
+        _, ride = simulate_drive(scenario, vehicle, surface, "paper", duration_s, friction=friction)
+        return collect_ranged_figures(ride)
+
+    return label_ranges(sampled_friction(weather_of(scenario), surface, study), drive)
 
 
 @pytest.mark.parametrize(
@@ -50,7 +55,7 @@ def test_five_drives_find_what_a_drive_of_every_sample_finds(entries):
     friction = sampled_friction(weather_of(scenario), surface, study)
     driven = []
 
-    def again(mu: float) -> tuple[float, float]:
+    def again(mu: float) -> dict[str, float]:
         driven.append(mu)
         ride = simulate_scenario(
             vehicle,
@@ -60,21 +65,23 @@ def test_five_drives_find_what_a_drive_of_every_sample_finds(entries):
             mode="paper",
             duration_s=8.0,
         )
-        return ride.stopping_distance, float(ride.columns["pitch"].max())
+        return collect_ranged_figures(ride)
 
-    found = label_ranges(friction, again)
+    found, few = label_ranges(friction, again), label_ranges(friction, again, PERCENTILES)
+    assert few == pytest.approx(found, rel=1e-3)
+    driven[5:] = []
     assert len(driven) == len(DRIVEN_PERCENTILES) == 5
-    every = np.array([again(mu) for mu in friction])
-    for k, name in enumerate(("stopping_distance", "peak_pitch")):
+    every = [again(mu) for mu in friction]
+    for name in ("stopping_distance", "peak_pitch"):
         for percentile in (5, 50, 95):
-            exact = np.percentile(every[:, k], percentile)
+            exact = np.percentile([figures[name] for figures in every], percentile)
             assert found[f"{name}_p{percentile:02d}"] == pytest.approx(exact, rel=2e-3)
 
 
 def test_a_percentile_that_the_clip_does_not_contain_is_not_represented():
     """Stops on the better half of the roads, and not on the worse one: the shorter percentile is known."""
     friction = np.linspace(0.2, 0.4, 101)
-    found = label_ranges(friction, lambda mu: (10 / mu if mu > 0.299 else float("nan"), 0.01))
+    found = label_ranges(friction, lambda mu: {"stopping_distance": 10 / mu if mu > 0.299 else float("nan")})
     assert found["stopping_distance_p05"] == pytest.approx(10 / 0.39, rel=1e-3)
     assert isnan(found["stopping_distance_p95"])
 

@@ -9,9 +9,9 @@ from catalogs.entries import load
 from catalogs.physical_limits import PhysicalLimits
 from catalogs.scenario import Scenario, find_scenario_problems
 from flows.making.driving import weather_of
+from studies.physics_judge.laws.constants import SURFACE_FORMS, derive_surface
 from tasks.campaign.planned_runs import RunPlan, make_planned_run
 from tasks.errors import InputError
-from tasks.eval.physics.constants import SURFACE_FORMS, derive_surface
 from tasks.surface.state import SurfaceParameters, SurfaceState
 from tasks.surface.weather import DRY, WEATHERS, Weather, find_weather, list_by_code, surface_state
 
@@ -90,23 +90,20 @@ def test_an_unknown_kind_is_refused_and_the_known_are_listed(use):
 
 
 def test_a_kinds_code_stays_what_files_and_fmus_hold():
-    assert {name: row.code for name, row in WEATHERS.items()} == {
-        "dry": 1,
-        "rain": 2,
-        "snow": 3,
-        "ice": 4,
-        "fog": 5,
-    }
+    held = {"dry": 1, "rain": 2, "snow": 3, "ice": 4, "fog": 5}
+    codes = {name: row.code for name, row in WEATHERS.items()}
+    assert codes | held == codes and len(set(codes.values())) == len(codes)
 
 
 def test_a_kind_may_grip_as_another_does_and_leave_codes_free(monkeypatch):
     """Without a tyre family of its own; an FMU refuses the codes that no kind has."""
-    gravel = replace(WEATHERS["dry"], name="gravel", code=7, grips_as="dry")
+    names = list(WEATHERS)
+    gravel = replace(WEATHERS["dry"], name="gravel", code=len(names) + 2, grips_as="dry")
     monkeypatch.setitem(WEATHERS, "gravel", gravel)
     vehicle = load("vehicle", "paper-reference")
     assert vehicle.find_tyre_family("gravel") is vehicle.find_tyre_family("dry")
-    assert vehicle.find_weathers() == ["dry", "rain", "snow", "ice", "fog", "gravel"]
-    assert list_by_code() == ("dry", "rain", "snow", "ice", "fog", "", "gravel")
+    assert vehicle.find_weathers() == [*names, "gravel"]
+    assert list_by_code() == (*names, "", "gravel")
 
 
 def test_dry_is_the_kind_that_changes_no_picture():

@@ -9,7 +9,7 @@ from catalogs.entries import load
 from catalogs.scenario import Scenario
 from studies.physics_judge.__main__ import judge
 from studies.physics_judge.clips import make_clip
-from tasks.eval.physics.constants import compute_wet_friction, derive_surface
+from studies.physics_judge.laws.constants import compute_wet_friction, derive_surface
 from tasks.studies.label_ranges import sampled_friction
 from tasks.surface.weather import Weather, find_wet_grip, surface_state
 from tasks.surface.wet_friction import ANY_SPEED, compute_wet_share

@@ -9,7 +9,7 @@ import pytest
 from numba import njit
 from numba.extending import register_jitable
 
-from catalogs.entries import load
+from catalogs.entries import entry_names, load
 from tasks.explanation import force_steps
 from tasks.surface.road_profile import FLAT_ROAD
 from tasks.vehicle.model.embedded import _compile_tyre
@@ -79,7 +79,7 @@ def test_an_fmu_takes_the_third_kind_of_tyre_as_a_rollout_does(car: Vehicle) -> 
 
 @pytest.mark.parametrize("law", contract.LAWS, ids=lambda law: law.tyre.__name__)
 def test_a_slope_is_the_derivative_of_its_friction(law: TyreLaw, vehicle: Vehicle) -> None:
-    curves = (vehicle.find_curve("rain"), load("tyre", "pacejka-205-60r15"))
+    curves = (vehicle.find_curve("rain"), *(load("tyre", name) for name in entry_names("tyre")))
     tyre = contract.scale_curve(next(c for c in curves if isinstance(c, law.curve)), 0.4, 1.2)
     assert find_law(type(tyre)) is find_law(law.curve) is law
     for slip in (0.01, 0.05, 0.3):

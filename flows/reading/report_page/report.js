@@ -170,10 +170,11 @@ async function beside(clip, sibling) {
   $("sibling").value = sibling?.clip_id ?? "";
   $("label").textContent = clip.label;
   $("badge").className = `badge ${TONES[verdictOf(clip)]}`;
-  $("badge").textContent = { passed: "pose check passed", failed: "pose check failed", unjudged: "not judged: no frames" }[verdictOf(clip)];
+  $("badge").textContent = { passed: "pose check passed", failed: "pose check failed", unjudged: "not judged" }[verdictOf(clip)];
   $("labels").replaceChildren([...LABELS.map((label) => ranged(clip, ...label)), stopMissing(clip)].filter(Boolean).join(" · "),
     " ", el("small", { textContent: "in brackets p05 to p95" }));
   $("reasons").hidden = clip.verdict.reasons.length === 0;
+  $("reasons").className = TONES[verdictOf(clip)];
   $("reasons").textContent = clip.verdict.reasons.join("; ");
   $("changes").textContent = sibling ? changes(clip, sibling) : "";
   history.replaceState(null, "", `#${clip.clip_id}${sibling ? `+${sibling.clip_id}` : ""}`);
@@ -223,10 +224,10 @@ function changes(clip, sibling) {
     .filter(([, key]) => typeof clip.figures[key] === "number" && typeof sibling.figures[key] === "number")
     .map(([name, key, digits, unit, factor]) => `${name} ${signed((sibling.figures[key] - clip.figures[key]) * factor, digits)}${unit}`);
   if (!stopMissing(clip) && stopMissing(sibling)) parts.push(stopMissing(sibling));
-  const told = ({ scenario }, key) => (key === "objects" ? JSON.stringify(scenario[key] ?? []) : scenario[key] ?? "–");
+  const read = ({ scenario }, key) => (key === "objects" ? JSON.stringify(scenario[key] ?? []) : scenario[key] ?? "–");
   const turned = [...new Set([...Object.keys(clip.scenario), ...Object.keys(sibling.scenario)])]
-    .filter((key) => told(clip, key) !== told(sibling, key))
-    .map((key) => (key === "objects" ? "other road users" : `${key} ${told(clip, key)} → ${told(sibling, key)}`));
+    .filter((key) => read(clip, key) !== read(sibling, key))
+    .map((key) => (key === "objects" ? "other road users" : `${key} ${read(clip, key)} → ${read(sibling, key)}`));
   return `${sibling.label} beside it: ${turned.join(", ")}. This changes ${parts.join(", ") || "no figure that both have"}.`;
 }
 

@@ -57,7 +57,7 @@ function asCsv(clip, columns) {
   return lines.join("\n") + "\n";
 }
 
-/** The traces under the films; `onScrub` is told the time to which someone drags. */
+/** The traces under the films; `onScrub` gets the time to which someone drags. */
 class Traces {
   constructor(box, onScrub) {
     this.box = box;
@@ -155,7 +155,7 @@ class Traces {
 const axis = (letter, k) => `${letter}${k === 0 ? "" : k + 1}`;
 const axisKey = (k) => axis("yaxis", k);
 
-/** One clock for two films, or for none; `onTime` is told what moment is on show. */
+/** One clock for two films, or for none; `onTime` gets the moment on show. */
 class Player {
   constructor(films, onTime) {
     this.films = films;

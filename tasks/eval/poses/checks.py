@@ -27,7 +27,7 @@ class JudgeCamera:
     ----------
     K : float64 [3, 3] intrinsics, pixel centres at whole numbers [px]
     T_rig_camera : float64 [4, 4] camera mount [m]
-    distortion : float64 [5] as `tasks.eval.poses.undistort.undistort_frames` takes it [1]; None for a pinhole
+    distortion : float64 [5] as `tasks.eval.poses.resampling.undistort_frames` takes it [1]; None for a pinhole
     line_delay_s : from one row's exposure to the next one's; 0 for one shutter for all rows [s]
     """
 
@@ -72,7 +72,7 @@ def prepare_clip(
 
     Parameters
     ----------
-    buffers : ``rgb``, ``depth`` and ``class`` without distortion, from `tasks.eval.poses.undistort.undistort_frames`
+    buffers : ``rgb``, ``depth`` and ``class`` without distortion, from `tasks.eval.poses.resampling.undistort_frames`
     camera : the camera that took them
     frame_interval_s : from frame to frame [s]
     film_depth_mm : water on the road [mm]
@@ -169,7 +169,7 @@ def row_times(K: Floats, shape: tuple[int, int], distortion: Floats | None, line
     ----------
     K : float64 [3, 3] intrinsics, pixel centres at whole numbers [px]
     shape : height and width [px]
-    distortion : as `tasks.eval.poses.undistort.undistort_frames` takes it
+    distortion : as `tasks.eval.poses.resampling.undistort_frames` takes it
     line_delay_s : from one row's exposure to the next one's [s]
     """
     height, width = shape

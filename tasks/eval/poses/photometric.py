@@ -161,7 +161,7 @@ def _measure_air(
     """Return the air of a clip from a few of its runs of frames, or None where it is clear or cannot be measured.
 
     Smaller pictures suffice: an error of the pose moves greys either way, the veil all of them towards its own. Pixels
-    without a gradient are read too: they tell of the veil and nothing of the pose.
+    without a gradient are read too: they show the veil and nothing of the pose.
     """
     steps = min(settings.air_steps, len(greys) - 1)
     starts = np.unique(np.linspace(0, len(greys) - 1 - steps, settings.air_spans).astype(int))

@@ -10,14 +10,10 @@ from tasks.campaign.campaign import CHANNELS
 from tasks.identification.decision.excitation import read_variable
 from tasks.identification.inference.evidence import Evidence, RunEvidence
 from tasks.identification.inference.fit import Fit
-from tasks.identification.inference.forward import (
-    RunModel,
-    compute_instrument_readings,
-    equip_vehicle,
-    simulate_run,
-)
+from tasks.identification.inference.forward import RunModel
 from tasks.identification.inference.hypothesis import Hypothesis
 from tasks.identification.inference.noise import rewhiten_channels, whiten_channels
+from tasks.identification.inference.quotients import compute_slot_quotients, simulate_point
 from tasks.vehicle.effects.forms import SHAPES, Form, name_form, read_form_name
 from tasks.vehicle.effects.ports import PORT_UNITS
 from tasks.vehicle.effects.slots import Slot
@@ -130,25 +126,21 @@ def _differentiate_run(
     ranges: Mapping[str, tuple[float, float]],
 ) -> NDArray[np.float64]:
     """Return the whitened derivatives of one run by all knots, float64 [M, K]; 0 by those that it never reaches."""
-    model = run.model
-    equipped = equip_vehicle(model, theta)
-    plain = simulate_run(model, theta, slots=slots, keep_states=True, equipped=equipped)
-    y = compute_instrument_readings(model, theta, plain)
-    columns = np.zeros((*y.shape, KNOTS * len(KEYS)))
+    model, point = run.model, simulate_point(run.model, theta, slots)
+    columns = np.zeros((*point.readings.shape, KNOTS * len(KEYS)))
+    felt, hats, firsts = [], [], []
     for i, (port, variable) in enumerate(KEYS):
         low, high = ranges[variable]
         spacing = (high - low) / (KNOTS - 1)
-        for k, first in enumerate(_find_first_samples(model, plain, variable, low, spacing)):
+        for k, first in enumerate(_find_first_samples(model, point.simulated, variable, low, spacing)):
             if first is None:
                 continue
             hat = np.zeros(KNOTS)
             hat[k] = PORT_STEP[port]
-            extra = Slot(port=port, variable=variable, origin=low, spacing=spacing, values=hat)
-            moved = simulate_run(
-                model, theta, slots=(*slots, extra), branch=(first, plain), equipped=equipped
-            )
-            readings = compute_instrument_readings(model, theta, moved)
-            columns[:, :, KNOTS * i + k] = (readings - y) / PORT_STEP[port]
+            felt.append(KNOTS * i + k)
+            hats.append(Slot(port=port, variable=variable, origin=low, spacing=spacing, values=hat))
+            firsts.append(first)
+    columns[:, :, felt] = np.moveaxis(compute_slot_quotients(point, hats, firsts), 0, -1)
     return whiten_channels(columns, run.rho, run.sigma, model.sampled)
 
 

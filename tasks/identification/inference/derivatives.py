@@ -1,8 +1,6 @@
 """Derivatives of one run's readings: by its own offsets and disturbances, by the session, and by the library."""
 
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,19 +12,16 @@ from tasks.identification.inference.evidence import (
     RunEvidence,
     set_disturbance_prior,
 )
-from tasks.identification.inference.forward import (
-    RunModel,
-    compute_instrument_readings,
-    compute_starting_speed,
-    equip_vehicle,
-    moves_alike,
-    simulate_run,
-)
+from tasks.identification.inference.forward import RunModel, compute_starting_speed
 from tasks.identification.inference.noise import whiten_channels
+from tasks.identification.inference.quotients import (
+    compute_quotient,
+    compute_slot_quotients,
+    simulate_point,
+)
 from tasks.vehicle.effects.library import Effect
 from tasks.vehicle.effects.slots import Slot
 from tasks.vehicle.effects.table import PARAMETER_INDEX
-from tasks.vehicle.model.simulation import Simulation
 
 SECOND_SHARES = (0.3, 0.6)
 """Shares of the range of an effect's second parameter at which it is tried, besides its first value."""
@@ -34,8 +29,6 @@ STEPS = (5e-4, 0.02)
 """Smallest and largest step of a number of the file: a car that stops sooner stands where another brakes [1]."""
 KNOT_STEP = (30.0, 0.01, 30.0)
 """Step of a knot at each disturbed port [N, 1, N m]."""
-Quotient = Callable[..., NDArray[np.float64]]
-"""Function that returns the difference quotient of the readings for a moved parameter vector and its step."""
 
 
 def differentiate_run(
@@ -60,33 +53,34 @@ def differentiate_run(
     disturbance : prior of the disturbances
     slots : forms that belong to that point
     """
-    simulated, compute_quotient = _prepare_quotients(model, base, slots)
+    point = simulate_point(model, base, slots)
+    speed, friction = compute_starting_speed(model, base) + 0.02, PARAMETER_INDEX["friction"]
     columns = [
-        compute_quotient(base, 0.02, initial_speed=compute_starting_speed(model, base) + 0.02),
-        compute_quotient(_shift_parameter(base, PARAMETER_INDEX["friction"], 0.01), 0.01),
+        compute_quotient(point, base, 0.02, initial_speed=speed),
+        compute_quotient(point, _shift_parameter(base, friction, 0.01), 0.01),
     ]
     for name in ("longitudinal_acceleration", "pitch"):
         offset = np.zeros_like(columns[0])
         offset[:, CHANNELS.index(name)] = 1.0
         columns.append(offset)
-    knots = []
     dt = model.run.interval
-    for port, spacing, step in zip(DISTURBED, KNOT_SPACING, KNOT_STEP, strict=True):
-        count = int(np.ceil(model.samples * dt / spacing)) + 1
-        knots.append(count)
-        for k in range(count):
-            first = min(max(int((k - 1) * spacing / dt), 0), model.samples - 1)
-            slot = Slot(
-                port=port,
-                variable="time",
-                origin=(k - 1) * spacing,
-                spacing=spacing,
-                values=np.array([0.0, step, 0.0]),
-            )
-            columns.append(compute_quotient(base, step, (slot,), branch=(first, simulated)))
+    knots = tuple(int(np.ceil(model.samples * dt / spacing)) + 1 for spacing in KNOT_SPACING)
+    hats = [
+        Slot(
+            port=port,
+            variable="time",
+            origin=(k - 1) * spacing,
+            spacing=spacing,
+            values=np.array([0.0, step, 0.0]),
+        )
+        for port, spacing, step, count in zip(DISTURBED, KNOT_SPACING, KNOT_STEP, knots, strict=True)
+        for k in range(count)
+    ]
+    firsts = [min(max(int(hat.origin / dt), 0), model.samples - 1) for hat in hats]
+    columns += list(compute_slot_quotients(point, hats, firsts))
     steps = np.clip(0.5 * np.array(tolerances.file_numbers), *STEPS)
     session = [
-        compute_quotient(_shift_parameter(base, i, step), step)
+        compute_quotient(point, _shift_parameter(base, i, step), step)
         for i, step in zip(SESSION_INDEX, steps, strict=True)
     ]
     nuisance = whiten_channels(np.stack(columns, axis=-1), rho, sigma, model.sampled)
@@ -95,7 +89,7 @@ def differentiate_run(
         rho=rho,
         sigma=sigma,
         nuisance=nuisance,
-        knots=tuple(knots),
+        knots=knots,
         information=nuisance.T @ nuisance,
         session=whiten_channels(np.stack(session, axis=-1), rho, sigma, model.sampled),
         library=np.zeros((len(nuisance), 1)),
@@ -119,7 +113,7 @@ def differentiate_by_library(
     effects : library of effects
     slots : forms that belong to that point
     """
-    _, compute_quotient = _prepare_quotients(run.model, base, slots)
+    point = simulate_point(run.model, base, slots)
     library, others = [], []
     for effect in effects:
         theta = base.copy()
@@ -127,7 +121,8 @@ def differentiate_by_library(
         if base[leading.index] == 0.0:
             for parameter in effect.parameters[1:]:
                 theta[parameter.index] = parameter.start
-        library.append(compute_quotient(_shift_parameter(theta, leading.index, leading.step), leading.step))
+        moved = _shift_parameter(theta, leading.index, leading.step)
+        library.append(compute_quotient(point, moved, leading.step))
     for index, value in list_second_values(effects):
         leading, second = effects[index].parameters
         theta = base.copy()
@@ -137,34 +132,13 @@ def differentiate_by_library(
         others.append(
             np.zeros_like(library[0])
             if there
-            else compute_quotient(_shift_parameter(theta, leading.index, leading.step), leading.step)
+            else compute_quotient(point, _shift_parameter(theta, leading.index, leading.step), leading.step)
         )
     columns, more = (
         whiten_channels(np.stack(part, axis=-1), run.rho, run.sigma, run.model.sampled)
         for part in (library, others or [np.zeros_like(library[0])])
     )
     return replace(run, library=columns, others=more)
-
-
-def _prepare_quotients(
-    model: RunModel, base: NDArray[np.float64], slots: tuple[Slot, ...]
-) -> tuple[Simulation, Quotient]:
-    """Return the simulation of a run at a point with its states, and the function that differentiates about it."""
-    equipped = equip_vehicle(model, base)
-    simulated = simulate_run(model, base, slots=slots, keep_states=True, equipped=equipped)
-    y = compute_instrument_readings(model, base, simulated)
-
-    def compute_quotient(
-        theta: NDArray[np.float64], step: float, extra: tuple[Slot, ...] = (), **options: Any
-    ) -> NDArray[np.float64]:
-        """Return the difference quotient of the readings."""
-        moved = simulated
-        if extra or options or not moves_alike(theta, base):
-            car = equipped if theta is base else None
-            moved = simulate_run(model, theta, slots=(*slots, *extra), equipped=car, **options)
-        return (compute_instrument_readings(model, theta, moved) - y) / step
-
-    return simulated, compute_quotient
 
 
 def list_second_values(effects: tuple[Effect, ...]) -> list[tuple[int, float]]:

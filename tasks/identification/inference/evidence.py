@@ -24,6 +24,7 @@ from tasks.identification.inference.disturbance import (
     compute_prior_precision,
 )
 from tasks.identification.inference.forward import (
+    SENSED,
     RunModel,
     compute_instrument_readings,
     compute_starting_speed,
@@ -101,7 +102,7 @@ class RunEvidence:
         moved, slots = move_by_offsets(theta, slots, offsets, self.knots)
         speed = compute_starting_speed(self.model, theta) + offsets[INITIAL_SPEED]
         simulated = simulate_run(self.model, moved, slots=slots, initial_speed=speed)
-        y = compute_instrument_readings(self.model, moved, simulated)
+        y = compute_instrument_readings(self.model, moved, simulated.history[:, SENSED])
         if not np.abs(y).max() < DIVERGED:
             return np.full(len(self.nuisance), BROKEN)
         y[:, CHANNELS.index("longitudinal_acceleration")] += offsets[ACCELERATION_BIAS]

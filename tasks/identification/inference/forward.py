@@ -14,9 +14,9 @@ from tasks.surface.weather import Weather, surface_state
 from tasks.vehicle.effects.grown import apply_effects
 from tasks.vehicle.effects.slots import Slot
 from tasks.vehicle.effects.table import PARAMETER_INDEX, PARAMETERS, unpack_parameter_vector
-from tasks.vehicle.model.brake_input import make_trace_input
+from tasks.vehicle.model.brake_input import BrakeInput, make_trace_input
 from tasks.vehicle.model.chassis import Conditions
-from tasks.vehicle.model.simulation import Recording, Simulation, simulate
+from tasks.vehicle.model.simulation import COLUMN, Recording, Simulation, simulate
 from tasks.vehicle.parameters import SurfaceResponse, Vehicle, compute_surface_response
 
 LEAD, LEAST_LEAD, DRIVEN_LEAD = 1.0, 5, 0.3
@@ -24,7 +24,14 @@ LEAD, LEAST_LEAD, DRIVEN_LEAD = 1.0, 5, 0.3
 a run that begins where a driver lifted his foot [s]."""
 STEP = 0.002
 """Longest integration step [s]; `compute_step_misfit` checks it by halving."""
-
+SENSED = tuple(
+    COLUMN[name]
+    for name in (
+        "speed", "longitudinal_acceleration", "wheel_speed_f", "wheel_speed_r", "pitch", "pitch_rate",
+        "heave_acceleration",
+    )
+)  # fmt: skip
+"""Columns of a history that the instruments read, in the order of `CHANNELS`."""
 
 SENSOR_INDEX = {name: row.index for name, row in PARAMETERS.items() if row.port == "sensor"}
 """Position of every error of an instrument in a parameter vector."""
@@ -54,10 +61,14 @@ class RunModel:
     samples: int
     initial_speed: float
 
-    @property
-    def substeps(self) -> int:
-        """Return the number of integration steps between samples."""
-        return max(round(self.run.interval / STEP), 1)
+    def count_substeps(self, step: float) -> int:
+        """Return the number of integration steps between samples.
+
+        Parameters
+        ----------
+        step : longest integration step [s]
+        """
+        return max(round(self.run.interval / step), 1)
 
     @property
     def measured(self) -> NDArray[np.float64]:
@@ -148,8 +159,13 @@ def prepare_run(run: Run, vehicle: Vehicle, surface: SurfaceParameters) -> RunMo
     )
 
 
-def _compute_grade_force(run: Run, vehicle: Vehicle) -> tuple[Slot, ...]:
-    """Return the force of the road's slope over time, rearward positive [N]."""
+def make_drive(model: RunModel) -> BrakeInput:
+    """Return what the driver of a run gives, as it was measured."""
+    return make_trace_input(model.run.pressure, model.run.interval, model.run.drive_torque)
+
+
+def compute_grade_force(run: Run, vehicle: Vehicle) -> tuple[Slot, ...]:
+    """Return the force of the road's slope over time, rearward positive [N]; none without a slope."""
     if run.slope is None:
         return ()
     force = vehicle.mass * vehicle.gravity * np.sin(run.slope)
@@ -214,7 +230,7 @@ def simulate_run(
     *,
     slots: tuple[Slot, ...] = (),
     initial_speed: float | None = None,
-    branch: tuple[int, Simulation] | None = None,
+    step: float = STEP,
     refinement: int = 1,
     keep_states: bool = False,
     equipped: EquippedVehicle | None = None,
@@ -227,35 +243,30 @@ def simulate_run(
     theta : float64 [len(EFFECT_TABLE)] effects, added to the vehicle's own [units of the table]
     slots : forms, added to the vehicle's own
     initial_speed : replaces the model's initial speed [m/s]
-    branch : sample, and an earlier simulation with its states, at which this one starts; earlier samples are copied
+    step : longest integration step [s]
     refinement : factor on the number of integration steps between samples [1]
     keep_states : keep the states, from which other simulations can start
-    equipped : `equip_vehicle` of the same run and vector, where many simulations share it
+    equipped : `equip_vehicle` of the same run and vector, where it is at hand
     """
     car = equip_vehicle(model, theta) if equipped is None else equipped
-    first = branch[0] if branch else 0
-    simulated = simulate(
+    return simulate(
         car.vehicle,
         car.surface,
-        make_trace_input(model.run.pressure, model.run.interval, model.run.drive_torque),
+        make_drive(model),
         car.conditions,
         Recording(
-            samples=model.samples - first,
+            samples=model.samples,
             interval=model.run.interval,
-            substeps=refinement * model.substeps,
+            substeps=refinement * model.count_substeps(step),
             keep_states=keep_states,
         ),
         initial_speed=compute_starting_speed(model, theta) if initial_speed is None else initial_speed,
-        start=branch[1].states[first] if branch else None,
-        slots=(*_compute_grade_force(model.run, car.vehicle), *slots),
+        slots=(*compute_grade_force(model.run, car.vehicle), *slots),
     )
-    if branch is None:
-        return simulated
-    return replace(simulated, history=np.concatenate((branch[1].history[:first], simulated.history)))
 
 
 def compute_instrument_readings(
-    model: RunModel, theta: NDArray[np.float64], simulated: Simulation
+    model: RunModel, theta: NDArray[np.float64], motion: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return the channels as the instruments give them: with gravity along a grade, and with sensor effects.
 
@@ -263,38 +274,33 @@ def compute_instrument_readings(
     ----------
     model : the run
     theta : float64 [len(EFFECT_TABLE)] effects and sensor errors [units of the table]
-    simulated : result of `simulate_run`
+    motion : float64 [..., samples, 7] `SENSED` columns of one or more simulations of the run
 
     Returns
     -------
-    float64 [samples, 7] in the order and units of `CHANNELS`
+    float64 [..., samples, 7] in the order and units of `CHANNELS`
     """
     g = model.vehicle.gravity
     e = {name: float(theta[i]) for name, i in SENSOR_INDEX.items()}
-    speed, pitch, pitch_rate = (simulated.column(name) for name in ("speed", "pitch", "pitch_rate"))
-    felt = (
-        simulated.column("longitudinal_acceleration")
-        + g * theta[PARAMETER_INDEX["slope"]] * model.run.direction
+    speed, acceleration, wheel_f, wheel_r, pitch, pitch_rate, up = (
+        motion[..., column] for column in range(len(SENSED))
     )
+    felt = acceleration + g * theta[PARAMETER_INDEX["slope"]] * model.run.direction
     if model.run.slope is not None:
         felt = felt + g * np.sin(model.run.slope[: model.samples])
-    up = simulated.column("heave_acceleration")
     tilt = e["mount_tilt"]
-    ax = (felt - e["gravity_leak"] * g * np.sin(pitch) + tilt * (g + up)) * (1.0 + e["acceleration_scale"])
     if model.run.speed_of_wheels:
         radius = model.vehicle.wheel_radius * (1.0 + theta[PARAMETER_INDEX["wheel_radius"]])
-        speed = 0.5 * radius * (simulated.column("wheel_speed_f") + simulated.column("wheel_speed_r"))
-    y = np.column_stack(
-        (
-            speed * (1.0 + e["speed_scale"]),
-            ax,
-            simulated.column("wheel_speed_f") * (1.0 + e["wheel_speed_scale"]),
-            simulated.column("wheel_speed_r") * (1.0 + e["wheel_speed_scale"]),
-            np.degrees(pitch) * (1.0 + e["pitch_scale"]),
-            np.degrees(pitch_rate) * (1.0 + e["pitch_rate_scale"]),
-            (up - tilt * felt) * (1.0 + e["vertical_scale"]),
-        )
-    )
+        speed = 0.5 * radius * (wheel_f + wheel_r)
+    y = np.empty_like(motion)
+    y[..., 0] = speed * (1.0 + e["speed_scale"])
+    leak = e["gravity_leak"] * g * np.sin(pitch)
+    y[..., 1] = (felt - leak + tilt * (g + up)) * (1.0 + e["acceleration_scale"])
+    y[..., 2] = wheel_f * (1.0 + e["wheel_speed_scale"])
+    y[..., 3] = wheel_r * (1.0 + e["wheel_speed_scale"])
+    y[..., 4] = np.degrees(pitch) * (1.0 + e["pitch_scale"])
+    y[..., 5] = np.degrees(pitch_rate) * (1.0 + e["pitch_rate_scale"])
+    y[..., 6] = (up - tilt * felt) * (1.0 + e["vertical_scale"])
     dt = model.run.interval
     for columns, chain in (
         (slice(0, 1), "speed"),
@@ -305,13 +311,14 @@ def compute_instrument_readings(
         delay, lag = e[f"{chain}_delay"], e.get(f"{chain}_lag", 0.0)
         if delay:
             late = np.arange(model.samples) - delay / dt
-            for j in range(columns.start, columns.stop):
-                y[:, j] = np.interp(late, np.arange(model.samples), y[:, j])
+            for one in y.reshape(-1, *y.shape[-2:]):
+                for j in range(columns.start, columns.stop):
+                    one[:, j] = np.interp(late, np.arange(model.samples), one[:, j])
         if lag > 0.0:
             keep = np.exp(-dt / lag)
-            driven = (1.0 - keep) * y[:, columns]
-            driven[0] += keep * y[0, columns]
-            y[:, columns] = filter_recursively(driven, keep)
+            driven = (1.0 - keep) * y[..., columns]
+            driven[..., 0, :] += keep * y[..., 0, columns]
+            y[..., columns] = np.moveaxis(filter_recursively(np.moveaxis(driven, -2, 0), keep), 0, -2)
     return y
 
 
@@ -319,6 +326,5 @@ def predict_channels(
     model: RunModel, theta: NDArray[np.float64], *, slots: tuple[Slot, ...] = (), refinement: int = 1
 ) -> NDArray[np.float64]:
     """Return the predicted channels of a run, float64 [samples, 7]; arguments as in `simulate_run`."""
-    return compute_instrument_readings(
-        model, theta, simulate_run(model, theta, slots=slots, refinement=refinement)
-    )
+    simulated = simulate_run(model, theta, slots=slots, refinement=refinement)
+    return compute_instrument_readings(model, theta, simulated.history[:, SENSED])

@@ -38,6 +38,7 @@ from tasks.render.weather.skies import Daylight, draw_sky_kind, draw_sun, light_
 from tasks.render.weather.sky import SkyLight, cloud_transmittance, light_from
 from tasks.render.weather.snow.field import LyingSnow, snow_field
 from tasks.render.weather.snow.layer import snow_layer, snowed_over, whiten_gaussians
+from tasks.render.weather.wet.soaked import soak_gaussians
 from tasks.render.weather.wet.wet_road import LightOnRoad, RoadFilm, wet_layer
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.route import Route
@@ -205,6 +206,9 @@ def weather_scene(
         scene, incident, strength = relight_street(gaussians, gaussians.light, before, own_sun, light)
         white = (light.to_sun[2] * light.colours[0] + light.colours[1]) / strength
         lit = LitScene(environment=environment, white=white, daylight=light, strength=strength)
+    if look.film is not None and look.walls is not None and state.film_depth_mm > 0:
+        mirrors = 0.0 if gaussians.light is None else gaussians.light[:, 3]
+        scene = soak_gaussians(scene, mirrors, incident, look.film, look.walls, seed)
     field = None
     if (cover := look.snow_cover) is not None:
         field = snow_field(
@@ -308,6 +312,7 @@ def apply_weather(
             parameters=film,
             seed=weather.seed,
             rate_mm_h=state.precipitation_mm_h,
+            falling=outside.population,
             refracts=weather.refracts,
         )
         light = LightOnRoad(environment=outside.environment, sky=sky, extinction=air.extinction)

@@ -7,6 +7,7 @@ from tasks.errors import InputError
 from tasks.render.weather.falling.precipitation import NearField, ParticleParameters
 from tasks.render.weather.sky import SkyParameters
 from tasks.render.weather.snow.layer import SnowCoverParameters
+from tasks.render.weather.wet.soaked import SoakedWallParameters
 from tasks.render.weather.wet.wet_road import RoadFilmParameters
 from tasks.surface.weather import find_weather
 
@@ -35,12 +36,14 @@ class KindLook:
     ----------
     particles : what falls, with its extinction
     film : the film on the road, of water or of ice
+    walls : how rain wets what stands
     snow_cover : snow on the ground
     anchors_mm_h : rates, ascending, between which the paper's composition blends pictures [mm/h]
     """
 
     particles: ParticleParameters | None = None
     film: RoadFilmParameters | None = None
+    walls: SoakedWallParameters | None = None
     snow_cover: SnowCoverParameters | None = None
     anchors_mm_h: tuple[float, ...] | None = None
 

@@ -76,7 +76,8 @@ def share_light(surfels: Surfels, layout: StreetLayout, line: Course, casters: C
     facing = np.maximum(np.einsum("ij,ij->i", normal, to_sun), 0.0)
     direct = np.zeros(len(point))
     lit = np.flatnonzero(facing > 0)
-    direct[lit] = facing[lit] * _sun_share(point[lit], to_sun[lit], casters)
+    if len(lit):
+        direct[lit] = facing[lit] * _sun_share(point[lit], to_sun[lit], casters)
     openness = surfels.openness[order] * _ambient_share(point, casters.footprints)
     sky = sky_share(point, normal, layout) * openness
     around = (1 - sky) * (0.25 + 0.75 * openness)

@@ -1,4 +1,4 @@
-"""The panorama around the street: sky, sun, clouds and a hazy skyline."""
+"""The panorama around the street: sky, sun, clouds and far ridges."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +12,11 @@ Floats = NDArray[np.float64]
 _ROWS = 1024
 _ZENITH, _HORIZON = np.array([0.10, 0.225, 0.52]), np.array([0.56, 0.69, 0.84])
 _CLOUD_LIGHT, _CLOUD_SHADE = np.array([1.05, 1.02, 0.98]), np.array([0.50, 0.55, 0.63])
-_GROUND, _FAR_HOUSES = np.array([0.16, 0.155, 0.145]), np.array([0.30, 0.34, 0.39])
+_GROUND = np.array([0.16, 0.155, 0.145])
 _GLOW = np.array([1.0, 0.9, 0.72])
 _SUN_RADIUS_DEG = 0.6
+_RIDGES = ((0.030, 0.9, np.array([0.19, 0.22, 0.25])), (0.018, 0.4, np.array([0.115, 0.135, 0.13])))
+"""Mean height [rad], longest wave by the distance and colour of each ridge of far trees, dimmer than the sky [1]."""
 _CLOUD_BASE, _CLOUD_WAVE = 1.0, 0.8
 """Height of the cloud layer and length of its longest wave, in units of that height [1]."""
 
@@ -37,7 +39,7 @@ def draw_panorama(layout: StreetLayout, seed: int) -> NDArray[np.float32]:
     picture = np.empty((_ROWS, 2 * _ROWS, 3), dtype=np.float32)
     picture[upper] = _sky_radiance(layout, seed, elevation[upper, None], azimuth[None, :])
     haze = np.exp(elevation[~upper] / 0.05)[:, None, None]
-    picture[~upper] = _GROUND * (1 - haze) + 0.75 * _FAR_HOUSES * haze
+    picture[~upper] = _GROUND * (1 - haze) + _RIDGES[-1][2] * haze
     return picture
 
 
@@ -78,17 +80,12 @@ def _draw_clouds(
 
 
 def _add_skyline(seed: int, sky: Floats, elevation: Floats, azimuth: Floats) -> Floats:
-    """Add rows of far houses and trees, paler with distance."""
-    rng = named_generator(seed, "skyline")
-    turn = (azimuth[0] % (2 * np.pi)) / (2 * np.pi)
-    for blocks, height, pale in ((90, 0.050, 0.72), (140, 0.036, 0.45)):
-        step = np.floor(turn * blocks).astype(np.int64) % blocks
-        roof = (
-            height * (0.45 + 0.55 * rng.random(blocks)[step])
-            + 0.004
-            * rng.standard_normal(6 * blocks)[np.floor(turn * 6 * blocks).astype(np.int64) % (6 * blocks)]
-        )
-        colour = _FAR_HOUSES * (1 - pale) + _HORIZON * pale * 0.9
-        cover = np.clip((roof - elevation) / 0.002, 0, 1)[..., None]
+    """Add ridges of far trees, paler with distance."""
+    x, y = np.cos(azimuth[0]), np.sin(azimuth[0])
+    for number, (height, wave, colour) in enumerate(_RIDGES):
+        rise = fractal_noise(named_generator(seed, f"ridge {number}"), x, y, wave, 3)
+        crowns = fractal_noise(named_generator(seed, f"crowns {number}"), x, y, 0.03, 3)
+        top = height * np.maximum(1 + 0.35 * rise + 0.10 * crowns, 0.1)
+        cover = np.clip((top - elevation) / 0.002, 0, 1)[..., None]
         sky = sky * (1 - cover) + colour * cover
     return sky

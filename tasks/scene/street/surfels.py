@@ -134,7 +134,7 @@ def sheet_cells(
 
 
 def graded_cells(
-    breaks: ArrayLike, size: ArrayLike, fine: ArrayLike
+    breaks: ArrayLike, size: ArrayLike, fine: ArrayLike, growth: float = 0.7
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """Split a line at sharp edges into cells that grow away from them, so that the edges stay sharp.
 
@@ -143,6 +143,7 @@ def graded_cells(
     breaks : [n + 1] increasing positions of the edges [m]
     size : [n] or scalar, largest cell of each interval, kept to within a quarter [m]
     fine : [n] or scalar, largest cell next to an edge over ``size``; from 1 on all cells have one size [1]
+    growth : largest cell by the distance of its middle from the nearest edge [1]
 
     Returns
     -------
@@ -160,20 +161,20 @@ def graded_cells(
             inner = np.arange(1, int(np.ceil(length / (1.25 * largest)))) * largest
             inner *= length / (largest * (len(inner) + 1))
         else:
-            inner = np.array(_halve_interval(length, largest, share))
+            inner = np.array(_halve_interval(length, largest, share, growth))
         cuts += [edges[k] + inner, edges[k + 1 : k + 2]]
         interval += [k] * (len(inner) + 1)
     cut = np.concatenate(cuts)
     return (cut[1:] + cut[:-1]) / 2, np.diff(cut), np.array(interval, dtype=np.int64)
 
 
-def _halve_interval(length: float, largest: float, share: float) -> list[float]:
+def _halve_interval(length: float, largest: float, share: float, growth: float) -> list[float]:
     """Return inner cuts of an interval [m], halved until no cell is too large for its distance from the ends."""
     cuts, pending = [], [(0.0, length)]
     while pending:
         a, b = pending.pop()
         away = min((a + b) / 2, length - (a + b) / 2)
-        if b - a > 1.25 * min(largest, max(share * largest, 0.7 * away)):
+        if b - a > 1.25 * min(largest, max(share * largest, growth * away)):
             cuts.append((a + b) / 2)
             pending += [((a + b) / 2, b), (a, (a + b) / 2)]
     return sorted(cuts)

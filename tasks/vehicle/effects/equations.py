@@ -38,6 +38,18 @@ def compute_resistance(effects: EffectValues, speed: float, direction: float, sn
 
 
 @register_jitable(cache=True, error_model="numpy", forceinline=True)
+def compute_rolling_resistance(effects: EffectValues, speed: float) -> float:
+    """Return the rolling resistance of a wheel over its load (Gillespie 1992) [1].
+
+    Parameters
+    ----------
+    effects : numbers of the vehicle's effects
+    speed : speed of the vehicle [m/s]
+    """
+    return effects.rolling_coefficient + effects.rolling_speed * speed
+
+
+@register_jitable(cache=True, error_model="numpy", forceinline=True)
 def compute_engine_torque(effects: EffectValues, omega: float, radius: float) -> float:
     """Return the torque of the engine on the driven wheels, against their rotation [N m]: drag, less the idle creep.
 

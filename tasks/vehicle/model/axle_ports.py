@@ -12,7 +12,7 @@ from tasks.vehicle.effects.chassis import (
     compute_lateral_reserve,
     compute_stick_share,
 )
-from tasks.vehicle.effects.equations import compute_friction_factor
+from tasks.vehicle.effects.equations import compute_friction_factor, compute_rolling_resistance
 from tasks.vehicle.effects.lateral_force import NO_HOLD, LateralHold, compute_lateral_hold
 from tasks.vehicle.effects.slots import PortSums
 from tasks.vehicle.effects.table import EffectValues
@@ -194,8 +194,7 @@ def compute_rolling_axle(
     rubbing = effects.pad_drag / (wheels.front.brake_gain + wheels.rear.brake_gain)
     brake_torque = gain * (pressure * abs_scale + rubbing) * turning
     lever = wheels.radius - effects.radius_by_load * (ground.load - static_load) / stiffness
-    rolling = effects.rolling_coefficient + effects.rolling_speed * speed
-    offset = rolling * turning - effects.slope_moment * ground.slope
+    offset = compute_rolling_resistance(effects, speed) * turning - effects.slope_moment * ground.slope
     ground_moment = ground.load * lever * offset
     return AxlePorts(
         ground, slip, force_slip, tyre_force, abs_scale, gain * pressure, brake_torque, shaft_torque * turning,

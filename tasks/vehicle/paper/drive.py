@@ -20,6 +20,7 @@ DRIVE_COLUMNS = (
     "brake_torque_r", "abs_scale_f", "abs_scale_r", "brake_pressure_mpa", "road_force",
 )  # fmt: skip
 """Columns of the log that ``simulate_drive`` returns."""
+_WIDTH = len(DRIVE_COLUMNS)
 
 
 @njit(cache=True, nogil=True)
@@ -58,7 +59,7 @@ def simulate_drive(
     The log, shape (steps + 1, len(DRIVE_COLUMNS)); the brake onset [s], infinite if it never comes; the sample
     of the stop, -1 if there is none; the time of the stop, infinite if there is none [s].
     """
-    log = np.empty((steps + 1, 17))
+    log = np.empty((steps + 1, _WIDTH))
     station, speed = 0.0, initial_speed
     omega_f, omega_r = initial_speed / wheels.radius, initial_speed / wheels.radius
     scale_f, scale_r, at_ground = 1.0, 1.0, 0.0

@@ -47,7 +47,7 @@ class PaperRun:
 
     Parameters
     ----------
-    log : columns of ``DRIVE_COLUMNS``, shape (n, 17)
+    log : columns of ``DRIVE_COLUMNS``, shape (n, len(DRIVE_COLUMNS))
     states : half-car states, shape (n, 8) [m, rad, m/s, rad/s]
     road : road height under the front and the rear axle, shape (n, 2) [m]
     loads : contact loads of the half-car, shape (n, 2) [N]
@@ -163,7 +163,7 @@ def simulate_body(
     Parameters
     ----------
     vehicle, response, hazard : as in ``run_paper_mode``
-    log : log of `simulate_drive`, shape (n, 17)
+    log : log of `simulate_drive`, shape (n, len(DRIVE_COLUMNS))
     braked : brake onset and stop of the drive; `NO_STOP` leaves the low-speed rule out
     step : step of the grid [s]
     held_share : as in `compute_brake_pitch_input`

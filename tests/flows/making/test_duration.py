@@ -6,10 +6,10 @@ import pytest
 from catalogs.entries import entry_names, load
 from catalogs.grids import GridFile
 from flows.auditing.explain import explain_frame
-from flows.auditing.physics import audit_physics, clip_columns, clip_facts
 from flows.making.driving import simulate_drive
 from flows.making.generate import generate_dataset
 from flows.making.plan import make_plan
+from studies.physics_judge.audit_physics import audit_physics, clip_columns, clip_facts
 from tests.toy_street import write_toy_grid
 
 GRID = """

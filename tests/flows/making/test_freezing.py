@@ -7,7 +7,6 @@ from typer.testing import CliRunner
 
 import flows.making.freezing
 from catalogs.entries import find_entry, load
-from flows.auditing.physics import audit_physics
 from flows.cli import app
 from flows.making.freezing import (
     freeze_run,
@@ -19,6 +18,7 @@ from flows.making.freezing import (
 )
 from flows.store.sealed import recorded_grid
 from manifests.frozen_run import list_frozen, parameters_that_matter, read_frozen, seal_run
+from studies.physics_judge.audit_physics import audit_physics
 from tasks.errors import InputError
 
 SMALL = "multibody-speed-check"

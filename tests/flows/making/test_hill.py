@@ -12,8 +12,6 @@ from catalogs.road_grade import ROAD_GRADE
 from catalogs.scenes import write_scene
 from flows.auditing.audit import audit_dataset
 from flows.auditing.explain import explain_frame
-from flows.auditing.physics import audit_physics, clip_columns, clip_facts
-from flows.auditing.physics_constants import read_constants
 from flows.auditing.repair import repair_dataset
 from flows.making.catalogue import Catalogue
 from flows.making.freezing import frozen_run
@@ -23,9 +21,11 @@ from flows.store.layout import Layout
 from flows.store.telemetry import columns_hash
 from studies.lineage.driven_lines import Asked, drive_clip, is_driven
 from studies.lineage.kept_lines import list_lines
+from studies.physics_judge.audit_physics import audit_physics, clip_columns, clip_facts
+from studies.physics_judge.frozen_constants import read_constants
+from studies.physics_judge.laws.audit import audit_clip
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
-from tasks.eval.physics.audit import audit_clip
 from tasks.scene.route import route_from_positions
 from tests.toy_street import TOY_CAMERA, toy_street
 

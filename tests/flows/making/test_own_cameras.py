@@ -7,11 +7,11 @@ import pytest
 
 from catalogs.scenes import write_scene
 from flows.auditing.audit import audit_dataset
-from flows.auditing.physics import clip_facts
 from flows.exporting.export import export_dataset
 from flows.making.catalogue import catalogue_of
 from flows.making.generate import generate_dataset
 from flows.making.plan import make_plan, read_plan
+from studies.physics_judge.audit_physics import clip_facts
 from tasks.errors import InputError
 from tasks.render.camera import measure_mount
 from tests.toy_street import TOY_CAMERA, toy_street

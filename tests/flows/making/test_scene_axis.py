@@ -10,13 +10,13 @@ from catalogs.road_grade import name_grade_file
 from catalogs.scenes import write_scene
 from flows.auditing.audit import audit_dataset
 from flows.auditing.explain import explain_frame
-from flows.auditing.physics import audit_physics, clip_columns, clip_facts
 from flows.exporting.export import export_dataset
 from flows.making.generate import generate_dataset
 from flows.making.plan import make_plan, read_plan
 from flows.reading.report import make_report
 from flows.store.layout import Layout
 from studies.lineage.trace import trace_lineage
+from studies.physics_judge.audit_physics import audit_physics, clip_columns, clip_facts
 from tasks.errors import InputError
 from tasks.scene.route import route_from_positions
 from tests.toy_street import TOY_CAMERA, toy_street

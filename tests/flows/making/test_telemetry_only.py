@@ -9,7 +9,6 @@ import pytest
 import musync
 from flows.auditing.audit import audit_dataset
 from flows.auditing.explain import explain_frame
-from flows.auditing.physics import audit_physics
 from flows.auditing.repair import repair_dataset
 from flows.auditing.verify import verify_dataset
 from flows.making.generate import generate_dataset
@@ -18,6 +17,7 @@ from flows.reading.describe import describe_dataset
 from flows.reading.previews import make_films
 from flows.reading.query import query_dataset
 from flows.store.layout import Layout
+from studies.physics_judge.audit_physics import audit_physics
 from tasks.errors import InputError
 
 

@@ -13,11 +13,11 @@ from catalogs.references import ReferenceCase
 from catalogs.scenario import Scenario
 from flows.auditing.audit import audit_dataset
 from flows.auditing.explain import explain_frame
-from flows.auditing.physics import audit_physics, clip_columns, clip_facts
 from flows.making.request import make_dataset
 from flows.reading.query import query_dataset
 from studies.lineage.trace import trace_lineage
 from studies.negative_controls.study import run_controls
+from studies.physics_judge.audit_physics import audit_physics, clip_columns, clip_facts
 from tasks.errors import InputError
 from tasks.eval.state_agreement import WHEELS
 from tasks.vehicle.replayed_trace import replay_trace

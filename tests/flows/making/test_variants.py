@@ -13,7 +13,6 @@ from catalogs.grids import FaultyGrid, GridFile
 from catalogs.scenes import write_scene
 from flows.auditing.audit import audit_dataset
 from flows.auditing.explain import explain_frame
-from flows.auditing.physics import audit_physics, clip_columns, clip_facts
 from flows.auditing.repair import repair_dataset
 from flows.exporting.export import export_dataset
 from flows.making.catalogue import Catalogue, catalogue_of
@@ -28,6 +27,7 @@ from flows.store.frames import read_clip
 from flows.store.sealed import read_manifest
 from manifests.explain import find_input_differences
 from studies.paper.replay import replay_audit
+from studies.physics_judge.audit_physics import audit_physics, clip_columns, clip_facts
 from tasks.errors import InputError
 from tests.toy_street import TOY_CAMERA, toy_street
 

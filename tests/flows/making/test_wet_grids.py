@@ -4,10 +4,10 @@ import pytest
 
 from catalogs.entries import load
 from flows.auditing.explain import explain_frame
-from flows.auditing.physics import audit_physics
 from flows.making.generate import generate_dataset
 from flows.making.plan import make_plan
 from flows.store.sealed import read_manifest, recorded_grid
+from studies.physics_judge.audit_physics import audit_physics
 from tests.toy_street import write_toy_grid
 
 GRID = """

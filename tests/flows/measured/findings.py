@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+from catalogs.vehicles import open_vehicle
 from flows.measured.grown_vehicle import grown_vehicle
 from tasks.identification.decision.answer import NamedEffect, Parameter, Verdict
 from tasks.identification.inference.disturbance import Disturbance
@@ -51,7 +52,7 @@ def verdict_of(*effects: NamedEffect) -> Verdict:
 
 def grown_file(path: Path, *effects: NamedEffect, reached: Mapping[str, tuple[float, float]]) -> Path:
     """The reference vehicle with these effects, all of them carried."""
-    text, missing = grown_vehicle("paper-reference", verdict_of(*effects), reached)
+    text, missing = grown_vehicle(open_vehicle("paper-reference"), verdict_of(*effects), reached)
     assert text is not None and missing == []
     path.write_text(text)
     return path

@@ -118,8 +118,8 @@ def test_a_tolerance_that_no_verdict_uses_is_told(tmp_path: Path) -> None:
     drag = {"value": 0.6, "unit": "m2", "source": "data sheet", "tolerance": 0.06}
     file = tmp_path / "car.yaml"
     file.write_text(yaml.safe_dump({"extends": "paper-reference", **numbers, "effects": {"drag_area": drag}}))
-    assert find_unused_tolerances(str(file)) == ["cg_height", "drag_area"]
-    assert find_unused_tolerances("paper-reference") == []
+    assert find_unused_tolerances(open_vehicle(file)) == ["cg_height", "drag_area"]
+    assert find_unused_tolerances(open_vehicle("paper-reference")) == []
 
 
 def test_runs_that_grip_as_the_mapping_says_pull_no_friction(closed: Path) -> None:
@@ -275,7 +275,7 @@ def test_the_verdict_has_the_keys_that_others_read_and_is_plain_json() -> None:
         detectable={"bump_stop": float("inf")},
     )  # fmt: skip
     odds = (OpenOdds(names=("aerodynamic_drag",), odds=1.0), OpenOdds(names=(), odds=0.25))
-    content = verdict_json(replace(found, odds=odds))
+    content = verdict_json(replace(found, odds=odds), load("library of effects"))
     assert {"verdict", "effects", "rivals", "discriminating_experiment", "error"} <= set(content)
     effect = content["effects"][0]
     assert {"name", "class", "port", "variable", "parameters", "score", "gain", "spread"} <= set(effect)
@@ -292,7 +292,7 @@ def test_the_grown_vehicle_has_the_effect_the_retuned_number_and_where_they_come
         named("retuned_pressure_gain", "retune", parameter("pressure_gain", 0.1)),
         named("retuned_friction_level", "retune", parameter("friction", -0.05)),
     )
-    text, missing = grown_vehicle("paper-reference", verdict, {})
+    text, missing = grown_vehicle(open_vehicle("paper-reference"), verdict, {})
     assert text is not None and missing == []
     path = tmp_path / "grown.yaml"
     path.write_text(text)
@@ -310,13 +310,16 @@ def test_the_grown_vehicle_has_the_effect_the_retuned_number_and_where_they_come
 def test_sensor_faults_do_not_change_the_car_and_what_is_not_carried_is_named() -> None:
     sensor = named("sensor_pitch_scale", "sensor", parameter("pitch_scale", 0.05))
     unheard = named("unheard_of", "effect", parameter("no_such_number", 0.05))
-    assert grown_vehicle("paper-reference", verdict_of(sensor), {}) == (None, [])
-    assert grown_vehicle("paper-reference", verdict_of(unheard), {}) == (None, ["unheard_of: no_such_number"])
+    assert grown_vehicle(open_vehicle("paper-reference"), verdict_of(sensor), {}) == (None, [])
+    assert grown_vehicle(open_vehicle("paper-reference"), verdict_of(unheard), {}) == (
+        None,
+        ["unheard_of: no_such_number"],
+    )
 
 
 def test_a_dataset_is_planned_with_the_grown_vehicle_in_coupled_mode(tmp_path: Path) -> None:
     text, _ = grown_vehicle(
-        "paper-reference",
+        open_vehicle("paper-reference"),
         verdict_of(named("aerodynamic_drag", "effect", parameter("drag_area", 0.7, "m2"))),
         {},
     )

@@ -37,7 +37,7 @@ def found(effect: NamedEffect, campaign: str, rivals: tuple[tuple[str, NamedEffe
 
 
 def grown(base: str, verdict: Verdict, path: Path) -> Path:
-    text, missing = grown_vehicle(base, verdict, {})
+    text, missing = grown_vehicle(open_vehicle(base), verdict, {})
     assert text is not None and missing == []
     path.write_text(text)
     return path
@@ -56,10 +56,13 @@ def test_what_no_vehicle_can_carry_is_missing_from_it_and_the_rest_is_there(numb
         drag(0.3), name="of the road", parameters=(replace(drag(0.3).parameters[0], name=number),)
     )
     verdict = replace(found(drag(0.5), "spring"), effects=(foreign, drag(0.5)))
-    text, missing = grown_vehicle("paper-reference", verdict, {})
+    text, missing = grown_vehicle(open_vehicle("paper-reference"), verdict, {})
     assert missing == [f"of the road: {number}"]
     assert text is not None and "drag_area" in text
-    assert grown_vehicle("paper-reference", replace(verdict, effects=(foreign,)), {}) == (None, missing)
+    assert grown_vehicle(open_vehicle("paper-reference"), replace(verdict, effects=(foreign,)), {}) == (
+        None,
+        missing,
+    )
 
 
 def test_what_the_runs_could_not_tell_from_it_stands_in_its_provenance(tmp_path: Path) -> None:
@@ -86,9 +89,9 @@ def test_the_tyre_that_the_extended_vehicle_has_beside_it_goes_with_what_grows(t
     (tmp_path / "base.yaml").write_text("extends: paper-reference\ntyre: mine\n")
     (tmp_path / "mine.tir").write_bytes(tyre.read_bytes())
     (tmp_path / "car.yaml").write_text("extends: base.yaml\n")
-    assert tyre_beside(str(tmp_path / "car.yaml")) == {"mine.tir": tyre.read_bytes()}
+    assert tyre_beside(open_vehicle(tmp_path / "car.yaml")) == {"mine.tir": tyre.read_bytes()}
     (tmp_path / "base.yaml").write_text("extends: paper-reference\ntyre: pacejka-205-60r15\n")
-    assert tyre_beside(str(tmp_path / "car.yaml")) == {}
+    assert tyre_beside(open_vehicle(tmp_path / "car.yaml")) == {}
 
 
 def test_a_tyre_beside_a_vehicle_of_the_catalogue_goes_along_with_what_extends_that(
@@ -100,4 +103,4 @@ def test_a_tyre_beside_a_vehicle_of_the_catalogue_goes_along_with_what_extends_t
     (tmp_path / "vehicles" / "slick.yaml").write_text("extends: paper-reference\ntyre: slick\n")
     (tmp_path / "tyres" / "pacejka-205-60r15.tir").rename(tmp_path / "vehicles" / "slick.tir")
     (tmp_path / "car.yaml").write_text("extends: slick\n")
-    assert list(tyre_beside(str(tmp_path / "car.yaml"))) == ["slick.tir"]
+    assert list(tyre_beside(open_vehicle(tmp_path / "car.yaml"))) == ["slick.tir"]

@@ -125,7 +125,7 @@ def test_a_friction_of_one_kind_of_weather_has_its_source_in_that_tyre_family_al
 def test_a_grade_belongs_to_the_road():
     (grade,) = (e for e in LIBRARY if e.name in OF_THE_ROAD)
     found = verdict_of(found_effect(grade, {"slope": 0.01}))
-    assert grown_vehicle("paper-reference", found, {}) == (None, ["retuned_grade: slope"])
+    assert grown_vehicle(open_vehicle("paper-reference"), found, {}) == (None, ["retuned_grade: slope"])
 
 
 def test_a_vehicle_that_calibration_grew_grows_further_and_keeps_what_it_had(tmp_path):
@@ -135,7 +135,7 @@ def test_a_vehicle_that_calibration_grew_grows_further_and_keeps_what_it_had(tmp
     found = verdict_of(
         found_effect(lag, {"lag": 0.08}), found_effect(rolling, {"rolling_coefficient": 0.004})
     )
-    text, missing = grown_vehicle("multibody-grown", found, {})
+    text, missing = grown_vehicle(open_vehicle("multibody-grown"), found, {})
     assert text is not None and missing == []
     path = tmp_path / "grown.yaml"
     path.write_text(text)

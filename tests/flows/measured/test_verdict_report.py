@@ -21,6 +21,7 @@ from tasks.identification.decision.verdict import Outcome, judge_runs
 from tests.browsers import find_barriers, open_chromium
 
 VEHICLE, SURFACE = load("vehicle", "paper-reference"), load("surface", "dense-asphalt")
+LIBRARY = load("library of effects")
 STOPS = tuple(
     RunPlan(speed=speed, peak=peak, duration=2.6, disc_rise=20.0)
     for speed, peak in ((16.0, 1.2), (20.0, 1.8), (12.0, 0.8))
@@ -57,7 +58,7 @@ def facts(outcome: Outcome, **more: Any) -> dict[str, Any]:
         "vehicle_file": "out/car-grown.yaml",
         "not_carried_by_coupled_mode": [],
     }
-    return verdict_json(outcome.verdict) | describe_search(outcome) | told | more
+    return verdict_json(outcome.verdict, LIBRARY) | describe_search(outcome, LIBRARY) | told | more
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +93,7 @@ def test_where_nothing_is_named_the_verdict_says_whether_the_model_misses_the_ru
 ) -> None:
     nothing = replace(judged[0].verdict, effects=(), rivals=())
     sentences = [
-        describe_search(replace(judged[0], verdict=replace(nothing, disagreement=why)))["sentence"]
+        describe_search(replace(judged[0], verdict=replace(nothing, disagreement=why)), LIBRARY)["sentence"]
         for why in ("", "the runs disagree")
     ]
     assert sentences[0].startswith("These runs show nothing that the model lacks. Its own numbers, fitted to")
@@ -109,7 +110,7 @@ def test_the_first_sentence_says_whether_stops_are_missed_beside_what_is_named(
     rest = "The speed is still missed by more than its noise: more is lacking than that."
     for misses in (False, True):
         outcome = replace(judged[0], verdict=replace(judged[0].verdict, misses=misses))
-        assert describe_search(outcome)["sentence"].endswith(rest) is misses
+        assert describe_search(outcome, LIBRARY)["sentence"].endswith(rest) is misses
 
 
 def test_the_page_says_the_verdict_its_numbers_rivals_and_what_to_do_next(

@@ -10,7 +10,6 @@ import pytest
 
 import musync
 from flows.auditing.explain import explain_frame
-from flows.auditing.physics import audit_physics
 from flows.exporting.export import export_dataset
 from flows.reading.describe import describe_dataset
 from flows.reading.previews import make_films
@@ -20,6 +19,7 @@ from flows.store.telemetry import read_table
 from studies.evaluation.evaluation import evaluate_dataset
 from studies.negative_controls.study import run_controls
 from studies.paper.sheets import draw_sheets
+from studies.physics_judge.audit_physics import audit_physics
 from tasks.errors import InputError
 
 

@@ -11,13 +11,13 @@ import musync
 from flows.auditing.audit import audit_dataset
 from flows.auditing.dataset_diff import compare_datasets
 from flows.auditing.explain import explain_frame
-from flows.auditing.physics import audit_physics
 from flows.exporting.export import export_dataset
 from flows.reading.query import query_dataset
 from flows.reading.report import make_report
 from flows.store.layout import Layout
 from flows.store.telemetry import read_columns
 from studies.lineage import trace as lineage
+from studies.physics_judge.audit_physics import audit_physics
 from tests.flows.older import make_older
 
 LATER = (

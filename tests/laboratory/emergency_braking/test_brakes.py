@@ -27,6 +27,10 @@ def road(weather: str):
     return surface_of(Scenario(**TABLE.list_weathers()[weather]), ASPHALT)
 
 
+def brake(kind: str, state):
+    return make_brake(kind, CAR, find_tyre_friction(CAR, state), TABLE)
+
+
 def compute_impact_speed(closing: float, gap: float, deceleration: float, delay: float, rise: float) -> float:
     """Return the closing speed at the impact, of a deceleration that rises on a straight line and then stays [m/s]."""
     left = gap - closing * (delay + rise) + deceleration * rise * rise / 6.0
@@ -48,7 +52,7 @@ def make_case(approach_km_h: float, **track: float) -> Case:
 @pytest.mark.parametrize(("speed", "target"), [(50, 0), (60, 0), (70, 0), (70, 20), (80, 20)])
 def test_the_impact_in_the_dry_is_the_closed_form(speed, target):
     dry, case = road("dry"), approach_at(speed, target)
-    trigger, line = make_brake("blind", CAR, dry, TABLE)
+    trigger, line = brake("blind", dry)
     outcome = drive_approach(CAR, dry, case, trigger, line, TABLE)
     assert outcome.collided and outcome.clearance == outcome.min_ttc == 0.0
     # the demand falls on a look, and the first pressure that is seen is that of the middle of a step
@@ -72,16 +76,16 @@ def test_the_brake_that_knows_friction_stops_a_margin_before_the_target_and_brak
     weather,
 ):
     state, case = road(weather), approach_at(50, 0)
-    outcome = drive_approach(CAR, state, case, *make_brake("friction", CAR, state, TABLE), TABLE)
+    outcome = drive_approach(CAR, state, case, *brake("friction", state), TABLE)
     assert not outcome.collided and 0.3 < outcome.clearance < 4.0
-    blind = drive_approach(CAR, state, case, *make_brake("blind", CAR, state, TABLE), TABLE)
+    blind = drive_approach(CAR, state, case, *brake("blind", state), TABLE)
     assert blind.collided and blind.brake_time > outcome.brake_time
 
 
 def test_no_brake_sees_through_fog_and_one_that_needs_more_road_than_that_brakes_at_its_visual_range():
     state, case = surface_of(Scenario(weather="fog", visual_range_m=12.0), ASPHALT), approach_at(60, 0)
     far, near = (
-        drive_approach(CAR, state, case, *make_brake("friction", CAR, state, TABLE), TABLE, visual_range_m)
+        drive_approach(CAR, state, case, *brake("friction", state), TABLE, visual_range_m)
         for visual_range_m in (inf, find_visual_range(state, load_weather()))
     )
     line = TABLE.brake_line
@@ -96,7 +100,7 @@ def test_no_brake_sees_through_fog_and_one_that_needs_more_road_than_that_brakes
 def test_the_brake_that_knows_friction_stops_behind_one_that_brakes(gap, slows):
     dry = road("dry")
     case = make_case(50, gap_m=OVERHANG + gap, speed_km_h=50, change_at_s=1, acceleration_m_s2=-slows)
-    outcome = drive_approach(CAR, dry, case, *make_brake("friction", CAR, dry, TABLE), TABLE)
+    outcome = drive_approach(CAR, dry, case, *brake("friction", dry), TABLE)
     assert not outcome.collided and outcome.clearance < 4.0 and outcome.brake_time > 1.0
 
 
@@ -141,7 +145,7 @@ def test_the_command_compares_brakes_writes_a_page_and_refuses_names_that_are_no
     asked = {"protocol": ["r152-pedestrian"], "weather": ["dry", "snow-3"], "out": str(tmp_path)}
     result = compare_brakes(**asked, brake=["blind", "friction"])
     assert result == compare_brakes(**asked, brake=["blind", "friction"])
-    assert len(result["rows"]) == 9 * 2 * 2
+    assert len(result["rows"]) == 10 * 2 * 2
     for row in result["rows"]:
         assert row["p05"] <= row["p50"] <= row["p95"]
     told = {(row["brake"], row["weather"]): row["collided"] for row in result["summary"]}

@@ -1,8 +1,9 @@
 """OpenSCENARIO of every protocol: read again as the same approach, valid by the schema, and what is refused."""
 
 import re
-from importlib.util import find_spec
+import subprocess
 from pathlib import Path
+from shutil import which
 from xml.etree import ElementTree as ET
 
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from catalogs.entries import load
 from catalogs.road_users import RoadUser
 from catalogs.scenario import Scenario
-from catalogs.scenes.opendrive import find_street
+from catalogs.scenes.opendrive import find_street, format_opendrive
 from studies.emergency_braking.cases import list_cases
 from studies.emergency_braking.compare import compare_brakes
 from studies.emergency_braking.openscenario import format_openscenario, read_openscenario
@@ -84,14 +85,27 @@ def test_the_command_writes_each_approach_and_drives_a_file_as_it_drives_the_pro
     assert impacts[0] == impacts[1]
 
 
-def test_the_standard_s_schema_and_a_foreign_reader_take_every_file(tmp_path):
-    xmlschema = pytest.importorskip("xmlschema", reason="pip install xmlschema")
-    if (checker := find_spec("qc_openscenario")) is None or checker.origin is None:
-        pytest.skip("pip install asam-qc-openscenarioxml, which brings the schema")
-    schema = xmlschema.XMLSchema(Path(checker.origin).parent / "schema/1.2.0/OpenSCENARIO.xsd")
-    for scenario in list_scenarios():
-        assert [*schema.iter_errors(write(tmp_path, scenario))] == []
+def test_the_checker_of_the_standard_finds_no_issue_in_a_file_of_each_protocol(tmp_path):
+    """Its rules begin with the schema; it belongs to the Quality Checker Framework of ASAM."""
+    if (checker := which("qc_openscenario")) is None:
+        pytest.skip("pip install asam-qc-openscenarioxml")
+    (tmp_path / "street.xodr").write_text(format_opendrive(STREET, "street"))
+    for name, entry in TABLE.protocols.items():
+        (*_, last) = list_cases(name, entry)
+        file, found = write(tmp_path, last.scenario), tmp_path / "found.xqar"
+        (tmp_path / "config.xml").write_text(
+            f'<Config><Param name="InputFile" value="{file}"/><CheckerBundle application="xoscBundle">'
+            f'<Param name="resultFile" value="{found}"/></CheckerBundle></Config>'
+        )
+        subprocess.run([checker, "-c", tmp_path / "config.xml"], check=True, capture_output=True)
+        checks = list(ET.parse(found).getroot().iter("Checker"))  # noqa: S314 (the checker's own text)
+        assert len(checks) >= 17 and {check.get("status") for check in checks} == {"completed"}
+        assert [*ET.parse(found).getroot().iter("Issue")] == []  # noqa: S314
+
+
+def test_a_foreign_reader_takes_a_file(tmp_path):
     foreign = pytest.importorskip("scenariogeneration.xosc", reason="pip install scenariogeneration")
+    (*_, scenario) = list_scenarios()
     board = ET.parse(write(tmp_path, scenario)).getroot()  # noqa: S314 (our own text)
     entities = foreign.Entities.parse(board.find("Entities"))
     assert [one.name for one in entities.scenario_objects] == ["ego", f"{scenario.objects[0].kind}-1"]

@@ -9,12 +9,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from flows.auditing.physics import clip_columns, clip_facts
 from flows.making.catalogue import catalogue_of
 from flows.making.generate import generate_dataset
 from studies.evaluation import evaluation
 from studies.evaluation.commands import shorten_evaluation
 from studies.evaluation.evaluation import NOT_RUN, evaluate_dataset
+from studies.physics_judge.audit_physics import clip_columns, clip_facts
 from tasks.errors import InputError
 from tasks.eval.state_agreement import WHEELS
 from tests.laboratory.foreign_video.test_trajectories import tum_lines

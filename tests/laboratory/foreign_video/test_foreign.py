@@ -27,7 +27,7 @@ from studies.foreign_video.sources import (
 from studies.synthetic_street import Clip, drive_clip
 from tasks.errors import InputError
 from tasks.eval.poses.motion import RecoveredMotion
-from tasks.eval.poses.undistort import undistort_frames
+from tasks.eval.poses.resampling import undistort_frames
 from tests.laboratory.foreign_video.test_trajectories import tum_lines
 
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from flows.auditing.physics import clip_columns, clip_facts
 from flows.cli import app
 from flows.making.catalogue import catalogue_of
 from flows.making.generate import generate_dataset
@@ -30,6 +29,7 @@ from studies.negative_controls.study import (
     summarise_controls,
 )
 from studies.paper.sheets import draw_sheets
+from studies.physics_judge.audit_physics import clip_columns, clip_facts
 from tasks.errors import InputError
 from tasks.eval.poses.motion import RecoveredMotion
 from tests.toy_street import write_toy_grid

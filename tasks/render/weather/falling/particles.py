@@ -206,7 +206,7 @@ def _outside(point, planes, radius, reach):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _poisson(chance, mean):  # type: ignore[no-untyped-def]
+def count_poisson(chance, mean):  # type: ignore[no-untyped-def]
     """Return a Poisson number by inversion; it never falls when the mean rises: populations are nested in the rate."""
     number, share = 0, exp(-mean)
     most = mean + 12 * sqrt(mean) + 12  # no chance of 32 bits reaches it: rounding alone would
@@ -238,7 +238,7 @@ def _count_in_cells(low, high, view, falling):  # type: ignore[no-untyped-def]
                 first, _, _, _ = philox(
                     np.uint64(kx) & WORD, np.uint64(ky) & WORD, np.uint64(kz) & WORD, falling.size_class, key
                 )
-                number = _poisson(scale_to_unit(first), falling.mean)
+                number = count_poisson(scale_to_unit(first), falling.mean)
                 if number > 0:
                     cells[found, 0], cells[found, 1], cells[found, 2], cells[found, 3] = kx, ky, kz, number
                     found += 1

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.conventions import ROAD_CLASSES
+from tasks.render.rasterise.preparation import rotation_matrices
 from tasks.render.weather.coverage_field import FieldParameters, height_field
 from tasks.render.weather.scene_light import (
     append_gaussians,
@@ -19,10 +20,11 @@ from tasks.render.weather.snow.field import (
     SnowField,
     coverage_rank,
     covered_share,
+    edge_width,
     local_depth_mm,
     locate_snow,
 )
-from tasks.render.weather.snow.road_anchors import AnchorParameters, road_anchors
+from tasks.render.weather.snow.road_anchors import AnchorParameters, RoadAnchors, road_anchors
 from tasks.render.weather.snow.shelter import open_share
 from tasks.render.weather.snow.wheel_tracks import TrackParameters
 from tasks.scene.gaussians import Gaussians
@@ -31,6 +33,12 @@ from tasks.scene.surroundings import surface_scales
 
 BURIED = 0.98
 """Share of an anchor that its snow hides from which on the anchor itself need not be drawn."""
+NEAR_EDGE = 0.12
+"""Distance beyond the edge of a patch, in the coverage field, within which discs are cut [1]."""
+MOST_PIECES = 4
+"""Pieces of an anchor, at most [1]."""
+OVERLAP = 0.8
+"""Standard deviation of a disc of a road by the size of its cell [1]."""
 HIGHEST_LUMP = 2.0
 """Height of the highest lump of snow by the mean depth [1]."""
 
@@ -55,6 +63,8 @@ class SnowCoverParameters:
     slush_mm : depth over which slush turns to snow, 1 - 1/e [mm]
     damp_albedo_ratio : reflectance of the damp road between the snow by its dry one [1]
     dust : share of the bare road that blown snow and salt whiten [1]
+    rim : share of the road that slush hides right beside a patch; None is no more than dust [1]
+    rim_width : distance from a patch, in the coverage field, over which that falls to 1/e [1]
     """
 
     patches: FieldParameters
@@ -71,6 +81,8 @@ class SnowCoverParameters:
     slush_mm: float
     damp_albedo_ratio: float
     dust: float
+    rim: float | None = None
+    rim_width: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,15 +143,20 @@ def snow_layer(
     """
     p = parameters
     anchors = road_anchors(gaussians, p.anchors, lift)
-    lay = locate_snow(field, gaussians.means[anchors.index])
+    xi = coverage_rank(field, locate_snow(field, gaussians.means[anchors.index]))
+    reach = edge_width(amount.coverage, p.edge) / 2 + NEAR_EDGE
+    cut = (np.abs(xi - amount.coverage) < reach) & (0 < amount.coverage < 1)
+    index, normal, place, scales, quats = _cut_anchors(gaussians, anchors, cut)
+    lay = locate_snow(field, place)
     xi = coverage_rank(field, lay)
     share = covered_share(xi, amount.coverage, p.edge)
-    on = share * gaussians.opacities[anchors.index] > 1 / 255
-    index, normal, flat = anchors.index[on], anchors.normal[on], anchors.flat[on]
-    share, tracks = share[on], lay.tracks[on]
+    least = np.ones(len(gaussians))
+    np.minimum.at(least, index, share)
+    on = share * gaussians.opacities[index] > 1 / 255
+    index, share, tracks = index[on], share[on], lay.tracks[on]
+    normal, place, scales, quats = normal[on], place[on], scales[on], quats[on]
+    buried = least[index] >= BURIED
     depth = local_depth_mm(xi[on], amount, p.edge)
-    place = gaussians.means[index].astype(np.float64)
-    scales, quats = _lying(gaussians, index, normal, flat)
     lumps = height_field(place[:, 0], place[:, 1], p.lumps, field.seed, "snow-lumps", scales.max(axis=1))
     rise = 1e-3 * depth * np.clip(1 + p.lump_share * lumps, 0.2, HIGHEST_LUMP)
     thin = np.argmin(scales, axis=1)
@@ -150,7 +167,6 @@ def snow_layer(
         colour = to_display_unclipped(colour)
     sh = np.zeros((len(index), *gaussians.sh.shape[1:]), dtype=np.float32)
     sh[:, 0] = (colour - 0.5) / C0
-    buried = share >= BURIED
     # Where the ground is not buried, its discs lie among those of the snow.
     area = surface_scales(scales).prod(axis=1) / surface_scales(gaussians.scales[index]).prod(axis=1)
     layer = replace(
@@ -164,7 +180,7 @@ def snow_layer(
         class_id=gaussians.class_id[index],
         surroundings=_surroundings(gaussians, index, area, share * area + ~buried),
     )
-    return SnowLayer(gaussians=layer, anchors=index, cover=share * area, buried=index[buried])
+    return SnowLayer(gaussians=layer, anchors=index, cover=share * area, buried=np.unique(index[buried]))
 
 
 def snowed_over(gaussians: Gaussians, snow: SnowLayer) -> Gaussians:
@@ -182,7 +198,8 @@ def snowed_over(gaussians: Gaussians, snow: SnowLayer) -> Gaussians:
     """
     if gaussians.surroundings is not None:
         about = gaussians.surroundings.copy()
-        about[snow.anchors, 0] *= (1 + snow.cover).astype(np.float32)
+        cover = np.bincount(snow.anchors, snow.cover, len(gaussians))
+        about[:, 0] *= (1 + cover).astype(np.float32)
         gaussians = replace(gaussians, surroundings=about)
     return append_gaussians(remove_gaussians(gaussians, snow.buried), snow.gaussians)
 
@@ -224,7 +241,10 @@ def whiten_gaussians(
     xi = coverage_rank(field, lay)
     tracks[on], depth[on] = lay.tracks, local_depth_mm(xi, amount, p.edge)
     cover = covered_share(xi, amount.coverage, p.edge)
-    hidden[on] = facing[on] * np.maximum(cover, p.dust * min(1.0, 4 * amount.coverage))
+    cover = np.maximum(cover, p.dust * min(1.0, 4 * amount.coverage))
+    if p.rim and p.rim_width and amount.coverage > 0:
+        cover = np.maximum(cover, p.rim * np.exp(-np.maximum(xi - amount.coverage, 0) / p.rim_width))
+    hidden[on] = facing[on] * cover
     beside = np.flatnonzero(~road & (facing > 0))
     reached = np.where(np.isin(gaussians.class_id, GROUND_CLASSES), 1.0, open_share(gaussians))
     depth[beside] = reached[beside] * amount.depth_mm
@@ -261,6 +281,29 @@ def _surroundings(
         return None
     overlap, ratio = gaussians.surroundings[index].T
     return np.column_stack((overlap * cover, ratio / np.sqrt(area))).astype(np.float32)
+
+
+def _cut_anchors(
+    gaussians: Gaussians, anchors: RoadAnchors, cut: NDArray[np.bool_]
+) -> tuple[
+    NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
+]:
+    """Return index, normal, place, scales and quaternion of the discs of the snow: of some anchors several in a row.
+
+    Discs of a road are as long as a flat view of it allows; the edge of a patch is as sharp as they are wide.
+    """
+    scales, quats = _lying(gaussians, anchors.index, anchors.normal, anchors.flat)
+    long, wide = scales.argmax(axis=1), np.sort(scales, axis=1)[:, 1]
+    length = scales[np.arange(len(scales)), long]
+    count = np.where(cut, np.clip(np.rint(length / wide), 1, MOST_PIECES), 1).astype(np.int64)
+    own = np.repeat(np.arange(len(count)), count)
+    turn = np.arange(len(own)) - np.repeat(np.cumsum(count) - count, count) - (count[own] - 1) / 2
+    axis = rotation_matrices(quats.astype(np.float32))[np.arange(len(long)), :, long]
+    place = gaussians.means[anchors.index].astype(np.float64)[own]
+    place += (turn * length[own] / (OVERLAP * count[own]))[:, None] * axis[own]
+    scales = scales[own]
+    scales[np.arange(len(own)), long[own]] /= count[own]
+    return anchors.index[own], anchors.normal[own], place, scales, quats[own]
 
 
 def _lying(

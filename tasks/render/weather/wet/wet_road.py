@@ -17,8 +17,11 @@ from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.render.composition import LUMINANCE
 from tasks.render.rasterise.gbuffer import GBuffer
 from tasks.render.weather.falling.particles import Shutter
+from tasks.render.weather.falling.precipitation import Population
+from tasks.render.weather.falling.streaks import draw_streaks
 from tasks.render.weather.layer import Layer
 from tasks.render.weather.sky import SkyLight
+from tasks.render.weather.wet.impacts import ImpactParameters, visible_impacts
 from tasks.render.weather.wet.lobe import average_over_lobe
 from tasks.render.weather.wet.puddles import (
     RoadWaterParameters,
@@ -42,6 +45,7 @@ class RoadFilmParameters:
     diffuse_reflectance : mean reflectance of the film's surface for diffuse light from above [1]
     rough_slope : standard deviation of the slopes of coated texture that stands out of the film [1]
     normal_window : width of the window over which road normals are averaged, by picture height [1]
+    impacts : what drops leave where they strike it; None shows none
     """
 
     water: RoadWaterParameters
@@ -49,6 +53,7 @@ class RoadFilmParameters:
     diffuse_reflectance: float
     rough_slope: float
     normal_window: float
+    impacts: ImpactParameters | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,6 +67,7 @@ class RoadFilm:
     parameters : optics of the wet road
     seed : visual seed of the clip [1]
     rate_mm_h : rate of the rain that strikes it [mm/h]
+    falling : that rain; None where none falls
     refracts : whether the texture below is drawn where the film shows it
     """
 
@@ -70,6 +76,7 @@ class RoadFilm:
     parameters: RoadFilmParameters
     seed: int
     rate_mm_h: float = 0.0
+    falling: Population | None = None
     refracts: bool = False
 
 
@@ -195,6 +202,13 @@ def wet_layer(
         shift = compute_film_shift(view, 1e-3 * film.depth_mm, p.refractive_index)
         below = see_through_film(picture, view, shift) - picture
         add += gain * water.smooth[..., None] * below
+    if p.impacts is not None and film.falling is not None:
+        struck = visible_impacts(
+            film.falling, p.impacts, shutter, gbuffer.depth, road, water.smooth, film.seed
+        )
+        bright = np.broadcast_to(p.impacts.light * sky.white, (len(struck), 3))
+        splashed = draw_streaks(struck, bright, gbuffer.depth, shutter.K, 0.0)
+        _cover_where(splashed.alpha, splashed.rgb, gain, add)
     return Layer(name="wet", gain=gain, add=add)
 
 
@@ -294,6 +308,18 @@ def _road_normals(normal: NDArray[np.float32], road: NDArray[np.bool_], window: 
         _copy_where(road[near], normal[near], on_road)
         _normalise_where(road[near], cv2.blur(on_road, (window, window)), mean[near])
     return mean
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _cover_where(alpha, light, gain, add):  # type: ignore[no-untyped-def]
+    """Put what hides a share of the layer before it."""
+    for row in range(alpha.shape[0]):
+        for column in range(alpha.shape[1]):
+            if alpha[row, column] > 0:
+                through = 1 - alpha[row, column]
+                gain[row, column, 0] *= through
+                for c in range(3):
+                    add[row, column, c] = through * add[row, column, c] + light[row, column, c]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")

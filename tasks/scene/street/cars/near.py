@@ -14,6 +14,7 @@ from tasks.scene.spherical_harmonics import C0
 from tasks.scene.street.bend import integrate_course
 from tasks.scene.street.cars.parked import COARSE, build_parked, draw_look, place_body
 from tasks.scene.street.layout import StreetLayout
+from tasks.scene.street.near import measure_approach, replace_discs
 from tasks.scene.street.objects import list_objects, own_gaussians
 from tasks.scene.street.plan import Car, plan_street
 from tasks.scene.surroundings import add_surroundings
@@ -24,8 +25,6 @@ LEVELS = (0.045, 0.06, 0.08, 0.11, 0.15, 0.2)
 """Spacings of a car's discs: 25,000 to 1,500 discs a car [m]."""
 CELL_PX = 4.5
 """Spacing where the clip comes nearest, with the focal length that its camera has [px]."""
-_IN_VIEW = 0.8
-"""Cosine of the angle from the camera's axis up to which a car counts as in view [1]."""
 _NORMAL_M = 0.4
 """Way that counts as much as a turn of the surface by a radian, for the light of the nearest coarse disc [m]."""
 _ALIKE = 4
@@ -70,30 +69,10 @@ def detail_cars(
         parts.append(_make_fine(car, seed, cell, replace(gaussians, **coarse), layout))
     if not parts:
         return gaussians
-    index = np.concatenate(gone)
-    joined: dict[str, Any] = {
-        name: np.concatenate([np.delete(getattr(gaussians, name), index, axis=0), *(p[name] for p in parts)])
-        for name in parts[0]
-    }
-    return replace(gaussians, **joined)
+    return replace_discs(gaussians, np.concatenate(gone), parts)
 
 
-def measure_approach(point: Floats, T_world_camera: Floats) -> float:
-    """Return how near a camera comes to a point that it has in view; infinite where it never has [m].
-
-    Parameters
-    ----------
-    point : float64 [3] world [m]
-    T_world_camera : float64 [F, 4, 4] its poses [m]
-    """
-    away = point - T_world_camera[:, :3, 3]
-    ahead = np.einsum("fk,fk->f", away, T_world_camera[:, :3, 2])
-    distance = np.linalg.norm(away, axis=1)
-    seen = ahead > _IN_VIEW * distance
-    return float(distance[seen].min()) if seen.any() else float("inf")
-
-
-def _make_fine(car: Car, seed: int, cell: float, coarse: Gaussians, layout: StreetLayout) -> dict[str, Any]:
+def _make_fine(car: Car, seed: int, cell: float, coarse: Gaussians, layout: StreetLayout) -> Gaussians:
     line = integrate_course(layout)
     body = build_parked(car, seed, cell)
     old, new = (place_body(one, car) for one in (build_parked(car, seed, COARSE), body))
@@ -121,7 +100,7 @@ def _make_fine(car: Car, seed: int, cell: float, coarse: Gaussians, layout: Stre
         shares = np.einsum("nk,nkc->nc", weight, coarse.light[nearest].astype(np.float64))
         shares[:, 3] = new.glow.sum(axis=1) / np.maximum(colour.sum(axis=1), 1e-9)
         out["light"] = np.clip(shares, 0, 1).astype(np.float32)
-    return out
+    return replace(coarse, **out)
 
 
 @lru_cache(maxsize=4)

@@ -26,6 +26,8 @@ _SKY, _HOUSES, _ROAD = (
     np.array([0.16, 0.15, 0.14]),
     np.array([0.13, 0.13, 0.125]),
 )
+_RIDGE, _RIDGE_WAVES = (0.42, 0.11, 0.06), (2, 5, 11)
+"""Upward part of the direction to the mirrored ridges: mean, variation and width of the edge; its waves a turn [1]."""
 
 
 def build_cars(layout: StreetLayout, parked: tuple[Car, ...], seed: int) -> Surfels:
@@ -126,13 +128,19 @@ def car_footprints(parked: tuple[Car, ...]) -> Floats:
 
 
 def mirror_surroundings(centre: Floats, normal: Floats, gloss: Floats, eye: Floats) -> Floats:
-    """Return the radiance [N, 3] mirrored towards the eye, after Schlick (1994), doi:10.1111/1467-8659.1330233."""
+    """Return the radiance [N, 3] mirrored towards the eye, after Schlick (1994), doi:10.1111/1467-8659.1330233.
+
+    It is that of sky, of houses below a ridge that rises and falls around, and of the road.
+    """
     view = eye - centre
     view /= np.linalg.norm(view, axis=1, keepdims=True)
     cosine = np.clip((normal * view).sum(axis=1), 0.0, 1.0)
-    up = (2 * cosine[:, None] * normal - view)[:, 2:]
+    along = 2 * cosine[:, None] * normal - view
+    up, turn = along[:, 2:], np.arctan2(along[:, 1:2], along[:, :1])
     share = gloss + (1 - gloss) * (1 - cosine) ** 5 * (gloss > 0)
-    sky = np.clip((up - 0.30) / 0.25, 0.0, 1.0)
+    ridge = _RIDGE[0] + _RIDGE[1] * sum(np.sin(k * turn + k * k) / np.sqrt(k) for k in _RIDGE_WAVES)
+    sky = np.clip((up - ridge) / _RIDGE[2] + 0.5, 0.0, 1.0)
     road = np.clip(-up / 0.1 + 0.5, 0.0, 1.0)
-    around = (_HOUSES * (1 - sky) + _SKY * sky) * (1 - road) + _ROAD * road
+    fronts = _HOUSES * (1 + 0.5 * np.sign(np.sin(19 * turn)) * np.clip(4 * up * (1 - up / ridge), 0, 1))
+    around = (fronts * (1 - sky) + _SKY * sky) * (1 - road) + _ROAD * road
     return np.minimum(share, _MOST_MIRRORED)[:, None] * around

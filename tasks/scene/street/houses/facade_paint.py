@@ -17,6 +17,8 @@ Ints = NDArray[np.int64]
 
 _MIRRORED_SKY = np.array([0.15, 0.195, 0.26])
 _MIRRORED_STREET = np.array([0.035, 0.034, 0.032])
+OPENINGS = 1000
+"""Numbers that a house has for its openings [1]."""
 _SHOP_LIGHT = np.array([0.15, 0.11, 0.068])
 
 
@@ -31,7 +33,7 @@ class FrontCells:
     part : int64 [N] `Part`
     house : int64 [N] index of the house [1]
     kind : int64 [N] index of the bay's kind in `BAYS` [1]
-    opening : int64 [N] number that the cells of one bay and storey share [1]
+    opening : int64 [N] number that the cells of one bay and storey share, `OPENINGS` apart from house to house [1]
     across : float64 [N] place in the bay, -1 to 1 [1]
     up : float64 [N] place in the glazing, 0 to 1 [1]
     """
@@ -137,8 +139,8 @@ def paint_fronts(
     inside = _SHOP_LIGHT * (goods * np.clip(1.2 - 0.6 * cells.up, 0.0, 1.0))[:, None] + _MIRRORED_STREET
     glow = np.where(shop[:, None], inside, glow)
 
-    _, opening = np.unique(cells.opening, return_inverse=True)
-    drape, glint = rng.random((2, opening.max() + 1))[:, opening]
+    panes = named_generator(seed, "panes").random((OPENINGS * len(looks), 2))
+    drape, glint = panes[cells.opening].T
     window = pane & ~shop & ~doors
     drawn = (drape < 0.4) & (np.abs(cells.across) > 0.2) | (drape > 0.75) & (cells.up > 2.2 - 1.8 * drape)
     albedo = np.where((window & drawn)[:, None], 0.55 * palette.CURTAIN, albedo)

@@ -16,6 +16,8 @@ Floats = NDArray[np.float64]
 
 DEPTH = 10.0
 """Depth of the houses, from front to back [m]."""
+_CELL = 6.0
+"""Cell of a roof where it is seen closest [px]."""
 _PITCH = {"flat": (0.0, 0.0), "pitched": (2.6, 3.4), "mansard": (0.9, 2.6)}
 """Run back from the eaves and rise of the roof's front slope [m]."""
 
@@ -38,7 +40,7 @@ def _close_house(layout: StreetLayout, house: Building, seed: int) -> list[Surfe
     rng = named_generator(seed, f"roof {house.number}")
     front = layout.front_position(house.side) + house.side * house.setback
     eaves = house.eaves_height(layout)
-    cell = max(9.0 * PIXEL * float(nearest_depth(layout, house.nearest_station, front, eaves)), 0.25)
+    cell = max(_CELL * PIXEL * float(nearest_depth(layout, house.nearest_station, front, eaves)), 0.2)
     out = float(house.side)
     along = np.array([out * house.width, 0, 0])
     start = house.start if out > 0 else house.start + house.width

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lsim
 
-from tasks.eval.physics.constants import DT, ClipColumns, Constants, Floats, find_climb
-from tasks.eval.physics.coupled import find_hits, spread
-from tasks.eval.physics.half_step import INNER_STEP, HalfStep, find_brake_onset
-from tasks.eval.physics.laws import Law, evaluate_law, is_shaken, rounding_tolerance
+from studies.physics_judge.laws.constants import DT, ClipColumns, Constants, Floats, find_climb
+from studies.physics_judge.laws.coupled import find_hits, spread
+from studies.physics_judge.laws.half_step import INNER_STEP, HalfStep, find_brake_onset
+from studies.physics_judge.laws.law import Law, evaluate_law, is_shaken, rounding_tolerance
 
 STOP_PASS = 10
 """Largest distance between the stops of the last two fixed-point passes over a road feature; 6 occurred [ticks]."""

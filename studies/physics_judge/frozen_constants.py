@@ -13,8 +13,8 @@ from flows.making.plan import TICK_RATE_HZ
 from flows.store.layout import Layout
 from flows.store.sealed import read_plan_record, recorded_grid
 from manifests.manifest import is_driven
+from studies.physics_judge.laws.constants import Constants, TyreTables
 from tasks.errors import InputError
-from tasks.eval.physics.constants import Constants, TyreTables
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.paper.low_speed import SteadyStop
 from tasks.vehicle.parameters import Vehicle

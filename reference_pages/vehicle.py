@@ -1,10 +1,12 @@
-"""Tables of the page on effects: those that ``close-loop`` may name, and the numbers that any fit may give."""
+"""Tables of the vehicle model: effects, numbers that a fit may give it, and inputs of its FMU."""
 
 import re
 
 from catalogs.entries import load
 from reference_pages.markdown import format_table
+from tasks.surface.weather import list_by_code
 from tasks.vehicle.effects.table import EFFECT_TABLE, EFFECT_UNITS, EffectParameter
+from tasks.vehicle.model.embedded_variables import INPUTS, EmbeddedVariable
 
 NUMBER = re.compile(r"\{[^}]*\}")
 """Place of a number in a sentence of the library."""
@@ -51,5 +53,25 @@ def _describe_change(row: EffectParameter) -> str:
     return CHANGES[row.kind].format(", ".join(f"`{field}`" for field in row.fields))
 
 
-TABLES = {"effects": write_effect_table, "effect numbers": write_number_table}
+def write_input_table() -> str:
+    """Return the table of inputs and of parameters, which are fixed after the start, as Markdown."""
+    rows = [
+        (f"`{row.name}`", row.unit, f"{row.start:g}", _write_range(row), row.role, row.description)
+        for row in INPUTS
+    ]
+    return format_table(("name", "unit", "start", "range", "role", "meaning"), rows)
+
+
+def _write_range(row: EmbeddedVariable) -> str:
+    if row.kind == "choice":
+        return ", ".join(f"{code} {name}" for code, name in enumerate(list_by_code(), 1) if name)
+    ends = [f"{end:g}" if abs(end) < float("inf") else "" for end in (row.minimum, row.maximum)]
+    return " to ".join(ends) if all(ends) else f"{ends[0]} and more" if ends[0] else ""
+
+
+TABLES = {
+    "effects": write_effect_table,
+    "effect numbers": write_number_table,
+    "FMU inputs": write_input_table,
+}
 """Function that writes each table, by the name under which a page asks for it."""

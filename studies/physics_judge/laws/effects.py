@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.signal import lfilter
 
-from tasks.eval.physics.constants import Constants, Floats, raised_cosine
-from tasks.eval.physics.tyres import TyreCurve
+from studies.physics_judge.laws.constants import Constants, Floats, raised_cosine
+from studies.physics_judge.laws.tyres import TyreCurve
 
 AIR_DENSITY = 1.2
 """[kg/m3]."""

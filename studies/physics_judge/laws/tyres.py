@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tasks.eval.physics.constants import (
+from studies.physics_judge.laws.constants import (
     Constants,
     Floats,
     compute_burckhardt_friction,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
-from tasks.eval.physics.constants import (
+from studies.physics_judge.laws.constants import (
     DT,
     ClipColumns,
     Constants,
@@ -18,7 +18,7 @@ from tasks.eval.physics.constants import (
     pressure_at,
     read_grade,
 )
-from tasks.eval.physics.effects import (
+from studies.physics_judge.laws.effects import (
     bound_lateral_hold,
     compute_engine_torque,
     compute_friction,
@@ -29,8 +29,8 @@ from tasks.eval.physics.effects import (
     delay_pressure,
     feel_road,
 )
-from tasks.eval.physics.half_step import INNER_STEP, find_brake_onset, find_held_rows, pressure_shape
-from tasks.eval.physics.tyres import TyreCurve, find_curve
+from studies.physics_judge.laws.half_step import INNER_STEP, find_brake_onset, find_held_rows, pressure_shape
+from studies.physics_judge.laws.tyres import TyreCurve, find_curve
 
 WET = ("rain",)
 """Kinds of weather in which water lies on the road."""
@@ -222,7 +222,7 @@ def _compute_axle(
 
 
 def _compare_with_reference(v: Floats, facts: Mapping[str, Any], constants: Constants) -> Floats:
-    """Wet friction at each speed over that which the clip's mu_c tells [1]."""
+    """Wet friction at each speed over that for which the clip's mu_c holds [1]."""
     surface = constants.surface
     if facts["weather"] not in WET or not grips_by_speed(surface):
         return np.ones(len(v))

@@ -9,7 +9,6 @@ import numpy as np
 from catalogs.scenes import load_route
 from catalogs.studies.ablation import cut_coupling
 from catalogs.variants import warn_of_variant
-from flows.auditing.physics_constants import read_constants
 from flows.making.catalogue import Catalogue
 from flows.making.driving import collect_surface_depths, surface_of
 from flows.making.input_changes import refuse_changed_records
@@ -19,11 +18,16 @@ from flows.making.traced import refuse_traced
 from flows.running.orchestration import run_as_stage
 from flows.running.progress import progress_bar
 from flows.store.address import open_for_reading, want_telemetry
-from flows.store.clip_tables import iterate_clips
 from flows.store.layout import Layout
 from flows.store.outputs import Outputs
 from flows.store.sealed import read_manifest, read_plan_record
 from flows.store.telemetry import list_columns, read_columns, read_table
+from studies.physics_judge.clip_tables import iterate_clips
+from studies.physics_judge.frozen_constants import read_constants
+from studies.physics_judge.laws.audit import PhysicsVerdict, audit_clip
+from studies.physics_judge.laws.constants import DT, Constants
+from studies.physics_judge.laws.law import Law, finite_rows
+from studies.physics_judge.laws.route import RouteLine
 from tasks.conventions import (
     CHANNELS_BY_NAME,
     CHECK_CHANNELS,
@@ -33,10 +37,6 @@ from tasks.conventions import (
     TICK_CHANNELS,
 )
 from tasks.errors import InputError
-from tasks.eval.physics.audit import PhysicsVerdict, audit_clip
-from tasks.eval.physics.constants import DT, Constants
-from tasks.eval.physics.laws import Law, finite_rows
-from tasks.eval.physics.route import RouteLine
 
 Tables = tuple[dict[str, np.ndarray], dict[str, np.ndarray]]
 """Columns of a clip's ticks and of its frames."""

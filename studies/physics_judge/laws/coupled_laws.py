@@ -9,19 +9,19 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.eval.physics.constants import DT, ClipColumns, Constants, Floats
-from tasks.eval.physics.coupled import Forces, compute_forces, spread
-from tasks.eval.physics.effects import AXLE, FORCE, HEAVE, PITCH, SUM, TORQUE
-from tasks.eval.physics.half_step import INNER_STEP
-from tasks.eval.physics.laws import Law, evaluate_law, rounding_tolerance
-from tasks.eval.physics.tyres import find_curve
+from studies.physics_judge.laws.constants import DT, ClipColumns, Constants, Floats
+from studies.physics_judge.laws.coupled import Forces, compute_forces, spread
+from studies.physics_judge.laws.effects import AXLE, FORCE, HEAVE, PITCH, SUM, TORQUE
+from studies.physics_judge.laws.half_step import INNER_STEP
+from studies.physics_judge.laws.law import Law, evaluate_law, rounding_tolerance
+from studies.physics_judge.laws.tyres import find_curve
 
 HIDDEN = 1.5
 """Share of a rate's change of slope that an integral over a tick may miss: half where it jumps within, times 3 [1]."""
 UNEQUAL = 0.01
 """Share of its integral by which a wheel's change of speed may miss it over a clip [1]."""
 FAINT = 1e-5
-"""Change of wheel speed in an interval that tells nothing of it [rad/s]."""
+"""Change of wheel speed in an interval that shows nothing of it [rad/s]."""
 FEWEST = 20
 """Intervals that a ratio over all of them needs [1]."""
 AROUND = 20

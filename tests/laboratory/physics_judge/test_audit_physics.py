@@ -10,14 +10,14 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from flows.auditing.physics import audit_physics, clip_columns, clip_facts, find_route
-from flows.auditing.physics_constants import read_constants
 from flows.making.generate import generate_dataset
 from flows.making.plan import read_plan
 from flows.store.layout import Layout
+from studies.physics_judge.audit_physics import audit_physics, clip_columns, clip_facts, find_route
+from studies.physics_judge.frozen_constants import read_constants
+from studies.physics_judge.laws.audit import audit_clip
 from tasks.conventions import TICK_CHANNELS
 from tasks.errors import InputError
-from tasks.eval.physics.audit import audit_clip
 from tasks.vehicle.paper.low_speed import BrakedStop, compute_brake_pitch_input
 from tests.toy_street import write_toy_grid
 

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.eval.physics.body import body_laws
-from tasks.eval.physics.clip_row import command_laws, outcome_laws, road_height_laws, surface_laws
-from tasks.eval.physics.constants import ClipColumns, Constants
-from tasks.eval.physics.coupled_laws import coupled_laws
-from tasks.eval.physics.effects import find_unjudged
-from tasks.eval.physics.frames import frame_laws, pose_check_laws, pose_laws
-from tasks.eval.physics.half_step import follow_half_step
-from tasks.eval.physics.laws import Law, motion_laws, wheel_laws
-from tasks.eval.physics.route import RouteLine, grade_laws, route_laws
+from studies.physics_judge.laws.body import body_laws
+from studies.physics_judge.laws.clip_row import command_laws, outcome_laws, road_height_laws, surface_laws
+from studies.physics_judge.laws.constants import ClipColumns, Constants
+from studies.physics_judge.laws.coupled_laws import coupled_laws
+from studies.physics_judge.laws.effects import find_unjudged
+from studies.physics_judge.laws.frames import frame_laws, pose_check_laws, pose_laws
+from studies.physics_judge.laws.half_step import follow_half_step
+from studies.physics_judge.laws.law import Law, motion_laws, wheel_laws
+from studies.physics_judge.laws.route import RouteLine, grade_laws, route_laws
 
 COPIED = "frame rows are ticks: "
 """Prefix of the names of the laws that relate the two tables."""

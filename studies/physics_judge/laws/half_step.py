@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.eval.physics.constants import (
+from studies.physics_judge.laws.constants import (
     DT,
     ClipColumns,
     Constants,
@@ -16,7 +16,7 @@ from tasks.eval.physics.constants import (
     pressure_at,
     raised_cosine,
 )
-from tasks.eval.physics.tyres import find_curve
+from studies.physics_judge.laws.tyres import find_curve
 
 INNER_STEP = 0.0005
 """Step of the integration behind the ticks (paper, Table frozen_physical_params) [s]."""

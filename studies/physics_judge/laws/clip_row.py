@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from tasks.eval.physics.constants import (
+from studies.physics_judge.laws.constants import (
     DT,
     SURFACE_FORMS,
     ClipColumns,
@@ -15,8 +15,8 @@ from tasks.eval.physics.constants import (
     pressure_at,
     raised_cosine,
 )
-from tasks.eval.physics.half_step import find_brake_onset, pressure_shape
-from tasks.eval.physics.laws import ROUNDING, Law, evaluate_law
+from studies.physics_judge.laws.half_step import find_brake_onset, pressure_shape
+from studies.physics_judge.laws.law import ROUNDING, Law, evaluate_law
 
 AT_A_STEP = 1e-9
 """Time about a tick within which a command that jumps has either value [s]."""

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from studies.physics_judge.laws.constants import Constants, Floats, read_grade
+from studies.physics_judge.laws.law import Law, evaluate_law
 from tasks.eval.body_agreement import pose_body
-from tasks.eval.physics.constants import Constants, Floats, read_grade
-from tasks.eval.physics.laws import Law, evaluate_law
 from tasks.eval.poses.rigid import invert_pose
 
 PLACE = 2e-3

@@ -11,21 +11,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tasks.eval.physics.constants import (
+from studies.physics_judge.laws.constants import (
     ClipColumns,
     Constants,
     Floats,
     find_climb,
     raised_cosine,
 )
-from tasks.eval.physics.coupled import find_hits, spread
-from tasks.eval.physics.half_step import (
+from studies.physics_judge.laws.coupled import find_hits, spread
+from studies.physics_judge.laws.half_step import (
     INNER_STEP,
     HalfStep,
     find_brake_onset,
     find_held_rows,
 )
-from tasks.eval.physics.tyres import find_curve
+from studies.physics_judge.laws.tyres import find_curve
 
 ROUNDING = 1e-9
 """Relative error that double-precision sums of a run may carry [1]."""

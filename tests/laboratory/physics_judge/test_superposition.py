@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flows.auditing.physics import clip_columns, clip_facts
-from flows.auditing.physics_constants import read_constants
 from flows.making.generate import generate_dataset
-from tasks.eval.physics import body
-from tasks.eval.physics.audit import audit_clip
-from tasks.eval.physics.body import follow_moment
-from tasks.eval.physics.constants import Constants
+from studies.physics_judge.audit_physics import clip_columns, clip_facts
+from studies.physics_judge.frozen_constants import read_constants
+from studies.physics_judge.laws import body
+from studies.physics_judge.laws.audit import audit_clip
+from studies.physics_judge.laws.body import follow_moment
+from studies.physics_judge.laws.constants import Constants
 from tests.toy_street import write_toy_grid
 
 GRID = """

@@ -10,9 +10,9 @@ from catalogs.scenario import Scenario
 from studies.physics_judge.__main__ import draw_braked_clip, judge
 from studies.physics_judge.clips import TYRE, StudyClip, draw_clip, make_clip
 from studies.physics_judge.errors import ERRORS
-from tasks.eval.physics.audit import audit_clip
-from tasks.eval.physics.constants import DT
-from tasks.eval.physics.tyres import find_curve
+from studies.physics_judge.laws.audit import audit_clip
+from studies.physics_judge.laws.constants import DT
+from studies.physics_judge.laws.tyres import find_curve
 from tasks.vehicle.parameters import compute_surface_response
 from tasks.vehicle.tyres.magic_formula_tyre import MagicFormulaTyre, compute_magic_formula_friction
 

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from studies.physics_judge.laws.constants import Constants, Floats
+from studies.physics_judge.laws.law import Law, evaluate_law
 from tasks.conventions import TICK_CHANNELS
 from tasks.eval.body_agreement import pose_body, rms
-from tasks.eval.physics.constants import Constants, Floats
-from tasks.eval.physics.laws import Law, evaluate_law
 from tasks.eval.poses.rigid import invert_pose
 
 PITCH = "frames.recovered_pitch frames.pitch ticks.pitch"

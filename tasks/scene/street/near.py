@@ -1,0 +1,46 @@
+"""What a clip comes near: how near, and how finer discs take the place of the street's own."""
+
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tasks.scene.gaussians import Gaussians
+
+Floats = NDArray[np.float64]
+
+_IN_VIEW = 0.8
+"""Cosine of the angle from the camera's axis up to which a point counts as in view [1]."""
+
+
+def measure_approach(point: Floats, T_world_camera: Floats) -> float:
+    """Return how near a camera comes to a point that it has in view; infinite where it never has [m].
+
+    Parameters
+    ----------
+    point : float64 [3] world [m]
+    T_world_camera : float64 [F, 4, 4] its poses [m]
+    """
+    away = point - T_world_camera[:, :3, 3]
+    ahead = np.einsum("fk,fk->f", away, T_world_camera[:, :3, 2])
+    distance = np.linalg.norm(away, axis=1)
+    seen = ahead > _IN_VIEW * distance
+    return float(distance[seen].min()) if seen.any() else float("inf")
+
+
+def replace_discs(gaussians: Gaussians, index: NDArray[np.int64], finer: list[Gaussians]) -> Gaussians:
+    """Return the set without some of its Gaussians, and with finer ones last.
+
+    Parameters
+    ----------
+    gaussians : of the street
+    index : int64 [B] positions of those that go [1]
+    finer : what comes in their place, with the same members
+    """
+    joined: dict[str, Any] = {}
+    for name in (member.name for member in fields(Gaussians)):
+        if isinstance(value := getattr(gaussians, name), np.ndarray):
+            kept = np.delete(value, index, axis=0)
+            joined[name] = np.concatenate([kept, *(getattr(one, name) for one in finer)])
+    return replace(gaussians, **joined)
