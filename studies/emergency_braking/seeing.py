@@ -1,4 +1,4 @@
-"""What a brake reads from one picture of the road: its friction, by the network of `studies.learn_friction`.
+"""What a brake reads from one picture of the road: its friction.
 
 ``python -m studies.emergency_braking.seeing`` trains the network on the full brakes of pictures.yaml, on streets that
 no protocol uses, prints how far off it is on two streets that it never saw, and writes network.npz beside this file.
@@ -19,7 +19,7 @@ from catalogs.scenario import Scenario
 from flows.cli import run_to_end
 from flows.driving.simulator import Simulator
 from flows.making.generate import generate_dataset
-from studies.learn_friction.network import Trained, read_trained, train_network
+from studies.emergency_braking.network import Trained, read_trained, train_network
 from studies.learn_friction.samples import Samples, read_samples, split_samples
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.parameters import Vehicle
@@ -87,7 +87,7 @@ def make_samples(place: str) -> Samples:
     """
     if not Path(place, "manifest.json").is_file():
         generate_dataset(str(GRID), place, pictures="later", runner="threads")
-    return read_samples(musync.open(place), over_s=OVER_S, frames=1, most=1)
+    return read_samples(musync.open(place), over_s=OVER_S, most=1)
 
 
 def format_errors(test: Samples, answers: list[NDArray[np.float64]]) -> str:

@@ -60,6 +60,7 @@ def run_study() -> None:
         "--grid", type=Path, default=GRID, help="of the dataset, with the splits train and test"
     )
     parser.add_argument("--seeds", type=int, default=3, help="networks trained in each world")
+    parser.add_argument("--weights", type=Path, help="file for the weights of the first network")
     asked = parser.parse_args()
     started = time.perf_counter()
     data = open_made(asked.dataset, asked.grid)
@@ -73,6 +74,8 @@ def run_study() -> None:
     relabelled = relabel_samples(samples, read_brakes(musync.open(painted)))
     found = compare_predictors(samples, relabelled, seeds=range(1, asked.seeds + 1))
     print(format_errors(found), format_promises(found), sep="\n\n")
+    if asked.weights:
+        found.networks[0].write(asked.weights)
     print(f"\ndataset {made - started:.0f} s, training and test {time.perf_counter() - made:.0f} s")
 
 

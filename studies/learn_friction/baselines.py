@@ -24,10 +24,10 @@ def describe_command(samples: Samples) -> Numbers:
 
 
 def describe_picture(samples: Samples) -> Numbers:
-    """Return the command, and mean and deviation of every colour above and below the middle of the newest picture."""
-    newest = samples.pictures[:, -3:].numpy() / 255.0
-    middle = newest.shape[2] // 2
-    halves = (newest[:, :, :middle], newest[:, :, middle:])
+    """Return the command, and mean and deviation of every colour above and below the middle of the picture."""
+    pictures = samples.pictures.numpy() / 255.0
+    middle = pictures.shape[2] // 2
+    halves = (pictures[:, :, :middle], pictures[:, :, middle:])
     statistics = [measure(half, axis=(2, 3)) for half in halves for measure in (np.mean, np.std)]
     return np.concatenate([samples.command, *statistics], axis=1)
 

@@ -1,6 +1,6 @@
 """Baselines, the network, and the network of a world without physics, on drives that none of them has seen."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -13,7 +13,7 @@ from studies.learn_friction.baselines import (
     predict_by_ridge,
     predict_mean,
 )
-from studies.learn_friction.network import train_network
+from studies.learn_friction.network import Trained, train_network
 from studies.learn_friction.samples import Samples, split_samples
 
 NETWORK, PAINTED = "network", "network, appearance-only world"
@@ -30,22 +30,26 @@ class Comparison:
 
     Parameters
     ----------
-    test : samples with what the car really does
+    test : a sample of each clip, with what the car really does
     painted : deceleration that the appearance-only world claims for them [m/s2]
     answers : of each predictor, an array a seed [m/s2]
-    new_rates : samples whose precipitation rate no training clip had
+    networks : of the world with physics, one a seed
+    new_rates : clips whose precipitation rate no training clip had
     clips : of training and of test [1]
     """
 
     test: Samples
     painted: NDArray[np.float64]
     answers: Mapping[str, Sequence[NDArray[np.float64]]]
+    networks: Sequence[Trained]
     new_rates: NDArray[np.bool_]
     clips: tuple[int, int]
 
 
-def compare_predictors(samples: Samples, painted: Samples, *, seeds: Iterable[int]) -> Comparison:
+def compare_predictors(samples: Samples, painted: Samples, *, seeds: Sequence[int]) -> Comparison:
     """Train every predictor on the training drives and ask it about the test drives.
+
+    The answer for a clip is the mean of those for its pictures.
 
     Parameters
     ----------
@@ -53,25 +57,33 @@ def compare_predictors(samples: Samples, painted: Samples, *, seeds: Iterable[in
     painted : the same with the labels of the appearance-only world
     seeds : of the networks, a pair of them each
     """
-    train, test = split_samples(samples)
-    painted_train, painted_test = split_samples(painted)
-    answers = {name: [predict(train, test)] for name, predict in BASELINES.items()}
-    answers |= {NETWORK: [], PAINTED: []}
-    for seed in seeds:
-        answers[NETWORK].append(train_network(train, seed=seed).predict(test))
-        answers[PAINTED].append(train_network(painted_train, seed=seed).predict(test))
+    train, pictures = split_samples(samples)
+    painted_train, painted_pictures = split_samples(painted)
+    _, first, clip = np.unique(pictures.clip, return_index=True, return_inverse=True)
+    test = pictures.take(first)
+
+    def ask(predict: Callable[[Samples], NDArray[np.float64]]) -> NDArray[np.float64]:
+        return np.bincount(clip, predict(pictures)) / np.bincount(clip)
+
+    networks, painted_networks = (
+        [train_network(part, seed=seed) for seed in seeds] for part in (train, painted_train)
+    )
+    answers = {name: [ask(partial(predict, train))] for name, predict in BASELINES.items()}
+    answers[NETWORK] = [ask(network.predict) for network in networks]
+    answers[PAINTED] = [ask(network.predict) for network in painted_networks]
     known = set(zip(train.weather, train.rate, strict=True))
     return Comparison(
         test=test,
-        painted=painted_test.deceleration,
+        painted=painted_pictures.take(first).deceleration,
         answers=answers,
+        networks=networks,
         new_rates=np.array([pair not in known for pair in zip(test.weather, test.rate, strict=True)]),
         clips=(len(set(train.clip)), len(set(test.clip))),
     )
 
 
 def format_errors(found: Comparison) -> str:
-    """Return a table of errors: root mean square over samples, mean over seeds and, of several, their range."""
+    """Return a table of errors: root mean square over clips, mean over seeds and, of several, their range."""
     kinds = sorted(set(found.test.weather))
     groups = {"all": np.ones(len(found.test), bool)}
     groups |= {kind: found.test.weather == kind for kind in kinds} | {"rates not trained": found.new_rates}

@@ -1,4 +1,4 @@
-"""A small convolutional network: pictures and brake command in, deceleration out."""
+"""A small convolutional network: one picture in, the road's friction out; with the brake command, the deceleration."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,85 +10,98 @@ from torch import nn
 
 from musync import SeededOrder
 from studies.learn_friction.samples import Samples
+from tasks.conventions import GRAVITY
 
-EPOCHS, BATCH, RATE, DECAY = 60, 32, 2e-3, 1e-4
-"""Passes over the samples [1], samples in a step [1], learning rate [1], weight decay [1]."""
+EPOCHS, BATCH, RATE, DECAY = 60, 32, 2e-3, 1e-3
+"""Passes over the samples [1], samples in a step [1], largest learning rate [1], weight decay [1]."""
+SEEN = (64, 96)
+"""Height and width of the pictures that the network sees [px]."""
+GAIN, BALANCE = (-0.25, 0.25), (-0.05, 0.05)
+"""Logarithm of the brightness of a training picture, and relative gain of each colour [1]."""
+LEAST_FRICTION = 0.02
+"""Of an answer [1]."""
 
 
 class BrakeNetwork(nn.Module):
-    """Three convolutions see the pictures; two layers join what they saw with the command.
+    """Four convolutions see the road's friction; the car decelerates as the brake asks, or as the road gives.
 
     Parameters
     ----------
-    channels : of all pictures of a sample [1]
+    centre, scale : mean and deviation of the friction [1]
     """
 
-    def __init__(self, channels: int):
+    def __init__(self, centre: float, scale: float) -> None:
         super().__init__()
+        self.register_buffer("spread", torch.tensor([centre, scale], dtype=torch.float32))
+        layers: list[nn.Module] = []
+        for given, made in ((3, 16), (16, 32), (32, 64), (64, 64)):
+            layers += [nn.Conv2d(given, made, 3, stride=2, padding=1), nn.BatchNorm2d(made), nn.ReLU()]
         self.see = nn.Sequential(
-            nn.Conv2d(channels, 16, 5, stride=2, padding=2), nn.ReLU(),
-            nn.Conv2d(16, 32, 3, stride=2, padding=1), nn.ReLU(),
-            nn.Conv2d(32, 32, 3, stride=2, padding=1), nn.ReLU(),
-            nn.AdaptiveAvgPool2d((2, 1)), nn.Flatten(),
-        )  # fmt: skip
-        self.join = nn.Sequential(
-            nn.Linear(2 * 32 + 2, 64), nn.ReLU(), nn.Linear(64, 64), nn.ReLU(), nn.Linear(64, 1)
+            *layers, nn.AdaptiveAvgPool2d((2, 1)), nn.Flatten(), nn.Dropout(0.2), nn.Linear(128, 1)
         )
+        self.limits = nn.Parameter(torch.tensor([2.0, GRAVITY, 8.0]).log())
 
-    def forward(self, pictures: torch.Tensor, command: torch.Tensor) -> torch.Tensor:
-        """Return the standardised deceleration of uint8 pictures and standardised commands."""
-        seen = self.see(pictures.float() / 127.5 - 1)
-        return self.join(torch.cat([seen, command], dim=1))[:, 0]
+    def forward(self, pictures: torch.Tensor, pressure: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Return friction [1] and deceleration [m/s2] of pictures in 0..1 and pressures [MPa].
+
+        The deceleration is the smooth minimum of a gain times the pressure and one times the friction; both gains and
+        the sharpness are learned.
+        """
+        centre, scale = self.spread
+        friction = (centre + scale * self.see(pictures - 0.5)[:, 0]).clamp(min=LEAST_FRICTION)
+        of_brake, of_road, sharpness = self.limits.exp()
+        asked, held = of_brake * pressure, of_road * friction
+        return friction, (asked**-sharpness + held**-sharpness) ** (-1 / sharpness)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Trained:
-    """A trained network with the scales of its numbers.
+    """A trained network.
 
     Parameters
     ----------
     network : its weights
-    centre, scale : of speed [m/s], pressure [MPa] and deceleration [m/s2]
-    losses : mean squared error of each epoch, standardised [1]
+    losses : mean squared errors of friction and deceleration by their variances, summed, of each epoch [1]; none of
+        a network that was read
     """
 
     network: BrakeNetwork
-    centre: NDArray[np.float64]
-    scale: NDArray[np.float64]
-    losses: tuple[float, ...]
+    losses: tuple[float, ...] = ()
+
+    def estimate_friction(self, pictures: NDArray[np.uint8]) -> NDArray[np.float64]:
+        """Return the friction of the road in each picture [1].
+
+        Parameters
+        ----------
+        pictures : uint8 [N, H, W, 3] RGB, of any size
+        """
+        shown = torch.from_numpy(np.ascontiguousarray(np.moveaxis(pictures, -1, 1)))
+        return self._ask(shown, np.ones(len(shown)))[:, 0]
 
     def predict(self, samples: Samples) -> NDArray[np.float64]:
         """Return the deceleration of each sample [m/s2]."""
-        return self.answer(samples.pictures, samples.command)
+        return self._ask(samples.pictures, samples.command[:, 1])[:, 1]
 
-    def answer(self, pictures: torch.Tensor, command: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the deceleration for pictures and commands, as of `Samples` [m/s2]."""
-        numbers = torch.from_numpy((command - self.centre[:2]) / self.scale[:2]).float()
+    def write(self, path: str | Path) -> None:
+        """Write the weights to a file for `read_network`."""
+        torch.save(self.network.state_dict(), path)
+
+    def _ask(self, pictures: torch.Tensor, pressure: NDArray[np.float64]) -> NDArray[np.float64]:
+        self.network.eval()
+        asked = torch.from_numpy(pressure).float()
         with torch.no_grad():
-            answer = torch.cat([
-                self.network(*part) for part in zip(pictures.split(256), numbers.split(256), strict=True)
-            ])  # fmt: skip
-        return answer.double().numpy() * self.scale[2] + self.centre[2]
-
-    def write(self, path: Path) -> None:
-        """Write weights and scales; the same ones give the same bytes."""
-        weights = {name: values.numpy() for name, values in self.network.state_dict().items()}
-        np.savez(path, centre=self.centre, scale=self.scale, **weights)
+            answers = [
+                torch.stack(self.network(shrink_pictures(shown), part), dim=1)
+                for shown, part in zip(pictures.split(256), asked.split(256), strict=True)
+            ]
+        return torch.cat(answers).double().numpy()
 
 
-def read_trained(path: Path) -> Trained:
-    """Return a network that `Trained.write` wrote, without its losses.
-
-    Parameters
-    ----------
-    path : of the file
-    """
-    with np.load(path) as kept:
-        weights = {name: torch.from_numpy(kept[name]) for name in kept.files}
-    centre, scale = (weights.pop(name).numpy() for name in ("centre", "scale"))
-    network = BrakeNetwork(weights["see.0.weight"].shape[1])
-    network.load_state_dict(weights)
-    return Trained(network=network, centre=centre, scale=scale, losses=())
+def read_network(path: str | Path) -> Trained:
+    """Return the network whose weights `Trained.write` wrote."""
+    network = BrakeNetwork(0, 1)
+    network.load_state_dict(torch.load(path, weights_only=True))
+    return Trained(network=network)
 
 
 def train_network(samples: Samples, *, seed: int, epochs: int = EPOCHS) -> Trained:
@@ -99,27 +112,48 @@ def train_network(samples: Samples, *, seed: int, epochs: int = EPOCHS) -> Train
     Parameters
     ----------
     samples : to learn from
-    seed : of the first weights and of the order
+    seed : of the first weights, of the order and of the variation of the pictures
     epochs : passes over the samples [1]
     """
     torch.use_deterministic_algorithms(True)
-    numbers = np.column_stack([samples.command, samples.deceleration])
-    centre, scale = numbers.mean(axis=0), numbers.std(axis=0) + 1e-9
-    standard = torch.from_numpy((numbers - centre) / scale).float()
+    pressure = torch.from_numpy(samples.command[:, 1]).float()
+    wanted = torch.from_numpy(np.stack([samples.friction, samples.deceleration])).float()
+    variances = wanted.var(dim=1, unbiased=False) + 1e-6
+    draw = torch.Generator().manual_seed(seed)
+    order, losses = SeededOrder(len(samples), seed), []
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
-        network = BrakeNetwork(samples.pictures.shape[1])
-    descent = torch.optim.AdamW(network.parameters(), lr=RATE, weight_decay=DECAY)
-    order, losses = SeededOrder(len(samples), seed), []
-    for epoch in range(epochs):
-        order.set_epoch(epoch)
-        total = 0.0
-        for batch in torch.tensor(list(order)).split(BATCH):
-            answer = network(samples.pictures[batch], standard[batch, :2])
-            loss = nn.functional.mse_loss(answer, standard[batch, 2])
-            descent.zero_grad()
-            loss.backward()
-            descent.step()
-            total += float(loss.detach()) * len(batch)
-        losses.append(total / len(samples))
-    return Trained(network=network, centre=centre, scale=scale, losses=tuple(losses))
+        network = BrakeNetwork(float(wanted[0].mean()), float(variances[0].sqrt()))
+        descent = torch.optim.AdamW(network.parameters(), lr=RATE, weight_decay=DECAY)
+        steps = epochs * -(-len(samples) // BATCH)
+        slowing = torch.optim.lr_scheduler.OneCycleLR(descent, RATE, total_steps=steps)
+        for epoch in range(epochs):
+            order.set_epoch(epoch)
+            total = 0.0
+            for batch in torch.tensor(list(order)).split(BATCH):
+                answer = torch.stack(
+                    network(vary_pictures(shrink_pictures(samples.pictures[batch]), draw), pressure[batch])
+                )
+                loss = (((answer - wanted[:, batch]) ** 2).mean(dim=1) / variances).sum()
+                descent.zero_grad()
+                loss.backward()
+                descent.step()
+                slowing.step()
+                total += float(loss.detach()) * len(batch)
+            losses.append(total / len(samples))
+    return Trained(network=network, losses=tuple(losses))
+
+
+def shrink_pictures(pictures: torch.Tensor) -> torch.Tensor:
+    """Return uint8 pictures [N, 3, H, W] as the network sees them, in 0..1."""
+    return nn.functional.interpolate(pictures.float() / 255, SEEN, mode="bilinear", antialias=True)
+
+
+def vary_pictures(pictures: torch.Tensor, draw: torch.Generator) -> torch.Tensor:
+    """Return pictures [N, 3, *SEEN] of other brightness and white balance, each mirrored or not."""
+
+    def spread(low: float, high: float, channels: int = 1) -> torch.Tensor:
+        return low + (high - low) * torch.rand(len(pictures), channels, 1, 1, generator=draw)
+
+    mirrored = torch.where(spread(0, 1) < 0.5, pictures.flip(-1), pictures)
+    return (mirrored * torch.exp(spread(*GAIN)) * (1 + spread(*BALANCE, 3))).clamp(0, 1)

@@ -2,17 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
 import musync
+from tasks.conventions import GRAVITY
 
-FRAMES = 3
-"""Pictures of one sample [1]."""
-WINDOWS = 4
-"""Samples of one clip at most [1]."""
+PICTURES = 4
+"""Samples of one clip at most: its last pictures before the brake, one each [1]."""
 OVER_S = 1.5
 """The deceleration is the mean over this time from the brake onset on [s]."""
 DRIVE = ["initial_speed_km_h", "peak_pressure_mpa", "brake_onset_m", "brake_onset_s"]
@@ -25,9 +25,10 @@ class Samples:
 
     Parameters
     ----------
-    pictures : uint8 [sample, frame x channel, y, x], all taken before the brake onset
+    pictures : uint8 [sample, channel, y, x], each taken before the brake onset
     command : speed before the brake [m/s], brake pressure after the ramp [MPa]
-    deceleration : mean over ``OVER_S`` from the brake onset on [m/s2]
+    friction : reference coefficient of the road [1]
+    deceleration : mean over ``OVER_S`` from the brake onset on, as on a level road [m/s2]
     drive : number of the drive [1]
     weather, split, clip : kind of weather, split of the grid, label of the clip
     rate : precipitation [mm/h]
@@ -35,6 +36,7 @@ class Samples:
 
     pictures: torch.Tensor
     command: NDArray[np.float64]
+    friction: NDArray[np.float64]
     deceleration: NDArray[np.float64]
     drive: NDArray[np.int64]
     weather: NDArray[np.str_]
@@ -45,7 +47,7 @@ class Samples:
     def __len__(self) -> int:
         return len(self.deceleration)
 
-    def take(self, rows: NDArray[np.bool_]) -> "Samples":
+    def take(self, rows: NDArray[Any]) -> "Samples":
         """Return the samples of some rows."""
         return replace(self, **{field.name: getattr(self, field.name)[rows] for field in fields(self)})
 
@@ -58,11 +60,13 @@ class Brake:
     ----------
     onset_s : when [s]
     speed : then [m/s]
-    deceleration : mean from then on, over the time that was asked for [m/s2]
+    friction : reference coefficient of the road [1]
+    deceleration : mean from then on, over the time that was asked for, less what the road's grade gives [m/s2]
     """
 
     onset_s: float
     speed: float
+    friction: float
     deceleration: float
 
 
@@ -81,7 +85,9 @@ def read_brakes(data: musync.Dataset, *, over_s: float = OVER_S) -> dict[str, Br
     """
     brakes, short = {}, []
     for clip in data.pandas("clips").sort_values("index").to_dict("records"):
-        ticks = data.pandas("ticks", ["t_ns", "speed", "brake_pressure_mpa"], clip=clip["clip_id"])
+        ticks = data.pandas(
+            "ticks", ["t_ns", "speed", "brake_pressure_mpa", "road_grade"], clip=clip["clip_id"]
+        )
         pressed = np.flatnonzero(ticks["brake_pressure_mpa"].to_numpy() > 0)
         if not len(pressed):
             continue
@@ -91,7 +97,14 @@ def read_brakes(data: musync.Dataset, *, over_s: float = OVER_S) -> dict[str, Br
             short.append(clip["label"])
             continue
         start, end = np.interp([onset, onset + over_s], seconds, speed)
-        brakes[clip["label"]] = Brake(onset_s=onset, speed=start, deceleration=(start - end) / over_s)
+        braking = (seconds >= onset) & (seconds <= onset + over_s)
+        climb = GRAVITY * ticks["road_grade"].to_numpy()[braking].mean()
+        brakes[clip["label"]] = Brake(
+            onset_s=onset,
+            speed=start,
+            friction=clip["surface_friction"],
+            deceleration=(start - end) / over_s - climb,
+        )
     if short:
         raise musync.InputError(
             f"the telemetry must reach {over_s:g} s past the brake onset; that of {len(short)} clips"
@@ -100,10 +113,8 @@ def read_brakes(data: musync.Dataset, *, over_s: float = OVER_S) -> dict[str, Br
     return brakes
 
 
-def read_samples(
-    data: musync.Dataset, *, over_s: float = OVER_S, frames: int = FRAMES, most: int = WINDOWS
-) -> Samples:
-    """Read the samples of every clip that brakes and has enough frames before.
+def read_samples(data: musync.Dataset, *, over_s: float = OVER_S, most: int = PICTURES) -> Samples:
+    """Read the samples of every clip that brakes.
 
     Clips in quarantine are taken too: the pose check wants more pixels than these pictures have, and nothing is
     recovered from them here.
@@ -112,8 +123,7 @@ def read_samples(
     ----------
     data : dataset with frames
     over_s : time over which the deceleration is averaged [s]
-    frames : pictures of one sample [1]
-    most : samples of one clip, each a frame earlier than the one before [1]
+    most : samples of one clip [1]
 
     Raises
     ------
@@ -122,28 +132,27 @@ def read_samples(
     """
     clips = data.pandas("clips").sort_values("index")
     drives = clips.groupby(DRIVE, dropna=False, sort=True).ngroup().to_numpy()
-    windows = data.torch(window=frames, stride=1, columns=["speed"], arrays=["rgb"], quarantined=True)
+    windows = data.torch(window=most, stride=1, columns=["speed"], arrays=["rgb"], quarantined=True)
     rate_hz = data.manifest["grid"]["frame_rate_hz"]
     brakes = read_brakes(data, over_s=over_s)
     rows, pictures = [], []
     for clip, drive in zip(clips.to_dict("records"), drives, strict=True):
         if (brake := brakes.get(clip["label"])) is None:
             continue
-        last = min(
-            int(brake.onset_s * rate_hz), windows.starts[-1] + frames - 1
-        )  # the last frame before the onset
-        for first in range(last - frames + 1, max(last - frames + 1 - most, -1), -1):
-            shown = windows[windows.clips.index(clip["index"]) * len(windows.starts) + first]["rgb"]
-            pictures.append(shown.permute(0, 3, 1, 2).flatten(0, 1))
-            rows.append({
-                "command": (brake.speed, clip["peak_pressure_mpa"]), "deceleration": brake.deceleration,
-                "drive": drive, "weather": clip["weather"], "split": clip["split"], "clip": clip["label"],
-                "rate": clip["precipitation_mm_h"],
-            })  # fmt: skip
+        last = min(int(brake.onset_s * rate_hz), windows.starts[-1] + most - 1)
+        first = max(last - most + 1, 0)
+        shown = windows[windows.clips.index(clip["index"]) * len(windows.starts) + first]["rgb"]
+        before = shown[: last - first + 1].permute(0, 3, 1, 2)
+        pictures.append(before)
+        rows += len(before) * [{
+            "command": (brake.speed, clip["peak_pressure_mpa"]), "friction": brake.friction,
+            "deceleration": brake.deceleration, "drive": drive, "rate": clip["precipitation_mm_h"],
+            "weather": clip["weather"], "split": clip["split"], "clip": clip["label"],
+        }]  # fmt: skip
     if not rows:
-        raise musync.InputError(f"a sample needs {frames} frames before a brake onset; no clip has them")
+        raise musync.InputError("no clip brakes")
     return Samples(
-        pictures=torch.stack(pictures), **{name: np.array([row[name] for row in rows]) for name in rows[0]}
+        pictures=torch.cat(pictures), **{name: np.array([row[name] for row in rows]) for name in rows[0]}
     )
 
 
@@ -177,7 +186,7 @@ def split_samples(samples: Samples) -> tuple[Samples, Samples]:
 
 
 def relabel_samples(samples: Samples, brakes: Mapping[str, Brake]) -> Samples:
-    """Return the same pictures with the deceleration of a world that looks the same before the brake.
+    """Return the same pictures with friction and deceleration of a world that looks the same before the brake.
 
     Parameters
     ----------
@@ -193,4 +202,9 @@ def relabel_samples(samples: Samples, brakes: Mapping[str, Brake]) -> Samples:
         raise musync.InputError(
             f"both worlds must have the same clips; {len(lacking)} ({', '.join(lacking[:3])}) brake in one alone"
         )
-    return replace(samples, deceleration=np.array([brakes[label].deceleration for label in samples.clip]))
+    others = [brakes[label] for label in samples.clip]
+    return replace(
+        samples,
+        friction=np.array([brake.friction for brake in others]),
+        deceleration=np.array([brake.deceleration for brake in others]),
+    )

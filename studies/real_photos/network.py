@@ -15,8 +15,10 @@ SEEN = 48
 """Side of the square that the network sees [px]."""
 BATCH, RATE, TUNING_RATE, DECAY, SMOOTHING = 32, 2e-3, 5e-4, 1e-3, 0.05
 """Pictures in a step [1], learning rates [1], weight decay [1], label smoothing [1]."""
-CROP, SATURATION, GAMMA, BALANCE = (0.8, 1.0), (-0.35, 0.5), (-0.35, 0.35), (-0.12, 0.12)
+CROP, SATURATION, GAMMA, BALANCE = (0.5, 1.0), (-0.35, 0.5), (-0.35, 0.35), (-0.12, 0.12)
 """Share of each side that is kept [1], logarithms of saturation and gamma, relative gain of each colour [1]."""
+GREY, HUE, BLUR = 0.2, (-0.5, 0.5), (-1.0, 1.0)
+"""Share of pictures without colour [1], turn of hues [rad], from doubled local contrast to a mean of 3 x 3 [1]."""
 LEVELS, BLACK, WHITE = (0.03, 0.97), (0.0, 0.28), (0.68, 1.02)
 """Shares of the pixels that lie below black and white, and where these come to lie [1]."""
 
@@ -112,9 +114,10 @@ def shrink_pictures(pictures: torch.Tensor) -> torch.Tensor:
 
 
 def vary_pictures(pictures: torch.Tensor, draw: torch.Generator) -> torch.Tensor:
-    """Return uint8 pictures as other cameras might have taken them: other crop, levels, colour saturation and balance.
+    """Return uint8 pictures as other cameras might have taken them of other ground: crop, levels, colours, sharpness.
 
-    No variation knows the class: a dry road stays dry when its picture is darker, bluer or taken with a longer lens.
+    No variation knows the class: a dry road stays dry when its picture is darker, grey or taken with a longer lens, and
+    when its verge is brown.
 
     Parameters
     ----------
@@ -127,13 +130,22 @@ def vary_pictures(pictures: torch.Tensor, draw: torch.Generator) -> torch.Tensor
 
     seen = _crop_pictures(pictures.float() / 255, spread)
     grey = seen.mean(dim=1, keepdim=True)
-    seen = grey + torch.exp(spread(*SATURATION)) * (seen - grey)
+    coloured = spread(0, 1) > GREY
+    seen = grey + coloured * torch.exp(spread(*SATURATION)) * (_turn_hues(seen, spread(*HUE)) - grey)
     light = grey[:, :, ::4, ::4].flatten(1)  # enough of the pixels to know how many are darker
     black, white = light.quantile(torch.tensor(LEVELS), dim=1)[..., None, None, None]
     low, high = spread(*BLACK), spread(*WHITE)
     seen = low + (seen - black) * (high - low) / (white - black).clamp(min=0.05)
     seen = seen.clamp(1e-3, 1) ** torch.exp(spread(*GAMMA)) * (1 + spread(*BALANCE, 3))
-    return seen.clamp(0, 1)
+    smooth = nn.functional.avg_pool2d(seen, 3, stride=1, padding=1, count_include_pad=False)
+    return (seen + spread(*BLUR) * (smooth - seen)).clamp(0, 1)
+
+
+def _turn_hues(pictures: torch.Tensor, angle: torch.Tensor) -> torch.Tensor:
+    """Turn colours about the grey axis by angles [rad]."""
+    own, across = (1 + 2 * torch.cos(angle)) / 3, torch.sin(angle) / 3**0.5
+    left = (1 - torch.cos(angle)) / 3
+    return own * pictures + (left - across) * pictures.roll(1, 1) + (left + across) * pictures.roll(-1, 1)
 
 
 def _crop_pictures(pictures, spread):  # type: ignore[no-untyped-def]

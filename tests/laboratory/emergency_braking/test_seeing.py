@@ -7,9 +7,9 @@ import pytest
 from catalogs.entries import load
 from catalogs.scenario import Scenario
 from studies.emergency_braking.compare import ROAD, compare_brakes
+from studies.emergency_braking.network import read_trained
 from studies.emergency_braking.seeing import GRID, WEIGHTS, Reader, load_reader
 from studies.emergency_braking.table import load_table
-from studies.learn_friction.network import read_trained
 
 ASPHALT = load("wet friction").apply(load("surface", "dense-asphalt"))
 

@@ -11,9 +11,9 @@ from catalogs.entries import load
 from flows.making.generate import generate_dataset
 from studies.learn_friction.__main__ import GRID, STREETS, open_made, paint_grid
 from studies.learn_friction.comparison import PAINTED, compare_predictors, format_errors
-from studies.learn_friction.network import train_network
+from studies.learn_friction.network import read_network, train_network
 from studies.learn_friction.samples import (
-    FRAMES,
+    PICTURES,
     Brake,
     Samples,
     read_brakes,
@@ -27,15 +27,17 @@ from tests.documents import DOCS, list_blocks
 
 @pytest.fixture(scope="module")
 def drawn() -> Samples:
-    """Twelve drives, each dry and on snow: bright pictures, on which the car brakes half as hard."""
+    """Twelve drives, each dry and on snow: pictures with a bright road, on which the car brakes half as hard."""
     draw = np.random.Generator(np.random.Philox(1))
     drive = np.repeat(np.arange(12), 2)
     snow = np.tile([False, True], 12)
     pressure = draw.uniform(1, 3, 12)[drive]
-    pictures = draw.integers(0, 60, (24, 9, 16, 24)) + 150 * snow[:, None, None, None]
+    pictures = draw.integers(0, 60, (24, 3, 64, 64))
+    pictures[:, :, 32:] += 150 * snow[:, None, None, None]
     return Samples(
         pictures=torch.from_numpy(pictures.astype(np.uint8)),
         command=np.column_stack([np.full(24, 15.0), pressure]),
+        friction=np.where(snow, 0.3, 0.9),
         deceleration=np.where(snow, 1.0, 2.0) * pressure,
         drive=drive,
         weather=np.where(snow, "snow", "dry"),
@@ -113,6 +115,7 @@ def test_an_appearance_only_world_brakes_as_the_dry_one_and_looks_the_same_befor
     sound, painted = (read_brakes(world) for world in worlds)
     dry, snow = sorted(sound)
     assert painted[dry].deceleration == painted[snow].deceleration == sound[dry].deceleration
+    assert painted[snow].friction == sound[dry].friction > sound[snow].friction
     assert sound[snow].deceleration < 0.7 * sound[dry].deceleration
     clips = sorted((world[snow] for world in worlds), key=lambda clip: clip.clip_id)
     assert clips[0].record["seed"] == clips[1].record["seed"], "the same drops and flakes"
@@ -120,16 +123,31 @@ def test_an_appearance_only_world_brakes_as_the_dry_one_and_looks_the_same_befor
         np.stack(frames["T_world_rig"][frames["t_ns"] < sound[snow].onset_s * 1e9])
         for frames in (clip.pandas("frames") for clip in clips)
     ]
-    assert len(poses[0]) >= FRAMES and np.array_equal(*poses)
+    assert len(poses[0]) >= PICTURES and np.array_equal(*poses)
+
+
+def test_the_deceleration_is_that_of_a_level_road(tmp_path) -> None:
+    """Downhill the car slows less, and the label is the same: brake and road give it."""
+    grid = load("grid", GRID)
+    label, drive = next((label, one) for label, one in grid.scenarios if one.weather == "dry")
+    labels = []
+    for scene in ("street", "hill"):
+        one = replace(
+            grid, scenarios=((label, replace(drive, scene=scene, brake_onset_m=50.0)),), tags=grid.tags[:1]
+        )
+        generate_dataset(one, str(tmp_path / scene), runner="threads", workers=1, pictures=False)
+        labels.append(read_brakes(musync.open(tmp_path / scene))[label].deceleration)
+    assert labels[1] == pytest.approx(labels[0], abs=0.03)
 
 
 def test_samples_take_the_labels_of_another_world_clip_by_clip(drawn: Samples) -> None:
     brakes = {
-        str(label): Brake(onset_s=1.0, speed=15.0, deceleration=float(number))
+        str(label): Brake(onset_s=1.0, speed=15.0, friction=0.1 * number, deceleration=float(number))
         for number, label in enumerate(drawn.clip)
     }
     painted = relabel_samples(drawn, brakes)
     assert torch.equal(painted.pictures, drawn.pictures) and list(painted.deceleration) == list(range(24))
+    assert list(painted.friction) == [0.1 * number for number in range(24)]
     del brakes["snow/0"]
     with pytest.raises(musync.InputError, match=r"1 \(snow/0\) brake in one alone"):
         relabel_samples(drawn, brakes)
@@ -138,22 +156,25 @@ def test_samples_take_the_labels_of_another_world_clip_by_clip(drawn: Samples) -
 def test_samples_end_before_the_brake_and_carry_what_follows(toy_dataset) -> None:
     data = musync.open(toy_dataset.root)
     samples = read_samples(data, over_s=0.7)
-    assert list(samples.clip) == ["dry/flat", "snow-3/flat"]  # the others never brake
-    assert len(set(samples.drive)) == 1 and samples.deceleration[0] > samples.deceleration[1] > 0
-    first = data.frames["rgb"][
-        int(data.manifest["clips"][0]["index"]), :FRAMES
-    ]  # at 0, 0.1 and 0.2 s, the onset
-    assert np.array_equal(samples.pictures[0], first.transpose(0, 3, 1, 2).reshape(9, *first.shape[1:3]))
+    assert list(samples.clip) == 3 * ["dry/flat"] + 3 * ["snow-3/flat"]  # the others never brake
+    assert len(set(samples.drive)) == 1 and samples.deceleration[0] > samples.deceleration[-1] > 0
+    assert samples.friction[0] > samples.friction[-1] > 0
+    before = data.frames["rgb"][int(data.manifest["clips"][0]["index"]), :3]  # at 0, 0.1 and 0.2 s, the onset
+    assert np.array_equal(samples.pictures[:3], before.transpose(0, 3, 1, 2))
     with pytest.raises(musync.InputError, match="give the grid a longer duration_s"):
         read_samples(data)
 
 
-def test_training_lowers_the_loss_and_a_seed_gives_the_same_network(drawn: Samples) -> None:
+def test_training_lowers_the_loss_and_a_seed_gives_the_same_network(drawn: Samples, tmp_path) -> None:
     train, test = split_samples(drawn)
     trained = train_network(train, seed=1, epochs=30)
     assert trained.losses[-1] < 0.3 * trained.losses[0]
+    friction = trained.estimate_friction(test.pictures.numpy().transpose(0, 2, 3, 1))
+    assert np.abs(friction - test.friction).max() < 0.2
+    trained.write(tmp_path / "weights.pt")
+    assert np.array_equal(read_network(tmp_path / "weights.pt").predict(test), trained.predict(test))
     again, same, other = (train_network(train, seed=seed, epochs=2) for seed in (1, 1, 2))
-    assert again.losses == same.losses == trained.losses[:2] != other.losses
+    assert again.losses == same.losses != other.losses
     assert np.array_equal(again.predict(test), same.predict(test))
 
 
