@@ -1,7 +1,7 @@
 """Measure the device path where a GPU is at hand, in under eight minutes: ``python -m studies.gpu``.
 
 For each size and weather of one street: how far the device's frames are from the processor's, and how long a whole
-clip takes, alone and beside others. Without a GPU, ``--rehearse`` runs the same steps on one tiny frame.
+clip takes, alone and beside others. Without a GPU, ``--rehearse`` runs the same steps on two tiny frames.
 """
 
 import argparse
@@ -91,9 +91,9 @@ def draw(scene: Scene, camera: Camera, name: str, backend: Backend, frames: int)
 def main() -> None:
     """Print one row a line."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--rehearse", action="store_true", help="one tiny frame, by the processor alone")
+    parser.add_argument("--rehearse", action="store_true", help="two tiny frames, by the processor alone")
     if parser.parse_args().rehearse:
-        measure(load_scene("street"), CpuBackend(), ((48, 32),), 1)
+        measure(load_scene("street"), CpuBackend(), ((48, 32),), 2)
         return
     import torch
 
