@@ -213,8 +213,8 @@ def wet_layer(
         below = see_through_film(picture, view, shift) - picture
         add += gain * water.smooth[..., None] * below
     if p.impacts is not None and film.falling is not None:
-        seen = (bring_to_host(one) for one in (gbuffer.depth, road, water.smooth))
-        struck = visible_impacts(film.falling, p.impacts, shutter, *seen, film.seed)
+        depth, wetted, smooth = map(bring_to_host, (gbuffer.depth, road, water.smooth))
+        struck = visible_impacts(film.falling, p.impacts, shutter, depth, wetted, smooth, film.seed)
         bright = np.broadcast_to(p.impacts.light * sky.white, (len(struck), 3))
         splashed = draw_streaks(struck, bright, gbuffer.depth, shutter.K, 0.0)
         _cover_where(splashed.alpha, splashed.rgb, gain, add)
