@@ -30,6 +30,8 @@ class BrakeNetwork(nn.Module):
     centre, scale : mean and deviation of the friction [1]
     """
 
+    spread: torch.Tensor
+
     def __init__(self, centre: float, scale: float) -> None:
         super().__init__()
         self.register_buffer("spread", torch.tensor([centre, scale], dtype=torch.float32))
