@@ -94,9 +94,19 @@ def library_versions() -> dict[str, str]:
     }
 
 
-def describe_processor() -> dict[str, str]:
-    """Return the architecture and, where the kernel reports them, the model and vector extensions of the processor."""
+def describe_processor(backend: str = "cpu") -> dict[str, str]:
+    """Return the architecture and, where the kernel reports them, the model and vector extensions of the processor.
+
+    Parameters
+    ----------
+    backend : rasteriser; frames of gsplat are those of one kind of GPU, whose name is given where the machine has it
+    """
     facts = {"architecture": platform.machine()}
+    if backend == "gsplat":
+        import torch  # slow to load
+
+        if torch.cuda.is_available():
+            facts["gpu"] = torch.cuda.get_device_name()
     cpuinfo = Path("/proc/cpuinfo")
     if cpuinfo.exists():
         for line in cpuinfo.read_text().splitlines():

@@ -66,7 +66,9 @@ def seal_dataset(layout: Layout, plan: Plan, executor: Executor | None = None) -
     ]
     artifacts = parts | {layout.relative(path): sha256_of_file(path) for path in shared}
     read_kept(layout, plan.inputs)
-    made_on = {"processor": describe_processor(), "git": git_commit(), "environment": environment_bom()}
+    made_on = {
+        "processor": describe_processor(plan.backend), "git": git_commit(), "environment": environment_bom()
+    }  # fmt: skip
     quarantined: dict[str, list[str]] = {}
     receipts = _note_quarantined(_read_receipts(layout, plan.clips), quarantined)
     write_pieces(layout.manifest, freeze_manifest(plan.head_as_json(), receipts, artifacts, made_on))

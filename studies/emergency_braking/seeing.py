@@ -19,7 +19,7 @@ from catalogs.scenario import Scenario
 from flows.cli import run_to_end
 from flows.driving.simulator import Simulator
 from flows.making.generate import generate_dataset
-from studies.emergency_braking.network import Trained, read_trained, train_network
+from studies.learn_friction.network import Trained, read_network, train_network
 from studies.learn_friction.samples import Samples, read_samples, split_samples
 from tasks.surface.state import SurfaceParameters
 from tasks.vehicle.parameters import Vehicle
@@ -45,22 +45,8 @@ class Reader:
     trained: Trained
     sha256: str
 
-    def read(self, picture: NDArray[np.uint8], speed: float, gravity: float) -> float:
-        """Return the friction with which the network expects a full brake to act [1].
-
-        Parameters
-        ----------
-        picture : uint8 [H, W, 3] sRGB of `CAMERA`
-        speed : of the car [m/s]
-        gravity : [m/s2]
-        """
-        pictures = torch.from_numpy(picture.copy()).permute(2, 0, 1)[None]
-        full_mpa = self.trained.centre[1]  # the one pressure of its training
-        (deceleration,) = self.trained.answer(pictures, np.array([[speed, full_mpa]]))
-        return max(float(deceleration), 0.1) / gravity
-
     def look(self, scenario: Scenario, car: Vehicle, pavement: SurfaceParameters) -> float:
-        """Return what it reads from the picture with which a drive begins [1].
+        """Return the friction that it reads from the picture with which a drive begins [1].
 
         Parameters
         ----------
@@ -69,13 +55,13 @@ class Reader:
         """
         seen = Simulator(scenario, vehicle=car, surface=pavement, camera=CAMERA).reset()
         assert seen.frame is not None
-        return self.read(seen.frame, seen.speed, car.gravity)
+        return float(self.trained.estimate_friction(seen.frame[None])[0])
 
 
 @cache
 def load_reader() -> Reader:
     """Return the reader whose weights lie beside this file."""
-    return Reader(trained=read_trained(WEIGHTS), sha256=sha256(WEIGHTS.read_bytes()).hexdigest())
+    return Reader(trained=read_network(WEIGHTS), sha256=sha256(WEIGHTS.read_bytes()).hexdigest())
 
 
 def make_samples(place: str) -> Samples:
@@ -91,12 +77,12 @@ def make_samples(place: str) -> Samples:
 
 
 def format_errors(test: Samples, answers: list[NDArray[np.float64]]) -> str:
-    """Return a table of the true deceleration, and of what each network says, by weather and rate [m/s2]."""
+    """Return a table of the true friction, and of what each network reads, by weather and rate [1]."""
     rows = ["| weather | mm/h | true | read |", "| --- | --- | --- | --- |"]
     for kind, rate in sorted(set(zip(test.weather, test.rate, strict=True))):
         here = (test.weather == kind) & (test.rate == rate)
         read = ", ".join(f"{answer[here].mean():.2f}" for answer in answers)
-        rows.append(f"| {kind} | {rate:g} | {test.deceleration[here].mean():.2f} | {read} |")
+        rows.append(f"| {kind} | {rate:g} | {test.friction[here].mean():.2f} | {read} |")
     return "\n".join(rows)
 
 
@@ -109,7 +95,8 @@ def run_study() -> None:
     torch.set_num_threads(1)
     train, test = split_samples(make_samples(asked.dataset))
     networks = [train_network(train, seed=SEED + place, epochs=EPOCHS) for place in range(asked.seeds)]
-    print(format_errors(test, [network.predict(test) for network in networks]))
+    pictures = test.pictures.permute(0, 2, 3, 1).numpy()
+    print(format_errors(test, [network.estimate_friction(pictures) for network in networks]))
     networks[0].write(WEIGHTS)
 
 

@@ -103,3 +103,11 @@ def test_the_processor_is_named_as_the_kernel_names_it() -> None:
     assert facts["model"] == said["model name"]
     known = {"avx", "avx2", "fma", "avx512f", "avx512dq", "avx512vl"}
     assert set(facts["vector_extensions"].split()) == known & set(said["flags"].split())
+
+
+def test_the_gpu_that_drew_is_named(monkeypatch) -> None:
+    torch = pytest.importorskip("torch")
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    monkeypatch.setattr(torch.cuda, "get_device_name", lambda: "a card")
+    assert describe_processor("gsplat")["gpu"] == "a card"
+    assert "gpu" not in describe_processor("cpu")

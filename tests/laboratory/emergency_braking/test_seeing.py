@@ -7,15 +7,15 @@ import pytest
 from catalogs.entries import load
 from catalogs.scenario import Scenario
 from studies.emergency_braking.compare import ROAD, compare_brakes
-from studies.emergency_braking.network import read_trained
 from studies.emergency_braking.seeing import GRID, WEIGHTS, Reader, load_reader
 from studies.emergency_braking.table import load_table
+from studies.learn_friction.network import read_network
 
 ASPHALT = load("wet friction").apply(load("surface", "dense-asphalt"))
 
 
 def test_the_weights_are_written_again_with_the_same_bytes(tmp_path):
-    read_trained(WEIGHTS).write(tmp_path / "again.npz")
+    read_network(WEIGHTS).write(tmp_path / "again.npz")
     assert (tmp_path / "again.npz").read_bytes() == WEIGHTS.read_bytes()
 
 

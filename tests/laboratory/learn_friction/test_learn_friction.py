@@ -171,8 +171,10 @@ def test_training_lowers_the_loss_and_a_seed_gives_the_same_network(drawn: Sampl
     assert trained.losses[-1] < 0.3 * trained.losses[0]
     friction = trained.estimate_friction(test.pictures.numpy().transpose(0, 2, 3, 1))
     assert np.abs(friction - test.friction).max() < 0.2
-    trained.write(tmp_path / "weights.pt")
-    assert np.array_equal(read_network(tmp_path / "weights.pt").predict(test), trained.predict(test))
+    trained.write(tmp_path / "weights.npz")
+    assert read_network(tmp_path / "weights.npz").predict(test) == pytest.approx(
+        trained.predict(test), abs=0.02
+    )
     again, same, other = (train_network(train, seed=seed, epochs=2) for seed in (1, 1, 2))
     assert again.losses == same.losses != other.losses
     assert np.array_equal(again.predict(test), same.predict(test))
