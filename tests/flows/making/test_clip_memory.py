@@ -47,7 +47,7 @@ def measure_clip(folder: Path, frames: int) -> tuple[int, int]:
     return peak, clip_memory(settings, catalogue_of(root).camera, ticks)
 
 
-@pytest.mark.parametrize("lens", ["", LENS, LENS + ROLLING])
+@pytest.mark.parametrize("lens", ["", LENS + ROLLING])
 def test_a_clip_grows_with_its_frames_as_estimated(lens: str, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_scene(toy_street(1), tmp_path / "flat", {})
