@@ -2,7 +2,6 @@
 
 ``python -m studies.emergency_braking.seeing`` trains the network on the full brakes of pictures.yaml, on streets that
 no protocol uses, prints how far off it is on two streets that it never saw, and writes network.npz beside this file.
-The file that is kept here is the network of learn_friction's streets.yaml, seed 1, which saw neither ice nor fog.
 """
 
 import argparse
