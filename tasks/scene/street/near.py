@@ -1,5 +1,6 @@
 """What a clip comes near: how near, and how finer discs take the place of the street's own."""
 
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from typing import Any
 
@@ -27,6 +28,20 @@ def measure_approach(point: Floats, T_world_camera: Floats) -> float:
     distance = np.linalg.norm(away, axis=1)
     seen = ahead > _IN_VIEW * distance
     return float(distance[seen].min()) if seen.any() else float("inf")
+
+
+def choose_cell(px: float, approach: float, focal_px: float, levels: Sequence[float]) -> float | None:
+    """Return the smallest cell that is no finer than a camera resolves, or None where the street's own will do [m].
+
+    Parameters
+    ----------
+    px : wanted size where the camera comes nearest [px]
+    approach : how near it comes [m]
+    focal_px : its focal length [px]
+    levels : cells, the finest first; it serves a camera that needs finer ones too [m]
+    """
+    wanted = px * approach / focal_px
+    return None if wanted > levels[-1] else next(level for level in levels if level >= wanted)
 
 
 def replace_discs(gaussians: Gaussians, index: NDArray[np.int64], finer: list[Gaussians]) -> Gaussians:

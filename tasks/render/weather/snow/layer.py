@@ -29,6 +29,7 @@ from tasks.render.weather.snow.shelter import open_share
 from tasks.render.weather.snow.wheel_tracks import TrackParameters
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.spherical_harmonics import C0
+from tasks.scene.street.surfels import OVERLAP
 from tasks.scene.surroundings import surface_scales
 
 BURIED = 0.98
@@ -37,8 +38,6 @@ NEAR_EDGE = 0.12
 """Distance beyond the edge of a patch, in the coverage field, within which discs are cut [1]."""
 MOST_PIECES = 4
 """Pieces of an anchor, at most [1]."""
-OVERLAP = 0.8
-"""Standard deviation of a disc of a road by the size of its cell [1]."""
 HIGHEST_LUMP = 2.0
 """Height of the highest lump of snow by the mean depth [1]."""
 

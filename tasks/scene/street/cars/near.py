@@ -14,7 +14,7 @@ from tasks.scene.spherical_harmonics import C0
 from tasks.scene.street.bend import integrate_course
 from tasks.scene.street.cars.parked import COARSE, build_parked, draw_look, place_body
 from tasks.scene.street.layout import StreetLayout
-from tasks.scene.street.near import measure_approach, replace_discs
+from tasks.scene.street.near import choose_cell, measure_approach, replace_discs
 from tasks.scene.street.objects import list_objects, own_gaussians
 from tasks.scene.street.plan import Car, plan_street
 from tasks.scene.surroundings import add_surroundings
@@ -55,10 +55,9 @@ def detail_cars(
     gone, parts = [], []
     for number, car in enumerate(cars, start=1):
         middle = line.to_world(np.array([[car.station, car.lateral, 0.7]]))[0]
-        spacing = CELL_PX * measure_approach(middle, T_world_camera) / focal_px
-        if spacing > LEVELS[-1]:
+        cell = choose_cell(CELL_PX, measure_approach(middle, T_world_camera), focal_px, LEVELS)
+        if cell is None:
             continue
-        cell = next(level for level in LEVELS if level >= spacing)
         rows = first + np.flatnonzero(owners == number)
         gone.append(rows)
         coarse: dict[str, Any] = {

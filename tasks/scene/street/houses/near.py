@@ -11,7 +11,7 @@ from tasks.scene.street.bend import integrate_course
 from tasks.scene.street.build import pack_surfels
 from tasks.scene.street.houses.facades import build_facades
 from tasks.scene.street.layout import EYE_HEIGHT, StreetLayout
-from tasks.scene.street.near import measure_approach, replace_discs
+from tasks.scene.street.near import choose_cell, measure_approach, replace_discs
 from tasks.scene.street.plan import Building, plan_street
 from tasks.scene.surroundings import add_surroundings
 
@@ -43,9 +43,9 @@ def detail_fronts(
     houses = plan_street(layout, seed).buildings
     edges = {}
     for index, house in enumerate(houses):
-        width = CELL_PX * _approach_front(house, layout, T_world_camera) / focal_px
-        if width <= LEVELS[-1]:
-            edges[index] = next(level for level in LEVELS if level >= width)
+        cell = choose_cell(CELL_PX, _approach_front(house, layout, T_world_camera), focal_px, LEVELS)
+        if cell is not None:
+            edges[index] = cell
     if not edges:
         return gaussians
     corner, counts = _list_coarse(layout, seed)
