@@ -83,14 +83,14 @@ def test_gsplats_class_is_found_where_light_falls_below_one_half() -> None:
     """Two tiles of 4 x 4: in the first a faint splat before a solid one, in the second none that halves the light."""
     front = np.full((4, 8), -1)
     means, conics = np.float32([[1.5, 1.5], [1.5, 1.5], [6.5, 1.5]]), np.float32([[1, 0, 1]] * 3)
-    opacities, starts = np.float32([0.3, 0.9, 0.45]), np.int32([[0, 2]])
+    opacities, starts = np.float32([0.3, 0.75, 0.45]), np.int32([[0, 2]])
     for row in range(4):
         for column in range(8):
             find_front(row, column, front, means, conics, opacities, starts, np.int32([0, 1, 2]), 4)
-    # half of the light is left where .3 and .9 of a normal law's height at the distance d leave half of it
+    # half of the light is left where .3 and .75 of a normal law's height at the distance d leave half of it
     dx, dy = np.meshgrid(np.arange(4) - 1.0, np.arange(4) - 1.0)
     falloff = np.exp(-(dx**2 + dy**2) / 2)
-    assert (front[:, :4] == np.where((1 - 0.3 * falloff) * (1 - 0.9 * falloff) < 0.5, 1, -1)).all()
+    assert (front[:, :4] == np.where((1 - 0.3 * falloff) * (1 - 0.75 * falloff) < 0.5, 1, -1)).all()
     assert (front[:, 4:] == -1).all() and (front[:, :4] == 1).any()
 
 
