@@ -37,6 +37,10 @@ axes:
       initial_speed_km_h: 50
       hold_speed: true
       objects: [{kind: car, track: {gap_m: 40, lateral_m: 3.5, heading_deg: 180, speed_km_h: 30}}]
+    led:
+      initial_speed_km_h: 50
+      hold_speed: true
+      objects: [{kind: car, track: {gap_m: 6, speed_km_h: 50, change_at_s: 0, acceleration_m_s2: -12}}]
     braked:
       initial_speed_km_h: 50
       peak_pressure_mpa: 8
@@ -82,6 +86,8 @@ def test_outcomes_have_percentiles_under_the_surface_bounds(data):
     for name in ("clearance", "min_ttc"):
         assert braked[f"{name}_p05"] < braked[f"{name}_p50"] < braked[f"{name}_p95"]
         assert braked[f"{name}_p05"] < braked[name] < braked[f"{name}_p95"]
+    # a lead car brakes as hard as each road allows
+    assert rows["led"]["impact_speed_p05"] < rows["led"]["impact_speed"] < rows["led"]["impact_speed_p95"]
     # nobody brakes there: no road changes the impact
     assert {standing[f"impact_speed_p{p}"] for p in ("05", "50", "95")} == {standing["impact_speed"]}
     (asked,) = re.findall(r'musync sql datasets/demo "(SELECT label, clearance.*)"', QUERIES)
@@ -93,7 +99,7 @@ def test_outcome_columns_have_units_and_answer_the_documented_query(data, toy_da
     field = pq.read_schema(data / "telemetry" / "clips.parquet").field("impact_speed")
     assert field.metadata[b"units"] == b"m s-1" and b"road user" in field.metadata[b"description"]
     (asked,) = re.findall(r'musync sql datasets/demo "(.* FILTER \(collided\).*)"', QUERIES)
-    assert musync.open(str(data)).sql(asked).fetchall()[0] == pytest.approx(("dry", 2, 50.0), abs=1e-4)
+    assert musync.open(str(data)).sql(asked).fetchall()[0] == pytest.approx(("dry", 3, 50.0), abs=1e-4)
     # a dataset without road users has the columns in the views, without values
     assert {row[1:] for row in musync.open(str(toy_dataset.root)).sql(asked).fetchall()} == {(0, None)}
 
