@@ -38,9 +38,9 @@ def asphalt_albedo(
     """
     to_kerb = np.minimum(layout.carriageway_left - d, d - layout.carriageway_right)
     tone, seam = _renewed_stretches(layout, seed, s, d, size)
-    for name, wave, octaves, spread in (("age", 9.0, 2, 0.10), ("mix", 0.9, 3, 0.085)):
+    for name, wave, octaves, spread in (("age", 9.0, 2, 0.14), ("mix", 0.9, 3, 0.11)):
         tone += spread * fractal_noise(named_generator(seed, f"asphalt {name}"), s, d, wave, octaves)
-    tone += 0.10 * fractal_noise(named_generator(seed, "asphalt streaks"), s / _STREAK, d, 0.4, 3)
+    tone += 0.14 * fractal_noise(named_generator(seed, "asphalt streaks"), s / _STREAK, d, 0.4, 3)
     tone += 0.17 * grain[:, 0] * np.minimum(1.0, np.sqrt(0.05 / size))
     tone += _worn_lanes(layout, seed, s, d)
     shade = np.exp(tone)
@@ -55,10 +55,16 @@ def asphalt_albedo(
     return np.minimum(_add_leaves(layout, seed, to_kerb, albedo), 0.5)
 
 
-def paint_albedo(seed: int, s: Floats, d: Floats, grain: Floats) -> Floats:
+def paint_albedo(layout: StreetLayout, seed: int, s: Floats, d: Floats, grain: Floats) -> Floats:
     """Return the reflectance of worn road paint, float64 [N, 3] [1]; parameters as `asphalt_albedo`."""
+    parts_traffic = np.abs(d - layout.lane_width / 2) < layout.marking_width
+    crosses = layout.has_crossing & (
+        np.abs(s - layout.crossing_station - layout.crossing_length / 2) < layout.crossing_length / 2
+    )
+    yellow = ~crosses & parts_traffic & (named_generator(seed, "paint").random() < layout.yellow_share)
     wear = 0.10 * fractal_noise(named_generator(seed, "paint wear"), s, d, 0.7, 3) + 0.05 * grain[:, 0]
-    return palette.PAINT * np.clip(0.95 + np.minimum(wear, 0.06), 0.45, 1.0)[:, None]
+    colour = np.where(yellow[:, None], palette.YELLOW_PAINT, palette.PAINT)
+    return colour * np.clip(0.95 + np.minimum(wear, 0.06), 0.45, 1.0)[:, None]
 
 
 def _renewed_stretches(
@@ -96,13 +102,12 @@ def _worn_lanes(layout: StreetLayout, seed: int, s: Floats, d: Floats) -> Floats
     tone *= np.clip(uneven, 0.2, 2.0)
     rng = named_generator(seed, "skid marks")
     for start in rng.uniform(0, layout.route_length, round(3 * layout.wear_scale)):
-        along, turn = (s - start) / rng.uniform(6, 20), rng.uniform(-0.02, 0.02)
-        lateral = rng.choice([0.0, layout.lane_width]) + rng.uniform(-0.3, 0.3) + turn * (s - start)
-        on = (along > 0) & (along < 1)
+        length, turn = rng.uniform(6, 20), rng.uniform(-0.02, 0.02)
+        lateral = rng.choice([0.0, layout.lane_width]) + rng.uniform(-0.3, 0.3)
+        on = np.flatnonzero((s > start) & (s < start + length))
+        along, across = s[on] - start, d[on] - lateral - turn * (s[on] - start)
         for wheel in (-_WHEEL, _WHEEL):
-            tone -= np.where(
-                on, 0.45 * np.exp(-(((d - lateral - wheel) / 0.11) ** 4)) * np.minimum(1, 3 * along), 0
-            )
+            tone[on] -= 0.45 * np.exp(-(((across - wheel) / 0.11) ** 4)) * np.minimum(1, 3 * along / length)
     return tone
 
 
@@ -138,12 +143,13 @@ def _cracks(layout: StreetLayout, seed: int, s: Floats, d: Floats, size: Floats)
         half = rng.uniform(3, 14) if along else rng.uniform(0.8, 3.6)
         width = rng.choice([0.008, 0.014, 0.035])
         run, offset = (s - middle, d - across) if along else (d - across, s - middle)
+        near = np.flatnonzero((np.abs(run) < half) & (np.abs(offset) < 1.0))
         bend = sum(
-            rng.uniform(0.03, 0.1) * np.sin(run * 2 * np.pi / wave + rng.uniform(0, 6.3))
+            rng.uniform(0.03, 0.1) * np.sin(run[near] * 2 * np.pi / wave + rng.uniform(0, 6.3))
             for wave in (5.0, 1.7, 0.6)
         )
-        thin = np.clip(1 - (np.abs(offset - bend) - width) / size, 0, 0.85)
-        cover = np.maximum(cover, np.where(np.abs(run) < half, thin, 0))
+        thin = np.clip(1 - (np.abs(offset[near] - bend) - width) / size[near], 0, 0.85)
+        cover[near] = np.maximum(cover[near], thin)
     net = np.abs(fractal_noise(named_generator(seed, "fatigue net"), s, d, 0.3, 2))
     tired = fractal_noise(named_generator(seed, "fatigue"), s / 4, d, 1.1, 2) + 0.5 * layout.wear_scale - 2.2
     broken = np.clip(1 - net / 0.16, 0, 0.5) * np.clip(2 * tired, 0, 1) * np.minimum(1, 0.06 / size)

@@ -69,6 +69,7 @@ class StreetLayout:
     tree_scale : size of a tree over that of a young lime of 7 m [1]
     leaf_share, autumn_share : share of the leaves that hang, and of these that have turned [1]
     dead_grass_share : share of the grass that is yellow [1]
+    yellow_share : share of the streets whose centre line is yellow, not white [1]
     bare_share : share of the open ground that lies bare; the grass about it is dry [1]
     shoulder_width : bare strip beside the road or pavement; 0 for none [m]
     asphalt_scale : reflectance of the asphalt over that of an old town street [1]
@@ -137,6 +138,7 @@ class StreetLayout:
     leaf_share: float
     autumn_share: float
     dead_grass_share: float
+    yellow_share: float
     bare_share: float
     shoulder_width: float
     asphalt_scale: float

@@ -76,6 +76,7 @@ POST_YELLOW = _linear_light("#d9a514")[0]
 BIN_GREEN = _linear_light("#2f4b3c")[0]
 ASPHALT = np.array([0.112, 0.108, 0.103])
 PAINT = np.array([0.50, 0.50, 0.475])
+YELLOW_PAINT = np.array([0.46, 0.30, 0.04])
 BITUMEN = np.array([0.035, 0.034, 0.034])
 IRON = np.array([0.075, 0.066, 0.058])
 FALLEN = np.array([[0.20, 0.13, 0.03], [0.13, 0.14, 0.03], [0.22, 0.09, 0.02]])

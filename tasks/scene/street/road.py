@@ -52,7 +52,9 @@ def build_road(layout: StreetLayout, seed: int) -> Surfels:
         np.stack([zero, width, zero], axis=1),
         np.where(marked, SemanticClass.MARKING, SemanticClass.ROAD).astype(np.uint8),
         np.where(
-            marked[:, None], paint_albedo(seed, s, d, grain), asphalt_albedo(layout, seed, s, d, width, grain)
+            marked[:, None],
+            paint_albedo(layout, seed, s, d, grain),
+            asphalt_albedo(layout, seed, s, d, width, grain),
         ),
         cover=_COVER,
     )
