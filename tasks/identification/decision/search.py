@@ -357,9 +357,9 @@ def _refit(evidence: Evidence, fitted: Fit) -> Fit:
 
 def _settle_scales(state: _SearchState) -> _SearchState:
     """Return the same runs with the scales of disturbances and noise that they ask for, every candidate free."""
-    for change in (_scale_disturbances, _scale_noise, _scale_disturbances):
-        state = change(state)
-    return state
+    state = _scale_disturbances(state)
+    noisy = _scale_noise(state)
+    return state if noisy is state else _scale_disturbances(noisy)
 
 
 def _scale_noise(state: _SearchState) -> _SearchState:
