@@ -239,33 +239,6 @@ def integrate_motion(
     )
 
 
-def motion_of_telemetry(pitch: Floats, station: Floats) -> RecoveredMotion:
-    """Return telemetry as if a pose check had recovered it without error.
-
-    Parameters
-    ----------
-    pitch : float64 [F] nose-down positive [rad]
-    station : float64 [F] [m]
-    """
-    count, zero = len(pitch), np.zeros(len(pitch))
-    way = station - station[0]
-    path = np.stack([way, zero, zero], axis=1)
-    return RecoveredMotion(
-        method="telemetry",
-        T_rig0_rig=np.full((count, 4, 4), np.nan),
-        pitch=pitch - pitch[0],
-        progress=way,
-        lateral=zero,
-        heave=np.full(count, np.nan),
-        normalised_path=path / way[-1] if way[-1] > LEAST_PROGRESS else np.full_like(path, np.nan),
-        pitch_std=np.full(count, np.nan),
-        progress_std=np.full(count, np.nan),
-        inliers=np.zeros(count, np.int64),
-        failed=np.zeros(count, bool),
-        failures=(),
-    )
-
-
 def _level_direction(direction: Floats) -> Floats:
     return np.array([direction[0], direction[1], 0.0]) / np.hypot(direction[0], direction[1])
 

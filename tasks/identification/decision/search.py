@@ -25,13 +25,13 @@ from tasks.identification.decision.forms import (
     rewhiten_splines,
 )
 from tasks.identification.decision.odds import (
-    FEWEST,
     Explanation,
     RunGrams,
     keep_members,
     search_explanations,
 )
 from tasks.identification.decision.open_explanations import select_members
+from tasks.identification.decision.random_effects import FEWEST
 from tasks.identification.inference.discrepancy import estimate_run_noise, set_run_noise
 from tasks.identification.inference.evidence import Evidence
 from tasks.identification.inference.fit import Fit, fit_hypotheses

@@ -5,14 +5,13 @@ import time
 from flows.making.generate import generate_dataset
 from flows.store.layout import Layout
 from studies.crashes.commands import kill_commands
-from studies.crashes.disturbances import write_without_right
 from studies.crashes.kills import files_of, half_clips
 from studies.crashes.processes import start_run
 
 
 def test_a_killed_run_resumes_to_the_same_bytes_and_commits_no_half_clip(toy_dataset, tmp_path):
     grid, layout = toy_dataset.root.parent / "grid.yaml", Layout(tmp_path / "data")
-    run = start_run(grid, layout.root)
+    run = start_run(grid, layout.root, None, "--workers", "1")
     while run.poll() is None and not list(layout.staging.glob("*.json")):
         time.sleep(0.01)
     run.kill()
@@ -29,8 +28,3 @@ def test_a_command_that_is_killed_before_any_change_of_the_disk_ends_the_second_
     found = kill_commands(tmp_path, ("sign", "export --to croissant"))
     assert [row["first"] for row in found.values()] == [None, None]
     assert all(row["equal"] == row["kills"] > 9 for row in found.values())
-
-
-def test_a_folder_that_may_not_be_written_is_told_in_one_sentence(toy_dataset, tmp_path):
-    found = write_without_right(toy_dataset.root.parent / "grid.yaml", tmp_path / "closed")
-    assert found["right"], found["said"]

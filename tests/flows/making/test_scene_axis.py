@@ -15,7 +15,7 @@ from flows.making.generate import generate_dataset
 from flows.making.plan import make_plan, read_plan
 from flows.reading.report import make_report
 from flows.store.layout import Layout
-from studies.lineage.trace import trace_lineage
+from studies.lineage import trace
 from studies.physics_judge.audit_physics import audit_physics, clip_columns, clip_facts
 from tasks.errors import InputError
 from tasks.scene.route import route_from_positions
@@ -93,12 +93,13 @@ def test_another_scene_changes_no_id_of_the_clips_of_the_others(folder, made):
     assert {clip.label: clip.clip_id for clip in alone.clips}.items() <= ids.items()
 
 
-def test_the_dataset_is_audited_explained_traced_and_shown(made, tmp_path):
+def test_the_dataset_is_audited_explained_traced_and_shown(made, tmp_path, monkeypatch):
     result = audit_dataset(str(made.root), share=0.5, seed=1, runner="threads", workers=1)
     assert result["verified"], result["contradictions"] + result["not_remade"]
     assert audit_physics(str(made.root))["verified"]
     assert explain_frame(str(made.root), "slope/dry", 5)["steps"]
-    lineage = trace_lineage(str(made.root), "slope/dry")
+    monkeypatch.setattr(trace, "move_lines", lambda *given: [])  # which takes seconds, and has its own tests
+    lineage = trace.trace_lineage(str(made.root), "slope/dry")
     assert lineage["follows"] and lineage["scene"]["name"] == "slope"
     make_report(str(made.root), out=str(tmp_path / "report"))
     page = "".join(path.read_text() for path in (tmp_path / "report").glob("*.html"))

@@ -3,8 +3,6 @@
 import base64
 import copy
 import re
-import subprocess
-import sys
 from dataclasses import replace
 
 import cv2
@@ -156,22 +154,3 @@ def test_a_dataset_without_readable_pictures_still_shows_its_figures(data):
     bare = with_manifest(data, grid=data.manifest["grid"] | {"pictures": False})
     for card in (bare._repr_html_(), bare["dry/flat"]._repr_html_()):
         assert "<img" not in card and "was made without frames" in card and ">dry" in card
-
-
-def test_importing_musync_brings_no_library_that_a_question_does_not_need():
-    heavy = (
-        "torch",
-        "prefect",
-        "dask",
-        "numba",
-        "pandas",
-        "scipy",
-        "zarr",
-        "plotly",
-        "cv2",
-        "jinja2",
-        "matplotlib",
-    )
-    code = f"import sys, musync; print(set({heavy!r}) & sys.modules.keys())"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "set()"

@@ -184,15 +184,32 @@ def test_a_missing_table_is_told_with_what_to_do(toy_dataset, tmp_path):
         query_dataset(str(tmp_path / "copy"), "SELECT 1")
 
 
-def test_a_question_needs_neither_torch_nor_what_makes_clips(toy_dataset):
+def test_a_question_needs_no_library_that_it_does_not_use_and_no_progress_bar_stands_among_its_answers(
+    toy_dataset,
+):
+    """Of a program without a file, which may show such a bar."""
+    seldom = {
+        "torch",
+        "numba",
+        "zarr",
+        "scipy",
+        "flows.making.clip",
+        "prefect",
+        "dask",
+        "plotly",
+        "cv2",
+        "matplotlib",
+    }
     code = (
-        "import sys, musync; musync.open(sys.argv[1]).sql('SELECT count(*) FROM ticks').fetchall();"
-        "print({'torch', 'numba', 'zarr', 'scipy', 'flows.making.clip'} & sys.modules.keys())"
+        f"import sys, musync; print(({seldom!r} | {{'pandas', 'jinja2'}}) & sys.modules.keys());"
+        "asked = \"SELECT count(*), current_setting('enable_progress_bar') FROM ticks\";"
+        "print(musync.open(sys.argv[1]).sql(asked).fetchall());"
+        f"print({seldom!r} & sys.modules.keys())"
     )
     answer = subprocess.run(
         [sys.executable, "-c", code, toy_dataset.root], capture_output=True, text=True, check=True
     )
-    assert answer.stdout.strip() == "set()"
+    assert answer.stdout.splitlines() == ["set()", "[(4004, False)]", "set()"]
 
 
 def test_an_unknown_table_names_those_that_exist(data):

@@ -180,14 +180,8 @@ def test_an_answer_too_large_to_return_is_refused(toy_dataset, monkeypatch):
         query_dataset(str(toy_dataset.root), "SELECT clip_id, label, weather FROM clips")
 
 
-@pytest.mark.parametrize(
-    "query",
-    [
-        "WITH RECURSIVE t AS (SELECT 1 UNION ALL SELECT 1 FROM t) SELECT count(*) FROM t",
-        "SELECT sum(a.range * b.range) FROM range(1000000000) a, range(1000000000) b",
-    ],
-)
-def test_a_query_without_end_is_ended_by_ctrl_c(toy_dataset, query):
+def test_a_query_without_end_is_ended_by_ctrl_c(toy_dataset):
+    query = "SELECT sum(a.range * b.range) FROM range(1000000000) a, range(1000000000) b"
     code = (
         "import signal, sys; from flows.reading import query\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a shell's background job ignores it
@@ -221,10 +215,3 @@ def test_two_threads_read_one_open_file_each_at_its_own_place(tmp_path):
     other.join()
     assert file.read(2) == bytes([10, 11]) and file.tell() == 12
     assert file.seek(-1, os.SEEK_END) == 99 and file.read() == bytes([99])
-
-
-def test_no_progress_bar_stands_among_the_answers_of_a_program_without_a_file(toy_dataset):
-    ask = "SELECT current_setting('enable_progress_bar')"
-    code = f"import musync; print(musync.open({str(toy_dataset.root)!r}).sql({ask!r}).fetchall())"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=SOURCE_ROOT)
-    assert done.stdout == "[(False,)]\n", done.stderr

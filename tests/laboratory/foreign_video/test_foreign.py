@@ -33,7 +33,7 @@ from tests.laboratory.foreign_video.test_trajectories import tum_lines
 
 @pytest.fixture(scope="module")
 def street() -> Clip:
-    return drive_clip(frames=24, frame_rate=16.0, hump_at=0.2)
+    return drive_clip(frames=24, frame_rate=16.0, hump_at=0.2, width=360, height=240, focal=300.0)
 
 
 @pytest.fixture(scope="module", autouse=True)
