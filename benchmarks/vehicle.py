@@ -14,11 +14,11 @@ from catalogs.entries import load
 from catalogs.studies import Condition
 from studies.paper.stop_curves import sensitivity_study
 from studies.paper.vehicle_modes import simulate_condition
+from studies.peers import reference
 from tasks.campaign.campaign import CHANNELS, Run
 from tasks.identification.inference.forward import prepare_run, simulate_run
 from tasks.surface.road_profile import FLAT_ROAD
 from tasks.surface.state import SurfaceParameters
-from tasks.vehicle import reference
 from tasks.vehicle.brake import BrakeCommand
 from tasks.vehicle.effects.table import build_parameter_vector
 from tasks.vehicle.paper.wheels import build_wheels, simulate_stop

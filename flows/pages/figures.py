@@ -206,5 +206,7 @@ def _plain(values: Values | None, digits: int | None) -> Any:
     """Return numbers with some digits; JSON has no infinity."""
     if values is None or digits is None:
         return values
-    # numbers of Python: those of NumPy take three times as long to write
-    return [float(f"{x:.{digits}g}") if isfinite(x) else None for x in np.asarray(values, float).tolist()]
+    # numbers of Python, written in one go: those of NumPy take three times as long, and one by one they take twice
+    known = np.asarray(values, float).tolist()
+    rounded = map(float, (f"%.{digits}g " * len(known) % tuple(known)).split())
+    return [x if isfinite(x) else None for x in rounded]

@@ -28,8 +28,8 @@ GRID, WEIGHTS = (Path(__file__).with_name(name) for name in ("pictures.yaml", "n
 CAMERA = str(Path(__file__).parents[1] / "learn_friction" / "streets-camera.yaml")
 OVER_S = 0.5
 """The deceleration that the network learns is the mean over this time from the brake onset on [s]."""
-SEED, EPOCHS = 1, 300
-"""Of the network whose weights are kept; passes over its few pictures [1]."""
+SEED = 1
+"""Of the network whose weights are kept [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,7 +73,7 @@ def make_samples(place: str) -> Samples:
     """
     if not Path(place, "manifest.json").is_file():
         generate_dataset(str(GRID), place, pictures="later", runner="threads")
-    return read_samples(musync.open(place), over_s=OVER_S, most=1)
+    return read_samples(musync.open(place), over_s=OVER_S)
 
 
 def format_errors(test: Samples, answers: list[NDArray[np.float64]]) -> str:
@@ -94,7 +94,7 @@ def run_study() -> None:
     asked = parser.parse_args()
     torch.set_num_threads(1)
     train, test = split_samples(make_samples(asked.dataset))
-    networks = [train_network(train, seed=SEED + place, epochs=EPOCHS) for place in range(asked.seeds)]
+    networks = [train_network(train, seed=SEED + place) for place in range(asked.seeds)]
     pictures = test.pictures.permute(0, 2, 3, 1).numpy()
     print(format_errors(test, [network.estimate_friction(pictures) for network in networks]))
     networks[0].write(WEIGHTS)

@@ -18,7 +18,7 @@ from studies.evaluation.metrics.video_motion import (
 from studies.evaluation.rows import Scored, figure_row, find_control, windowed_rows
 from studies.evaluation.standards import Floats, MeantMotion, Standard, opening_of, require_whole_way
 from tasks.eval.body_agreement import rms
-from tasks.eval.poses.motion import RecoveredMotion, motion_of_telemetry
+from tasks.eval.poses.motion import LEAST_PROGRESS, RecoveredMotion
 
 EventWindow = Literal["contact", "paper"]
 """When the event window opens: as the front axle meets the feature, or 2.2 s into the clip, as the paper's does."""
@@ -145,6 +145,33 @@ def motion_of(clip: JudgedClip, method: str) -> RecoveredMotion | None:
     if method == TELEMETRY:
         return motion_of_telemetry(clip.frames["pitch"], clip.frames["station"])
     return clip.motions.get(method)
+
+
+def motion_of_telemetry(pitch: Floats, station: Floats) -> RecoveredMotion:
+    """Return telemetry as if a pose check had recovered it without error.
+
+    Parameters
+    ----------
+    pitch : float64 [F] nose-down positive [rad]
+    station : float64 [F] [m]
+    """
+    count, zero = len(pitch), np.zeros(len(pitch))
+    way = station - station[0]
+    path = np.stack([way, zero, zero], axis=1)
+    return RecoveredMotion(
+        method="telemetry",
+        T_rig0_rig=np.full((count, 4, 4), np.nan),
+        pitch=pitch - pitch[0],
+        progress=way,
+        lateral=zero,
+        heave=np.full(count, np.nan),
+        normalised_path=path / way[-1] if way[-1] > LEAST_PROGRESS else np.full_like(path, np.nan),
+        pitch_std=np.full(count, np.nan),
+        progress_std=np.full(count, np.nan),
+        inliers=np.zeros(count, np.int64),
+        failed=np.zeros(count, bool),
+        failures=(),
+    )
 
 
 def _list_judged(clips: Sequence[JudgedClip], standard: Standard) -> Iterator[Judged]:

@@ -10,14 +10,15 @@ from torch import nn
 
 from musync import SeededOrder
 from studies.learn_friction.samples import Samples
+from studies.picture_variation import crop_pictures, draw_uniform, vary_colours, vary_tones
 from tasks.conventions import GRAVITY
 
 EPOCHS, BATCH, RATE, DECAY = 60, 32, 2e-3, 1e-3
 """Passes over the samples [1], samples in a step [1], largest learning rate [1], weight decay [1]."""
 SEEN = (64, 96)
 """Height and width of the pictures that the network sees [px]."""
-GAIN, BALANCE = (-0.25, 0.25), (-0.05, 0.05)
-"""Logarithm of the brightness of a training picture, and relative gain of each colour [1]."""
+CROP, GAIN = 0.7, (-0.25, 0.25)
+"""Share of each side of a training picture that is kept at least, and logarithm of its brightness [1]."""
 LEAST_FRICTION = 0.02
 """Of an answer [1]."""
 
@@ -158,10 +159,6 @@ def shrink_pictures(pictures: torch.Tensor) -> torch.Tensor:
 
 
 def vary_pictures(pictures: torch.Tensor, draw: torch.Generator) -> torch.Tensor:
-    """Return pictures [N, 3, *SEEN] of other brightness and white balance, each mirrored or not."""
-
-    def spread(low: float, high: float, channels: int = 1) -> torch.Tensor:
-        return low + (high - low) * torch.rand(len(pictures), channels, 1, 1, generator=draw)
-
-    mirrored = torch.where(spread(0, 1) < 0.5, pictures.flip(-1), pictures)
-    return (mirrored * torch.exp(spread(*GAIN)) * (1 + spread(*BALANCE, 3))).clamp(0, 1)
+    """Return pictures [N, 3, *SEEN] with other crops, colours, brightness, tones and sharpness."""
+    seen = vary_colours(crop_pictures(pictures, CROP, SEEN, draw), draw)
+    return vary_tones(seen * torch.exp(draw_uniform(seen, GAIN, draw)), draw)

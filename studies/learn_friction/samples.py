@@ -113,7 +113,7 @@ def read_brakes(data: musync.Dataset, *, over_s: float = OVER_S) -> dict[str, Br
     return brakes
 
 
-def read_samples(data: musync.Dataset, *, over_s: float = OVER_S, most: int = PICTURES) -> Samples:
+def read_samples(data: musync.Dataset, *, over_s: float = OVER_S) -> Samples:
     """Read the samples of every clip that brakes.
 
     Clips in quarantine are taken too: the pose check wants more pixels than these pictures have, and nothing is
@@ -123,7 +123,6 @@ def read_samples(data: musync.Dataset, *, over_s: float = OVER_S, most: int = PI
     ----------
     data : dataset with frames
     over_s : time over which the deceleration is averaged [s]
-    most : samples of one clip [1]
 
     Raises
     ------
@@ -132,15 +131,15 @@ def read_samples(data: musync.Dataset, *, over_s: float = OVER_S, most: int = PI
     """
     clips = data.pandas("clips").sort_values("index")
     drives = clips.groupby(DRIVE, dropna=False, sort=True).ngroup().to_numpy()
-    windows = data.torch(window=most, stride=1, columns=["speed"], arrays=["rgb"], quarantined=True)
+    windows = data.torch(window=PICTURES, stride=1, columns=["speed"], arrays=["rgb"], quarantined=True)
     rate_hz = data.manifest["grid"]["frame_rate_hz"]
     brakes = read_brakes(data, over_s=over_s)
     rows, pictures = [], []
     for clip, drive in zip(clips.to_dict("records"), drives, strict=True):
         if (brake := brakes.get(clip["label"])) is None:
             continue
-        last = min(int(brake.onset_s * rate_hz), windows.starts[-1] + most - 1)
-        first = max(last - most + 1, 0)
+        last = min(int(brake.onset_s * rate_hz), windows.starts[-1] + PICTURES - 1)
+        first = max(last - PICTURES + 1, 0)
         shown = windows[windows.clips.index(clip["index"]) * len(windows.starts) + first]["rgb"]
         before = shown[: last - first + 1].permute(0, 3, 1, 2)
         pictures.append(before)

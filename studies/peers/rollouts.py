@@ -18,9 +18,9 @@ from scipy.integrate import solve_ivp
 
 from benchmarks.side_by_side import least_cpu_s, make_row, print_rows
 from catalogs.entries import load
+from studies.peers import reference
 from tasks.surface.road_profile import FLAT_ROAD
 from tasks.surface.state import SurfaceState
-from tasks.vehicle import reference
 from tasks.vehicle.brake import BrakeCommand
 from tasks.vehicle.model.chassis import Chassis, Conditions, build_chassis
 from tasks.vehicle.model.ports import compute_ports

@@ -9,16 +9,15 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
+from studies.picture_variation import crop_pictures, draw_uniform, vary_colours, vary_tones
 from studies.real_photos.pictures import CLASSES, Pictures
 
 SEEN = 48
 """Side of the square that the network sees [px]."""
 BATCH, RATE, TUNING_RATE, DECAY, SMOOTHING = 32, 2e-3, 5e-4, 1e-3, 0.05
 """Pictures in a step [1], learning rates [1], weight decay [1], label smoothing [1]."""
-CROP, SATURATION, GAMMA, BALANCE = (0.5, 1.0), (-0.35, 0.5), (-0.35, 0.35), (-0.12, 0.12)
-"""Share of each side that is kept [1], logarithms of saturation and gamma, relative gain of each colour [1]."""
-GREY, HUE, BLUR = 0.2, (-0.5, 0.5), (-1.0, 1.0)
-"""Share of pictures without colour [1], turn of hues [rad], from doubled local contrast to a mean of 3 x 3 [1]."""
+CROP = 0.5
+"""Share of each side of a picture that is kept at least [1]."""
 LEVELS, BLACK, WHITE = (0.03, 0.97), (0.0, 0.28), (0.68, 1.02)
 """Shares of the pixels that lie below black and white, and where these come to lie [1]."""
 
@@ -114,48 +113,19 @@ def shrink_pictures(pictures: torch.Tensor) -> torch.Tensor:
 
 
 def vary_pictures(pictures: torch.Tensor, draw: torch.Generator) -> torch.Tensor:
-    """Return uint8 pictures as other cameras might have taken them of other ground: crop, levels, colours, sharpness.
-
-    No variation knows the class: a dry road stays dry when its picture is darker, grey or taken with a longer lens, and
-    when its verge is brown.
+    """Return uint8 pictures [N, 3, SIDE, SIDE], varied, as the network sees them.
 
     Parameters
     ----------
-    pictures : uint8 [N, 3, SIDE, SIDE]
+    pictures : to be cropped, of other colours, levels, tones and sharpness
     draw : of the variations
     """
-
-    def spread(low: float, high: float, channels: int = 1) -> torch.Tensor:
-        return low + (high - low) * torch.rand(len(pictures), channels, 1, 1, generator=draw)
-
-    seen = _crop_pictures(pictures.float() / 255, spread)
-    grey = seen.mean(dim=1, keepdim=True)
-    coloured = spread(0, 1) > GREY
-    seen = grey + coloured * torch.exp(spread(*SATURATION)) * (_turn_hues(seen, spread(*HUE)) - grey)
-    light = grey[:, :, ::4, ::4].flatten(1)  # enough of the pixels to know how many are darker
+    seen = crop_pictures(pictures.float() / 255, CROP, (SEEN, SEEN), draw)
+    light = seen.mean(dim=1)[:, ::4, ::4].flatten(1)  # enough of the pixels to know how many are darker
+    seen = vary_colours(seen, draw)
     black, white = light.quantile(torch.tensor(LEVELS), dim=1)[..., None, None, None]
-    low, high = spread(*BLACK), spread(*WHITE)
-    seen = low + (seen - black) * (high - low) / (white - black).clamp(min=0.05)
-    seen = seen.clamp(1e-3, 1) ** torch.exp(spread(*GAMMA)) * (1 + spread(*BALANCE, 3))
-    smooth = nn.functional.avg_pool2d(seen, 3, stride=1, padding=1, count_include_pad=False)
-    return (seen + spread(*BLUR) * (smooth - seen)).clamp(0, 1)
-
-
-def _turn_hues(pictures: torch.Tensor, angle: torch.Tensor) -> torch.Tensor:
-    """Turn colours about the grey axis by angles [rad]."""
-    own, across = (1 + 2 * torch.cos(angle)) / 3, torch.sin(angle) / 3**0.5
-    left = (1 - torch.cos(angle)) / 3
-    return own * pictures + (left - across) * pictures.roll(1, 1) + (left + across) * pictures.roll(-1, 1)
-
-
-def _crop_pictures(pictures, spread):  # type: ignore[no-untyped-def]
-    wide, high = (spread(*CROP)[:, 0, 0, 0] for _ in "xy")
-    mirrored = torch.sign(spread(-1, 1)[:, 0, 0, 0])
-    right, down = (spread(-1, 1)[:, 0, 0, 0] * (1 - size) for size in (wide, high))
-    affine = torch.zeros(len(pictures), 2, 3)
-    affine[:, 0, 0], affine[:, 0, 2], affine[:, 1, 1], affine[:, 1, 2] = mirrored * wide, right, high, down
-    grid = nn.functional.affine_grid(affine, [len(pictures), 3, SEEN, SEEN], align_corners=False)
-    return nn.functional.grid_sample(pictures, grid, padding_mode="reflection", align_corners=False)
+    low, high = draw_uniform(seen, BLACK, draw), draw_uniform(seen, WHITE, draw)
+    return vary_tones(low + (seen - black) * (high - low) / (white - black).clamp(min=0.05), draw)
 
 
 def _as_tensor(pictures: Pictures) -> torch.Tensor:

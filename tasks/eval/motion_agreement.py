@@ -13,9 +13,8 @@ from tasks.eval.poses.motion import RecoveredMotion
 Floats = NDArray[np.float64]
 
 TOO_LITTLE = "not judged: the pictures show too little to follow"
-SEES = 0.2
-"""Largest standard uncertainty of a figure, as a share of its limit: errors that steps share are up to four times what
-the covariance says, as fog that stands in the picture shows [1]."""
+COVERAGE = 2.0
+"""Standard uncertainties within which 95 % of Gaussian errors lie [1] (JCGM 100:2008, 6.3.3)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,11 +196,12 @@ def _find_blindness(
     """Return a sentence for each figure that the check sees less well than its limit needs.
 
     There is none where an error exceeds its limit by more than such a sight explains: then the motion is another.
-    Roll and yaw are seen about as well as pitch, the rig's place about as well as progress.
+    Roll and yaw are seen about as well as pitch, the rig's place about as well as progress. As the figures are RMS over
+    the frames, so are their uncertainties.
     """
     seen = ~recovered.failed
-    turn_std = float(np.rad2deg(recovered.pitch_std[seen].max()))
-    way_std = float(recovered.progress_std[seen].max())
+    turn_std = rms(np.rad2deg(recovered.pitch_std[seen]))
+    way_std = rms(recovered.progress_std[seen])
     figures = [
         ("pitch", pitch_rmse, turn_std, thresholds.pitch_rmse_deg, "deg"),
         ("progress", progress_rmse, way_std, thresholds.progress_rmse_m, "m"),
@@ -213,12 +213,13 @@ def _find_blindness(
         (errors.rise_rmse_m, way_std, thresholds.rise_rmse_m),
     ]
     missed = [(error, std, limit) for _, error, std, limit, _ in figures] + rig
-    if any(limit is not None and error > limit + std / SEES for error, std, limit in missed):
+    if any(limit is not None and error > limit + COVERAGE * std for error, std, limit in missed):
         return []
     return ([TOO_LITTLE] if recovered.blind else []) + [
-        f"not judged: {name} is known to {std:.2g} {unit}, and its limit of {limit:.2g} {unit} needs {SEES * limit:.2g}"
+        f"not judged: {name} is known to {std:.2g} {unit}, and its limit of {limit:.2g} {unit} needs"
+        f" {limit / COVERAGE:.2g}"
         for name, _, std, limit, unit in figures
-        if limit is not None and std > SEES * limit
+        if limit is not None and COVERAGE * std > limit
     ]
 
 

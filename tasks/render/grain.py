@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tasks.conventions import SemanticClass
-from tasks.render.pixels import INLINED, LAW, new_picture, run_on_either
+from tasks.render.pixels import INLINED, LAW, find_namespace, run_on_either
 from tasks.render.rasterise.gbuffer import GBuffer
 
 WAVES = np.array([0.008, 0.016, 0.032, 0.064, 0.128])
@@ -32,6 +32,7 @@ DEVIATION = {
 BRIGHTEST = 0.5
 """Linear light from which nothing shows: lying snow is smooth [1]."""
 _TILE = 256
+_LAST = _TILE - 1
 _TEXELS_A_WAVE = 3.0
 _PIXELS_A_WAVE = 2.0
 _WALL_FACING = 0.25
@@ -62,8 +63,7 @@ def add_grain(gbuffer: GBuffer, T_world_camera: NDArray[np.float64], K: NDArray[
     T_world_camera : [4, 4] pose [m]
     K : [3, 3] intrinsics, pixel centres at +0.5 [px]
     """
-    rgb = new_picture(gbuffer.rgb, 3)
-    rgb[...] = gbuffer.rgb
+    rgb = find_namespace(gbuffer.rgb).asarray(gbuffer.rgb, copy=True)
     pose, intrinsics = (np.ascontiguousarray(m, dtype=np.float64) for m in (T_world_camera[:3], K))
     _modulate(rgb, gbuffer.depth, gbuffer.class_id, pose, intrinsics, _NOISE)
     return replace(gbuffer, rgb=rgb)
@@ -125,8 +125,8 @@ def _blur_along(noise, u, v, along_u, along_v, samples, texels):  # type: ignore
         a, b = (u + t * along_u) * texels, (v + t * along_v) * texels
         r, c = floor(a), floor(b)
         ta, tb = a - r, b - c
-        r0, c0 = int(r) % _TILE, int(c) % _TILE
-        r1, c1 = (r0 + 1) % _TILE, (c0 + 1) % _TILE
+        r0, c0 = int(r) & _LAST, int(c) & _LAST
+        r1, c1 = (r0 + 1) & _LAST, (c0 + 1) & _LAST
         weight = 1 - abs(t)
         weights += weight
         total += weight * (

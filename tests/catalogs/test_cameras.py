@@ -8,7 +8,7 @@ from catalogs.entries import find_entry, load
 from tasks.render.camera import measure_mount
 
 
-@pytest.mark.parametrize("name", ["dashcam-480x320", "dashcam-1280x720"])
+@pytest.mark.parametrize("name", ["dashcam-480x320", "dashcam-1280x720", "dashcam-1920x1280"])
 def test_cameras_look_forward_from_above_the_road(name):
     camera = load("camera", name)
     np.testing.assert_allclose(camera.T_rig_camera[:3, :3] @ [0, 0, 1], [1, 0, 0], atol=1e-12)

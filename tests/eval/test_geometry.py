@@ -1,5 +1,7 @@
 """Small rigid-body, point and two-view geometry, against other implementations."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -20,6 +22,7 @@ from tasks.eval.poses.epipolar import (
     step_length,
     triangulate_points,
 )
+from tasks.eval.poses.motion import Placement, integrate_motion
 from tasks.eval.poses.rigid import (
     adjoint_matrix,
     advance_pose,
@@ -175,6 +178,28 @@ def test_an_error_of_depth_does_less_harm_where_it_is_expected() -> None:
             off = step.T_earlier_later @ MOTION
             turns.append([off[2, 1], off[0, 2], off[1, 0]])
     assert np.std(harm[0.02]) < 0.7 * np.std(harm[0.0])
+
+
+@pytest.mark.parametrize(("shift_px", "depth_error"), [(0.3, 0.0), (0.0, 0.01)])
+def test_errors_that_stay_in_a_region_for_many_steps_are_in_the_uncertainty(
+    shift_px: float, depth_error: float
+) -> None:
+    points, rng = cloud(), np.random.default_rng(13)
+    _, exact = seen_by_both(points)
+    column, row = ((exact - exact.min(axis=0)) // 50).astype(int).T
+    region, regions = 10 * row + column, 10 * (row.max() + 1)
+    limits = replace(LIMITS, depth_error=depth_error, regions=regions)
+    errors, stated = [], []
+    for _ in range(60):
+        pixels = exact + rng.normal(0, shift_px, (regions, 2))[region] + rng.normal(0, 0.03, exact.shape)
+        deep = points * (1 + rng.normal(0, depth_error, regions)[region])[:, None]
+        for seen, found in ((deep, errors), (points, stated)):
+            step = solve_pnp(seen, pixels, np.eye(4), K, limits, region)
+            chain = [Placement(anchor=k, step=step) for k in range(6)]
+            found.append(integrate_motion("drawn", chain, make_mount()))
+    for name in ("pitch", "progress"):
+        spread = np.std([getattr(motion, name)[-1] for motion in errors])
+        assert np.median([getattr(m, f"{name}_std")[-1] for m in stated]) == pytest.approx(spread, rel=0.35)
 
 
 def test_turn_direction_depth_and_length_come_out_of_two_views_exactly() -> None:

@@ -89,19 +89,6 @@ def test_a_gap_beyond_the_limit_is_never_bridged() -> None:
     assert calls == list(range(1, MAX_GAP + 1))
 
 
-def test_uncertainty_grows_with_the_root_of_the_number_of_equal_steps() -> None:
-    poses = rig_poses(np.arange(17.0), np.zeros(17), np.zeros(17))
-    level_camera = np.eye(4)
-    level_camera[:3, :3] = make_mount(tilt=0.0)[:3, :3]
-    seen = integrate_motion(
-        "test",
-        exact_steps(poses @ level_camera @ invert_pose(make_mount()), list(range(16)), 1e-6),
-        level_camera,
-    )
-    np.testing.assert_allclose(seen.pitch_std, 1e-3 * np.sqrt(np.arange(17)), rtol=1e-9)
-    np.testing.assert_allclose(seen.progress_std, 1e-3 * np.sqrt(np.arange(17)), rtol=1e-9)
-
-
 def test_propagated_uncertainty_matches_a_thousand_perturbed_chains() -> None:
     from tasks.eval.poses.twists import pose_from_twist
 

@@ -12,10 +12,10 @@ from tasks.identification.decision.comparison import compare_explanations, tempe
 from tasks.identification.decision.odds import (
     RunGrams,
     can_stand_for,
-    estimate_spread,
     search_explanations,
     weigh_explanation,
 )
+from tasks.identification.decision.random_effects import estimate_spread
 from tests.identification.explained import effect_of, form_of, grams_of
 
 LAG, DRAG = effect_of("brake_lag", 0, log_prior=-1.5), effect_of("aerodynamic_drag", 1, log_prior=-2.5)

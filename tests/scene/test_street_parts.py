@@ -8,7 +8,9 @@ import pytest
 from catalogs.scenes.street import load_street_layout
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
+from tasks.scene.street.asphalt import asphalt_albedo
 from tasks.scene.street.bend import integrate_course, lay_route
+from tasks.scene.street.ground import bare_share
 from tasks.scene.street.layout import nearest_depth
 from tasks.scene.street.light import Casters, share_light, sky_share, sun_direction
 from tasks.scene.street.noise import fractal_noise, named_generator
@@ -28,10 +30,8 @@ def white_floor() -> Surfels:
 
 
 def test_course_has_unit_speed_and_the_bend_its_radius() -> None:
-    poses, station = (
-        lay_route(LAYOUT, integrate_course(LAYOUT)).T_world_rig,
-        lay_route(LAYOUT, integrate_course(LAYOUT)).station,
-    )
+    route = lay_route(LAYOUT, integrate_course(LAYOUT))
+    poses, station = route.T_world_rig, route.station
     step = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)
     assert np.allclose(step, np.diff(station), rtol=1e-6)
     assert np.allclose(poses[station <= 40, :3, :3], np.eye(3), atol=1e-12)
@@ -77,12 +77,24 @@ def test_cells_are_finer_beside_an_edge() -> None:
     assert width.max() > 2 * width.min()
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_asphalt_is_as_uneven_in_brightness_as_on_photographs_and_as_dark_as_measured(seed: int) -> None:
+    s, d = (axis.ravel() for axis in np.meshgrid(np.arange(0, 150, 0.25), np.arange(-1.6, 5.2, 0.25)))
+    albedo = asphalt_albedo(LAYOUT, seed, s, d, np.full(len(s), 0.25), np.zeros((len(s), 2)))
+    assert 0.2 < np.log(albedo).std() < 0.45
+    assert 0.04 < np.median(albedo) < 0.16  # LBNL Heat Island Group, Pavement Albedo
+
+
+@pytest.mark.parametrize(("share", "low", "high"), [(0.0, 0.0, 0.0), (0.5, 0.4, 0.6), (1.0, 0.9, 1.0)])
+def test_ground_lies_bare_by_its_share(share: float, low: float, high: float) -> None:
+    s, away = (axis.ravel() for axis in np.meshgrid(np.arange(0, 300, 3.0), np.arange(3, 60, 3.0)))
+    assert low <= bare_share(replace(LAYOUT, bare_share=share), 1, s, away).mean() <= high
+
+
 def test_box_and_tube_face_outward() -> None:
     block = build_box([0, 0, 0], [1, 2, 3], 0.5, SemanticClass.OTHER, [0.5, 0.5, 0.5])
     assert (np.einsum("ij,ij->i", block.axes[:, 2], block.centre - [0.5, 1.0, 1.5]) > 0).all()
-    pole = build_tube(
-        np.linspace(0, 1, 5)[:, None] * [0, 0, 3.0], 0.1, 8, SemanticClass.POLE, [0.5, 0.5, 0.5]
-    )
+    pole = build_tube(np.linspace(0, 3, 5)[:, None] * [0, 0, 1], 0.1, 8, SemanticClass.POLE, [0.5, 0.5, 0.5])
     outward = pole.centre * [1, 1, 0]
     assert (np.einsum("ij,ij->i", pole.axes[:, 2], outward) > 0).all()
 
@@ -154,9 +166,7 @@ def test_crossing_beyond_the_route_is_refused() -> None:
 def test_nearest_depth_is_where_the_point_enters_the_picture() -> None:
     # half the picture is 0.6 wide and 0.4 high at unit depth; the eye is 1.4 m above the road
     assert nearest_depth(LAYOUT, 50.0, 0.0) == pytest.approx(3.5)
-    assert nearest_depth(LAYOUT, 50.0, 0.0, 1.4) == pytest.approx(3.5), (
-        "no cell is smaller than those of the road"
-    )
+    assert nearest_depth(LAYOUT, 50.0, 0.0, 1.4) == pytest.approx(3.5)  # no cell is smaller than the road's
     assert nearest_depth(LAYOUT, 50.0, -6.0) == pytest.approx(10.0)
     assert nearest_depth(LAYOUT, 50.0, 0.0, 9.4) == pytest.approx(20.0)
     assert nearest_depth(LAYOUT, LAYOUT.route_length + 40, 1.0) == pytest.approx(40.0)
@@ -196,10 +206,8 @@ def test_nothing_that_stands_is_on_the_lanes(seed: int) -> None:
         assert tree.lateral > LAYOUT.carriageway_left or tree.lateral < LAYOUT.carriageway_right
     for car in plan.cars:
         assert car.lateral - 1.0 > 1.5 * LAYOUT.lane_width or car.lateral + 1.0 < -LAYOUT.lane_width / 2
-        reach = (car.station - 2.5, car.station + 2.5)
-        assert (
-            reach[1] < LAYOUT.crossing_station or reach[0] > LAYOUT.crossing_station + LAYOUT.crossing_length
-        )
+        beyond = car.station - LAYOUT.crossing_station
+        assert not -2.5 <= beyond <= LAYOUT.crossing_length + 2.5
     for side in (-1, 1):
         on_side = sorted(car.station for car in plan.cars if car.lateral * side > 0)
         assert np.diff(on_side).min() > 5.0

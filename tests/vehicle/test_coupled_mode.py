@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from studies.peers import reference
 from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
-from tasks.vehicle import reference
 from tasks.vehicle.model.chassis import Conditions, build_chassis
 from tasks.vehicle.model.ports import compute_ports
 from tasks.vehicle.model.states import AxleMemory, Instant, Memory, Motion

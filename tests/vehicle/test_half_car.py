@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from studies.peers import reference
 from tasks.surface.road_profile import RoadHazard, road_elevation
-from tasks.vehicle import reference
 from tasks.vehicle.half_car import build_half_car, compute_forced_rates, integrate_half_car
 
 STEP = 5e-4

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from catalogs.entries import load
+from studies.peers import reference
 from tasks.surface.road_profile import FLAT_ROAD, RoadHazard
 from tasks.surface.weather import Weather, surface_state
-from tasks.vehicle import reference
 from tasks.vehicle.paper import paper_mode
 from tasks.vehicle.paper.low_speed import BrakedStop
 from tasks.vehicle.paper.paper_mode import (

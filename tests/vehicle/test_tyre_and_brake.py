@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from studies.peers import reference
 from tasks.errors import InputError
-from tasks.vehicle import reference
 from tasks.vehicle.brake import (
     BrakeCommand,
     compute_abs_command,

@@ -34,8 +34,8 @@ class RecoveredMotion:
     progress : float64 [F] distance along the heading [m]
     normalised_path : float64 [F, 3] progress, lateral and heave over the clip's whole progress [1];
         NaN where the car stood
-    pitch_std : float64 [F] standard uncertainty of `pitch`, from residuals and Jacobian, with the errors of
-        different steps taken as independent; a bias that they share is not in it [rad]
+    pitch_std : float64 [F] standard uncertainty of `pitch`, from what each region of the picture adds to it over all
+        steps; a bias that all regions share is not in it. Without regions, the steps' errors count as independent [rad]
     progress_std : float64 [F] the same of `progress` [m]
     inliers : int64 [F] points or pixels that carried the estimate; 0 in frame 0
     failed : bool [F]
@@ -77,10 +77,13 @@ class FrameStep:
     Parameters
     ----------
     T_earlier_later : float64 [4, 4] pose of the later camera in the earlier one [m]
-    covariance : float64 [6, 6] of the left twist (translation, rotation) that errors add [m, rad]
+    covariance : float64 [6, 6] of the left twist (translation, rotation) that errors add, if they are independent; it
+        weighs the step against others [m, rad]
     inliers : points or pixels that carried the estimate
     failure : why there is no estimate; empty where there is one
     blind : there is none because the pictures show too little to follow
+    region_twists : float64 [R, 6] the twist that the errors of each region of the picture add; None where errors are
+        not known by region [m, rad]
     """
 
     T_earlier_later: Floats
@@ -88,6 +91,7 @@ class FrameStep:
     inliers: int
     failure: str = ""
     blind: bool = False
+    region_twists: Floats | None = None
 
 
 def failed_step(reason: str, inliers: int, *, blind: bool = False) -> FrameStep:
@@ -153,6 +157,10 @@ def integrate_motion(
     Without `route_rotations` the route is taken as level: progress is the distance along the recovered
     heading, lateral and heave are coordinates in frame 0. With them, all four are resolved along the route.
 
+    What is wrong in one region of the picture lasts, as a verge or a front stays there for many steps. So errors are
+    summed by region over the steps, and the regions, not the steps, count as independent (Liang and Zeger 1986,
+    DOI 10.1093/biomet/73.1.13).
+
     Parameters
     ----------
     method : name of the pose check
@@ -166,6 +174,7 @@ def integrate_motion(
     T[0] = np.eye(4)
     cov = np.zeros((count, 6, 6))
     progress_var = np.zeros(count)
+    by_region, way_by_region = [np.zeros((1, 6))] * count, [np.zeros(1)] * count
     path = np.full((count, 3), np.nan)
     path[0] = 0.0
     route = None if route_rotations is None else np.swapaxes(route_rotations[:1], -1, -2) @ route_rotations
@@ -177,16 +186,21 @@ def integrate_motion(
             failures.append(f"{method}: frame {k} has no pose: {step.failure}.")
         Ad = adjoint_matrix(T_rig_camera)
         step_pose = T_rig_camera @ step.T_earlier_later @ invert_pose(T_rig_camera)
-        step_cov = Ad @ step.covariance @ Ad.T
+        if step.region_twists is None:
+            step_cov, twists = Ad @ step.covariance @ Ad.T, np.zeros((1, 6))
+        else:
+            step_cov, twists = np.zeros((6, 6)), step.region_twists @ Ad.T
         T[k] = T[a] @ step_pose
         carry = adjoint_matrix(T[a])
         cov[k] = cov[a] + carry @ step_cov @ carry.T
+        by_region[k] = by_region[a] + twists @ carry.T
 
         frame_axes = np.eye(3) if route is None else route[k]
         x, y, z = frame_axes.T @ T[k, :3, 0]
         pitch[k] = np.arctan2(-z, np.hypot(x, y))
         by_rotation = frame_axes @ np.array([-y, x, 0.0])
         pitch_var[k] = by_rotation @ cov[k, 3:, 3:] @ by_rotation
+        pitch_var[k] += np.square(by_region[k][:, 3:] @ by_rotation).sum()
 
         moved = T[k, :3, 3] - T[a, :3, 3]
         if route is None:
@@ -199,9 +213,10 @@ def integrate_motion(
         _, ty, tz = step_pose[:3, 3]
         by_twist = np.array([1.0, 0.0, 0.0, 0.0, tz, -ty])
         progress_var[k] = progress_var[a] + by_twist @ step_cov @ by_twist
+        way_by_region[k] = way_by_region[a] + twists @ by_twist
 
     failed = np.isnan(pitch)
-    progress_std = np.sqrt(progress_var)
+    progress_std = np.sqrt(progress_var + [np.square(way).sum() for way in way_by_region])
     last = np.flatnonzero(~failed)[-1]
     moving = abs(path[last, 0]) > max(5 * progress_std[last], LEAST_PROGRESS)
     lengths = path if metric else np.full_like(path, np.nan)
@@ -221,33 +236,6 @@ def integrate_motion(
         failed=failed,
         failures=tuple(failures),
         blind=bool(failures) and all(placed.step.blind for placed in placements if placed.step.failure),
-    )
-
-
-def motion_of_telemetry(pitch: Floats, station: Floats) -> RecoveredMotion:
-    """Return telemetry as if a pose check had recovered it without error.
-
-    Parameters
-    ----------
-    pitch : float64 [F] nose-down positive [rad]
-    station : float64 [F] [m]
-    """
-    count, zero = len(pitch), np.zeros(len(pitch))
-    way = station - station[0]
-    path = np.stack([way, zero, zero], axis=1)
-    return RecoveredMotion(
-        method="telemetry",
-        T_rig0_rig=np.full((count, 4, 4), np.nan),
-        pitch=pitch - pitch[0],
-        progress=way,
-        lateral=zero,
-        heave=np.full(count, np.nan),
-        normalised_path=path / way[-1] if way[-1] > LEAST_PROGRESS else np.full_like(path, np.nan),
-        pitch_std=np.full(count, np.nan),
-        progress_std=np.full(count, np.nan),
-        inliers=np.zeros(count, np.int64),
-        failed=np.zeros(count, bool),
-        failures=(),
     )
 
 

@@ -278,9 +278,8 @@ def _align_pictures(
     if correlation < settings.min_correlation:
         return _failed_attempt(f"the aligned pictures correlate by {correlation:.2f} only", agreeing)
     # errors are correlated within a block, so the blocks count as independent, not the pixels
-    spread = np.linalg.inv(H) @ (gradient.T @ gradient) @ np.linalg.inv(H)
-    carry = adjoint_matrix(T)
-    step = FrameStep(T_earlier_later=T, covariance=carry @ spread @ carry.T, inliers=agreeing)
+    twists = gradient @ np.linalg.inv(H) @ adjoint_matrix(T).T
+    step = FrameStep(T_earlier_later=T, covariance=twists.T @ twists, inliers=agreeing, region_twists=twists)
     return Attempt(step=step, quality=correlation)
 
 

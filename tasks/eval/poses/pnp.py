@@ -62,6 +62,8 @@ class PnpSettings:
     noise_floor, noise_ceiling : smallest assumed tracking error, and largest error of a valid track [px]
     least_contrast : standard deviation of a patch that noise alone may have, 8-bit [1]
     depth_error : relative standard error of the rendered depth [1]
+    regions_across : regions over the picture's width whose errors count as independent: wider than a hedge is high, and
+        enough that their spread is known [1]
     link_span : frames that the longer steps beside the chain span [1]
     link_stride : frames between their starts [1]
     """
@@ -85,6 +87,7 @@ class PnpSettings:
     noise_ceiling: float = 2.0
     least_contrast: float = 2.0
     depth_error: float = 0.01
+    regions_across: int = 10
     link_span: int = 4
     link_stride: int = 2
 
@@ -304,15 +307,24 @@ def _solve_tracks(
             f"{count} points tracked, at least {settings.min_points} are needed", count, blind=True
         )
     points = viewing_rays(origin[tracked], K) / q[tracked, None]
+    height, width = frame.grey.shape
+    side = -(-width // settings.regions_across)
     limits = PnpLimits(
         min_inliers=max(settings.min_points, int(settings.min_inlier_share * count)),
         noise_floor=settings.noise_floor,
         noise_ceiling=settings.noise_ceiling,
-        overlap=max(settings.window / cell_size(frame.grey.shape[1], settings.cells_across), 1.0) ** 2,
+        overlap=max(settings.window / cell_size(width, settings.cells_across), 1.0) ** 2,
         depth_error=settings.depth_error,
+        regions=settings.regions_across * -(-height // side),
     )
+    column, row = corners[tracked].T // side
     step = solve_pnp(
-        points, tracks.places[tracked].astype(np.float64), invert_pose(view.T_anchor_frame), K, limits
+        points,
+        tracks.places[tracked].astype(np.float64),
+        invert_pose(view.T_anchor_frame),
+        K,
+        limits,
+        row * settings.regions_across + column,
     )
     torn = bool(step.failure) and count < settings.followed * len(corners)
     return replace(step, blind=True) if torn else step

@@ -4,8 +4,10 @@ from math import sqrt
 
 import numpy as np
 
+from tasks.campaign.campaign import FILE_NUMBERS
 from tasks.identification.decision.candidates import Candidate
-from tasks.identification.decision.odds import FEWEST, INFORMED, Explanation, RunGrams
+from tasks.identification.decision.odds import Explanation, RunGrams
+from tasks.identification.decision.random_effects import FEWEST, INFORMED
 
 LEAST_SIZE = 0.5
 """Square of the smallest size that matters, over its variance by one run, from which the run tells a number [1]."""
@@ -47,7 +49,7 @@ def measure_disagreement(grams: RunGrams, explanation: Explanation) -> float:
     grams : of the runs
     explanation : whose residual is taken
     """
-    numbers = grams.columns.base[: -len(explanation.session)]
+    numbers = grams.columns.base[: -len(FILE_NUMBERS)]
     size = np.einsum("rii->ri", grams.information)[:, numbers]
     used = np.flatnonzero(explanation.everything != 0.0)
     moved = (explanation.everything - grams.centre)[used]

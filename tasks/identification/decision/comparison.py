@@ -5,12 +5,11 @@ from math import copysign, inf, log
 import numpy as np
 
 from tasks.identification.decision.odds import (
-    FEWEST,
     Explanation,
     RunGrams,
-    estimate_spread,
     weigh_explanation,
 )
+from tasks.identification.decision.random_effects import FEWEST, estimate_spread
 
 
 def compare_explanations(

@@ -12,11 +12,9 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
-from scipy.linalg.lapack import dpotrf, dpotrs
 
-from tasks.campaign.campaign import FILE_NUMBERS
 from tasks.identification.decision.candidates import Candidate, Columns
+from tasks.identification.decision.random_effects import Prior, integrate_columns, weigh_columns
 
 ALONG_ROAD = {"longitudinal_force", "brake_torque"}
 """Ports whose forces a car feels alike."""
@@ -29,10 +27,6 @@ PORT_OF_NUMBER = {
 """Port at which a number of the vehicle's file acts."""
 SAME_VARIABLE = {"speed": "wheel_speed", "wheel_speed": "speed"}
 """Variables that differ by the slip of the tyres alone."""
-FEWEST = 3
-"""Runs that must inform a direction for their scatter to say something [1]."""
-INFORMED = 1e-6
-"""Share of the best informed run's information from which a run informs a direction [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,15 +57,15 @@ class RunGrams:
         return np.asarray(self.score.sum(axis=0))
 
     @cached_property
-    def nobody(self) -> "_Prior":
+    def nobody(self) -> Prior:
         """Return the prior of the numbers that belong to every explanation, none of them named."""
-        return _arrange(self, ())
+        return _arrange(self, ())[0]
 
     @cached_property
     def plain(self) -> float:
         """Return the log evidence of the explanation without a member [1]."""
         own = self.nobody.columns
-        return _integrate(self.total[np.ix_(own, own)], self.total_score[own], self.nobody)[2]
+        return float(integrate_columns(self.total[np.ix_(own, own)], self.total_score[own], self.nobody)[2])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,7 +80,6 @@ class Explanation:
     values : float64 [K] of each member's columns, one after the other [their units]
     errors : float64 [K] their standard deviations
     spreads : standard deviation from run to run of each member, over its size [1]
-    session : float64 [8] numbers of the session
     everything : float64 [C] mean of every column's number where the gain is taken, without spread of the runs; 0 where
         it takes no part
     """
@@ -97,7 +90,6 @@ class Explanation:
     values: NDArray[np.float64]
     errors: NDArray[np.float64]
     spreads: tuple[float, ...]
-    session: NDArray[np.float64]
     everything: NDArray[np.float64]
 
     @property
@@ -120,16 +112,6 @@ class Explanation:
         return slice(at, at + len(member.columns))
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Prior:
-    """Columns of one explanation with their priors: float64 or int64 [K] each, and the members' indices among them."""
-
-    columns: NDArray[np.int64]
-    precision: NDArray[np.float64]
-    centre: NDArray[np.float64]
-    indices: tuple[NDArray[np.int64], ...]
-
-
 def weigh_explanation(
     grams: RunGrams, members: Sequence[Candidate], *, spread: bool = True
 ) -> Explanation | None:
@@ -141,39 +123,22 @@ def weigh_explanation(
     members : of the explanation
     spread : count what differs from run to run
     """
-    prior, nobody = _arrange(grams, members), grams.nobody
-    total, right = grams.total[np.ix_(prior.columns, prior.columns)], grams.total_score[prior.columns]
-    mean, factor, evidence = _integrate(total, right, prior)
-    everything = np.zeros(grams.columns.count)
-    everything[prior.columns] = mean + prior.centre
-    gain, spreads = evidence - grams.plain, [0.0] * len(members)
-    gain_with_spread = gain
-    if spread and members:
-        seen, pulls = [], []
-        for i, indices in enumerate(prior.indices):
-            own, along = prior.columns[indices], mean[indices] + prior.centre[indices]
-            information = along @ grams.information[:, own[:, None], prior.columns]
-            pull = grams.score[:, own] @ along
-            size = information[:, indices] @ along
-            spreads[i] = float(np.sqrt(estimate_spread(size, pull - information @ mean)))
-            if spreads[i] > 0.0:
-                seen.append((indices, along * spreads[i], information * spreads[i]))
-                pulls.append(pull * spreads[i])
-        if seen:
-            total, right = _admit_spread(total, right, seen, np.array(pulls).T)
-            mean, factor, evidence = _integrate(total, right, prior)
-            kept = len(nobody.columns)
-            gain_with_spread = evidence - _integrate(total[:kept, :kept], right[:kept], nobody)[2]
-    at = np.concatenate([np.empty(0, dtype=np.int64), *prior.indices]).astype(np.int64)
-    values = (mean + prior.centre)[at]
+    prior, own, begins = _arrange(grams, members)
+    runs = (grams.information, grams.score, grams.total, grams.total_score)
+    mean, values, errors, spreads, evidence, with_spread = weigh_columns(
+        runs, prior, grams.nobody, own, begins, spread
+    )
     bounds = [(m.lower, m.upper) for m in members for _ in m.columns]
     if any(not low - 1e-12 <= x <= high + 1e-12 for x, (low, high) in zip(values, bounds, strict=True)):
         return None
-    inverse = solve_triangular(factor, np.eye(len(mean))[:, at], lower=True, check_finite=False)
+    everything = np.zeros(grams.columns.count)
+    everything[prior.columns] = mean
+    gain = evidence - grams.plain
+    if np.isnan(with_spread):
+        with_spread = gain
     return Explanation(
-        members=tuple(members), log_odds=gain_with_spread + sum(m.log_prior for m in members), gain=gain, values=values,
-        errors=np.sqrt(np.einsum("ij,ij->j", inverse, inverse)), spreads=tuple(spreads),
-        session=(mean + prior.centre)[: len(nobody.columns)][-len(FILE_NUMBERS) :], everything=everything,
+        members=tuple(members), log_odds=with_spread + sum(m.log_prior for m in members), gain=gain, values=values,
+        errors=errors, spreads=tuple(spreads.tolist()), everything=everything,
     )  # fmt: skip
 
 
@@ -278,83 +243,32 @@ def keep_members(explanation: Explanation, members: Sequence[Candidate]) -> Expl
     )  # fmt: skip
 
 
-def estimate_spread(size: NDArray[np.float64], pull: NDArray[np.float64]) -> float:
-    """Return the variance from run to run of the amplitude of a direction (DerSimonian and Laird) [1].
+def _arrange(
+    grams: RunGrams, members: Sequence[Candidate]
+) -> tuple[Prior, NDArray[np.int64], NDArray[np.int64]]:
+    """Return the columns of an explanation: those of every number, and those of its members instead or besides.
 
-    Parameters
-    ----------
-    size : float64 [R] what each run says about an amplitude of one
-    pull : float64 [R] its score, so that pull / size is its own estimate
+    Beside them stand the places of the members' numbers among these columns, and where each member's own begin.
     """
-    informed = size > INFORMED * max(float(size.max()), 1e-300)
-    if np.count_nonzero(informed) < FEWEST:
-        return 0.0
-    weight, own = size[informed], pull[informed] / size[informed]
-    sum_of_weights = float(weight.sum())
-    mean = float(weight @ own) / sum_of_weights
-    heterogeneity = float(weight @ (own - mean) ** 2)
-    scale = sum_of_weights - float(weight @ weight) / sum_of_weights
-    return max(0.0, (heterogeneity - (len(own) - 1)) / scale) if scale > 0.0 else 0.0
-
-
-def _arrange(grams: RunGrams, members: Sequence[Candidate]) -> _Prior:
-    """Return the columns of an explanation: those of every number, and those of its members instead or besides."""
     base = grams.columns
     columns, deviations, centre = base.base.copy(), base.spike.copy(), grams.centre[base.base].copy()
     further: list[int] = []
     wide: list[float] = []
-    indices = []
+    own: list[int] = []
+    begins = [0]
     for member in members:
         if member.base < 0:
-            begin = len(columns) + len(further)
-            indices.append(np.arange(begin, begin + len(member.columns)))
+            own += range(len(columns) + len(further), len(columns) + len(further) + len(member.columns))
             further += member.columns
             wide += [member.slab] * len(member.columns)
         else:
             (columns[member.base],), deviations[member.base] = member.columns, member.slab
             centre[member.base] = grams.centre[member.columns[0]]
-            indices.append(np.array([member.base]))
-    columns = np.concatenate((columns, np.array(further, dtype=np.int64)))
-    return _Prior(
-        columns=columns,
+            own.append(member.base)
+        begins.append(len(own))
+    prior = Prior(
+        columns=np.concatenate((columns, np.array(further, dtype=np.int64))),
         precision=np.concatenate((deviations, wide)) ** -2.0,
         centre=np.concatenate((centre, grams.centre[further])),
-        indices=tuple(indices),
     )
-
-
-def _integrate(
-    information: NDArray[np.float64], score: NDArray[np.float64], prior: _Prior
-) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """Return mean about the linearisation point, Cholesky factor of the precision, and log evidence."""
-    precision, centre = prior.precision, prior.centre
-    factor, failed = dpotrf(information + np.diag(precision), lower=True, clean=True)
-    if failed:
-        raise np.linalg.LinAlgError("the information of the runs must be positive")
-    right = score - precision * centre
-    mean = np.asarray(dpotrs(factor, right, lower=True)[0])
-    evidence = 0.5 * float(right @ mean) - float(np.log(np.diag(factor)).sum())
-    evidence += 0.5 * float(np.log(precision).sum()) - 0.5 * float(precision @ centre**2)
-    return mean, factor, evidence
-
-
-def _admit_spread(
-    total: NDArray[np.float64],
-    right: NDArray[np.float64],
-    seen: Sequence[tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]],
-    pulls: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return information and score of all runs where each may lie off along some directions.
-
-    Parameters
-    ----------
-    total, right : float64 [K, K] and [K] where none does
-    seen : of each direction its indices, its values there, and what each run says along it, float64 [R, K]
-    pulls : float64 [R, D] score of each run along it
-    """
-    along = np.stack([information for *_, information in seen], axis=1)  # [R, D, K]
-    inner = np.stack([along[:, :, indices] @ values for indices, values, _ in seen], axis=2)
-    solved = np.linalg.solve(np.eye(len(seen)) + inner, np.concatenate((along, pulls[:, :, None]), axis=2))
-    run, way, k = along.shape
-    flat, solved = along.reshape(run * way, k), solved.reshape(run * way, k + 1)
-    return total - flat.T @ solved[:, :k], right - flat.T @ solved[:, k]
+    return prior, np.array(own, dtype=np.int64), np.array(begins)

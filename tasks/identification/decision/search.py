@@ -25,13 +25,13 @@ from tasks.identification.decision.forms import (
     rewhiten_splines,
 )
 from tasks.identification.decision.odds import (
-    FEWEST,
     Explanation,
     RunGrams,
     keep_members,
     search_explanations,
 )
 from tasks.identification.decision.open_explanations import select_members
+from tasks.identification.decision.random_effects import FEWEST
 from tasks.identification.inference.discrepancy import estimate_run_noise, set_run_noise
 from tasks.identification.inference.evidence import Evidence
 from tasks.identification.inference.fit import Fit, fit_hypotheses
@@ -357,9 +357,9 @@ def _refit(evidence: Evidence, fitted: Fit) -> Fit:
 
 def _settle_scales(state: _SearchState) -> _SearchState:
     """Return the same runs with the scales of disturbances and noise that they ask for, every candidate free."""
-    for change in (_scale_disturbances, _scale_noise, _scale_disturbances):
-        state = change(state)
-    return state
+    state = _scale_disturbances(state)
+    noisy = _scale_noise(state)
+    return state if noisy is state else _scale_disturbances(noisy)
 
 
 def _scale_noise(state: _SearchState) -> _SearchState:

@@ -19,7 +19,6 @@ from tasks.render.rasterise.projection import (
 TILE_WIDTH, TILE_HEIGHT = 16, 16
 """Pixels of one tile [px]."""
 
-_DIGITS, _DIGIT_BITS = 3, 11
 _ZERO, _HALF, _ONE, _LOG_CUT = (np.float32(c) for c in (0, 0.5, 1, LOG_CUT))
 
 
@@ -45,9 +44,8 @@ def tile_lists(
     return starts, splats
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
 def depth_order(keys: NDArray[np.uint32]) -> NDArray[np.uint32]:
-    """Return the places of the keys in ascending order: a stable radix sort from the last digit.
+    """Return the places of the keys in ascending order; equal keys keep theirs.
 
     Parameters
     ----------
@@ -57,23 +55,9 @@ def depth_order(keys: NDArray[np.uint32]) -> NDArray[np.uint32]:
     -------
     uint32 [V] places [1]
     """
-    n = len(keys)
-    pairs, sorted_pairs = np.empty(n, dtype=np.uint64), np.empty(n, dtype=np.uint64)
-    ends = np.zeros((_DIGITS, 1 << _DIGIT_BITS), dtype=np.int64)
-    mask = np.uint64((1 << _DIGIT_BITS) - 1)
-    for i in range(n):
-        pairs[i] = np.uint64(keys[i]) << np.uint64(32) | np.uint64(i)
-        for digit in range(_DIGITS):
-            ends[digit, pairs[i] >> np.uint64(32 + digit * _DIGIT_BITS) & mask] += 1
-    for digit in range(_DIGITS):
-        end = 0
-        for value in range(1 << _DIGIT_BITS):
-            end, ends[digit, value] = end + ends[digit, value], end
-        for pair in pairs:
-            bucket = pair >> np.uint64(32 + digit * _DIGIT_BITS) & mask
-            sorted_pairs[ends[digit, bucket]] = pair
-            ends[digit, bucket] += 1
-        pairs, sorted_pairs = sorted_pairs, pairs
+    # a number holds key and place: NumPy sorts numbers in vector registers, in a third of the time of places
+    pairs = keys.astype(np.uint64) << np.uint64(32) | np.arange(len(keys), dtype=np.uint64)
+    pairs.sort()
     return pairs.astype(np.uint32)
 
 

@@ -235,10 +235,9 @@ def remove_gaussians(gaussians: Gaussians, index: NDArray[np.int64]) -> Gaussian
     -------
     Gaussians
     """
-    kept: dict[str, Any] = {
-        name: np.delete(array, index, axis=0) for name, array in _arrays(gaussians).items()
-    }
-    return replace(gaussians, **kept)
+    kept = np.delete(np.arange(len(gaussians)), index)
+    left: dict[str, Any] = {name: array.take(kept, axis=0) for name, array in _arrays(gaussians).items()}
+    return replace(gaussians, **left)
 
 
 def _arrays(gaussians: Gaussians) -> dict[str, NDArray[Any]]:

@@ -1,6 +1,7 @@
 """The course of the road: route coordinates to the world, and the route itself."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -76,6 +77,7 @@ class Course:
         return np.stack([x * cos - y * sin, x * sin + y * cos, z], axis=1)
 
 
+@lru_cache(maxsize=4)
 def integrate_course(layout: StreetLayout) -> Course:
     """Integrate curvature and grade of the layout's course."""
     first, last = layout.station_range

@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtri
 
 from tasks.conventions import SemanticClass
 from tasks.scene.street import palette
@@ -50,7 +51,8 @@ def ground_albedo(layout: StreetLayout, seed: int, s: Floats, away: Floats) -> F
     """
     rng = named_generator(seed, "fields")
     patch = fractal_noise(named_generator(seed, "dead grass"), s, away, 4.0, 4)
-    dead = np.clip(layout.dead_grass_share + 0.25 * patch, 0, 1)[:, None]
+    dry = layout.dead_grass_share + 0.8 * layout.bare_share
+    dead = np.clip(dry + 0.25 * patch, 0, 1)[:, None]
     tone = np.exp(0.25 * fractal_noise(named_generator(seed, "grass"), s, away, 2.3, 4))[:, None]
     grass = (palette.GRASS + (palette.DEAD_GRASS - palette.GRASS) * dead) * tone
     # under trees lie leaves, and little grows
@@ -58,15 +60,28 @@ def ground_albedo(layout: StreetLayout, seed: int, s: Floats, away: Floats) -> F
         np.clip(layout.ground_trees_scale / 60, 0, 1) * smooth_step((away - 2.0) / 3.0) * (0.75 + 0.2 * patch)
     )
     grass += (palette.LITTER * tone - grass) * np.clip(shaded, 0, 1)[:, None]
-    bare = fractal_noise(named_generator(seed, "bare earth"), s, away, 1.1, 3) - 1.5 * away
-    grass += (0.8 * palette.EARTH - grass) * np.clip(bare + 0.4, 0, 0.8)[:, None]
     strips = palette.FIELDS[rng.integers(len(palette.FIELDS), size=(64, 4))]
     along = np.floor((s + 400.0 + 40.0 * np.sin(away / 11.0)) / rng.uniform(45, 90)).astype(np.int64) % 64
     across = np.clip((away - 6.0) / 16.0, 0, 3).astype(np.int64)
     rows = 1 + 0.12 * np.sin(2 * np.pi * (away + 0.1 * s) / 0.9)
     field = strips[along, across] * (rows * np.exp(0.12 * fractal_noise(rng, s, away, 3.0, 3)))[:, None]
-    worked = smooth_step((away - 5.0) / 1.5)[:, None] * (layout.front_garden > 15)
-    return np.clip(grass + (field - grass) * worked, 0.01, 0.6)
+    worked = smooth_step((away - 5.0) / 1.5)[:, None] * (layout.front_garden > 15) * (1 - layout.bare_share)
+    green = grass + (field - grass) * worked
+    lies_bare = bare_share(layout, seed, s, away)[:, None]
+    return np.clip(green + (palette.choose_soil(seed) * tone**0.6 - green) * lies_bare, 0.01, 0.6)
+
+
+def bare_share(layout: StreetLayout, seed: int, s: Floats, away: Floats) -> Floats:
+    """Return how bare the ground lies: the shoulder, its edge that wheels wear, and patches of dry land; [N] [1].
+
+    Parameters
+    ----------
+    layout, seed, s, away : as `ground_albedo` takes them
+    """
+    frayed = fractal_noise(named_generator(seed, "bare earth"), s, away, 1.1, 3)
+    worn = np.clip(2.0 * (layout.shoulder_width - away) + 0.6 * frayed + 0.4, 0, 0.9)
+    patch = fractal_noise(named_generator(seed, "bare patches"), s / 1.5, away, 6.0, 4)
+    return np.maximum(worn, np.clip(0.5 + 0.9 * (patch + ndtri(layout.bare_share)), 0, 0.92))
 
 
 def _lay_cells(layout: StreetLayout, seed: int, side: int) -> Surfels:
@@ -110,6 +125,8 @@ def _build_tufts(layout: StreetLayout, seed: int, side: int) -> Surfels:
     first, last = -2.0, layout.route_length + 40.0
     n = int(_TUFTS * _TUFTED * (last - first))
     s, away = rng.uniform(first, last, n), _TUFTED * rng.random(n) ** 1.6
+    grown = rng.random(n) ** 2 > bare_share(layout, seed, s, away)
+    s, away, n = s[grown], away[grown], int(grown.sum())
     height = rng.uniform(0.06, 0.20, n) * (0.6 + 0.8 * smooth_step(away / 1.0))
     turn = rng.uniform(0, np.pi, n)
     lean = rng.normal(0, 0.35, (n, 2))

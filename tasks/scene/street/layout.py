@@ -18,7 +18,8 @@ PIXEL = 1 / 400
 
 MAY_BE_NONE = (
     "parking_width", "crossing_length", "kerb_height", "kerb_width", "pavement_width", "front_garden", "open_ground",
-    "lamp_spacing", "tree_spacing", "delineator_spacing", "sign_spacing", "wire_spacing", "boundary_distance",
+    "shoulder_width", "lamp_spacing", "tree_spacing", "delineator_spacing", "sign_spacing", "wire_spacing",
+    "boundary_distance",
 )  # fmt: skip
 """Lengths of a `StreetLayout` that may be 0, where the street has no such thing."""
 
@@ -68,8 +69,14 @@ class StreetLayout:
     tree_scale : size of a tree over that of a young lime of 7 m [1]
     leaf_share, autumn_share : share of the leaves that hang, and of these that have turned [1]
     dead_grass_share : share of the grass that is yellow [1]
+    yellow_share : share of the streets whose centre line is yellow, not white [1]
+    bare_share : share of the open ground that lies bare; the grass about it is dry [1]
+    shoulder_width : bare strip beside the road or pavement; 0 for none [m]
     asphalt_scale : reflectance of the asphalt over that of an old town street [1]
     wear_scale : cracks and repairs over those of an old town street [1]
+    track_scale, strip_scale : reflectance of a lane's wheel tracks, and of the strip between them, over the rest [1]
+    renewal_spacing : mean length of a lane's stretches of one age [m]
+    renewal_scale : standard deviation of the logarithm of their reflectance [1]
     sun_azimuth_deg : direction of the sun, from the route's start heading to the left [deg]
     sun_elevation_deg : height of the sun [deg]
     sun_rgb : irradiance of the sun over pi, on a surface that faces it, linear light [1]
@@ -131,8 +138,15 @@ class StreetLayout:
     leaf_share: float
     autumn_share: float
     dead_grass_share: float
+    yellow_share: float
+    bare_share: float
+    shoulder_width: float
     asphalt_scale: float
     wear_scale: float
+    track_scale: float
+    strip_scale: float
+    renewal_spacing: float
+    renewal_scale: float
     sun_azimuth_deg: float
     sun_elevation_deg: float
     sun_rgb: tuple[float, float, float]

@@ -54,8 +54,9 @@ def replace_discs(gaussians: Gaussians, index: NDArray[np.int64], finer: list[Ga
     finer : what comes in their place, with the same members
     """
     joined: dict[str, Any] = {}
+    kept = np.delete(np.arange(len(gaussians)), index)
     for name in (member.name for member in fields(Gaussians)):
         if isinstance(value := getattr(gaussians, name), np.ndarray):
-            kept = np.delete(value, index, axis=0)
-            joined[name] = np.concatenate([kept, *(getattr(one, name) for one in finer)])
+            parts = [value.take(kept, axis=0), *(getattr(one, name) for one in finer)]
+            joined[name] = np.concatenate(parts)
     return replace(gaussians, **joined)

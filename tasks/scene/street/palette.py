@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from tasks.scene.street.noise import named_generator
+
 
 def _linear_light(*colours: str) -> NDArray[np.float64]:
     """Return the linear light of sRGB colours written #rrggbb (IEC 61966-2-1); float64 [len(colours), 3] [1]."""
@@ -39,6 +41,8 @@ BARK = _linear_light("#5d5145")[0]
 FOLIAGE = _linear_light("#566e33", "#4d6a33", "#5f7438", "#476338", "#677a3c")
 FLOWERS = _linear_light("#a8324a", "#c46a8c", "#c9a23a", "#b8452e")
 HEDGE = _linear_light("#46632e")[0]
+SOILS = _linear_light("#8c745a", "#98725c", "#b3a184", "#96918a", "#6f6050", "#a18d6e", "#7c766e")
+"""Loam, red earth, sand, gravel of limestone, dark earth, clay, gravel of basalt."""
 EARTH = _linear_light("#5b4a3a")[0]
 GRASS = _linear_light("#6a7c40")[0]
 FIELDS = _linear_light("#7d8a46", "#a39a5c", "#6b5a45", "#5f7a3c", "#b5a66a", "#8a7a56")
@@ -70,3 +74,20 @@ AUTUMN = _linear_light("#a8742c", "#8f4d24", "#b99a35", "#7d6a30", "#9c5a2a")
 SIGN_BLUE = _linear_light("#1d4f9c")[0]
 POST_YELLOW = _linear_light("#d9a514")[0]
 BIN_GREEN = _linear_light("#2f4b3c")[0]
+ASPHALT = np.array([0.112, 0.108, 0.103])
+PAINT = np.array([0.50, 0.50, 0.475])
+YELLOW_PAINT = np.array([0.46, 0.30, 0.04])
+BITUMEN = np.array([0.035, 0.034, 0.034])
+IRON = np.array([0.075, 0.066, 0.058])
+FALLEN = np.array([[0.20, 0.13, 0.03], [0.13, 0.14, 0.03], [0.22, 0.09, 0.02]])
+"""Single leaves on the road."""
+
+
+def choose_soil(seed: int) -> NDArray[np.float64]:
+    """Return the soil of a street: what lies bare beside it and drifts onto it; [3] [1].
+
+    Parameters
+    ----------
+    seed : the street's seed [1]
+    """
+    return SOILS[named_generator(seed, "soil").integers(len(SOILS))]

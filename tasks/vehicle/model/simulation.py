@@ -150,7 +150,8 @@ def simulate(
     return Simulation(history=history, states=states, onset=onset, onset_station=onset_station, stop=stop)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+# without Numba's reference counts: each call of a port counted those of the slots' arrays, a third of the loop's time
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
 def integrate_motion(
     state: VehicleState,
     samples: int,

@@ -9,8 +9,8 @@ import pytest
 from studies.evaluation.dataset_motion import list_motion_panels
 from studies.evaluation.judged_clip import JudgedClip
 from studies.evaluation.motion_curves import PITCH, PROGRESS, MotionPanel, draw_motion
+from studies.evaluation.motion_rows import motion_of_telemetry
 from studies.evaluation.standards import MeantMotion, Standard
-from tasks.eval.poses.motion import motion_of_telemetry
 
 TIMES = np.arange(81) / 10
 FLAT = {"hazard_center_m": 0.0, "hazard_length_m": 0.0, "hazard_height_m": 0.0}

@@ -87,6 +87,9 @@ def test_the_film_drowns_more_of_the_road_everywhere_as_it_rises(parameters):
     assert shares[0].max() == 0
     assert np.all(np.diff(shares, axis=0) >= 0)
     assert np.all(np.diff([share[road].mean() for share in shares]) > 0)
+    assert (
+        shares[2][road].mean() < 0.25 < 0.75 < shares[4][road].mean()
+    )  # matt at 2 mm/h, a mirror at 25 mm/h
     assert shares[-1][road].min() > 0.99
     assert all(share[~road].max() == 0 for share in shares)
     assert np.all(np.diff([compute_wetness(film, parameters.kinds["rain"].film.water) for film in FILMS]) > 0)

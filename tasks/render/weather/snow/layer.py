@@ -142,9 +142,10 @@ def snow_layer(
     """
     p = parameters
     anchors = road_anchors(gaussians, p.anchors, lift)
-    xi = coverage_rank(field, locate_snow(field, gaussians.means[anchors.index]))
-    reach = edge_width(amount.coverage, p.edge) / 2 + NEAR_EDGE
-    cut = (np.abs(xi - amount.coverage) < reach) & (0 < amount.coverage < 1)
+    cut = np.zeros(len(anchors.index), bool)
+    if 0 < amount.coverage < 1:
+        xi = coverage_rank(field, locate_snow(field, gaussians.means[anchors.index]))
+        cut = np.abs(xi - amount.coverage) < edge_width(amount.coverage, p.edge) / 2 + NEAR_EDGE
     index, normal, place, scales, quats = _cut_anchors(gaussians, anchors, cut)
     lay = locate_snow(field, place)
     xi = coverage_rank(field, lay)

@@ -116,7 +116,10 @@ def visible_impacts(
         return np.empty(0, dtype=STREAK)
     rays = np.stack([(columns + 0.5 - K[0, 2]) / K[0, 0], (rows + 0.5 - K[1, 2]) / K[1, 1], 0 * z + 1])
     ground = (pose[:3, :3] @ (rays * z)[:, seen]).T + pose[:3, 3]
-    cells = np.unique(np.floor(ground[:, :2] / CELL_M).astype(np.int64), axis=0)
+    place = np.floor(ground[:, :2] / CELL_M).astype(np.int64)
+    first, across = place.min(axis=0), np.ptp(place[:, 1]) + 1
+    # by one number for each cell: NumPy's own search of rows takes four times as long
+    cells = first + np.column_stack(np.divmod(np.unique((place - first) @ (across, 1)), across))
     large = population.edges_mm[:-1] >= p.smallest_mm - 1e-9
     flux = float((population.density * population.speed)[large].sum())
     strike = _Strike(

@@ -72,11 +72,13 @@ class WaterSurface:
 
     Parameters
     ----------
+    wet : float32 [H, W] share of the pixel that is wet [1]
     smooth : float32 [H, W] share of the pixel under smooth water [1]
     normal : float32 [H, W, 3] unit normals of that water where it mirrors, world frame [1]
     cosine : float32 [H, W] cosine of the angle at which the road is seen [1]
     """
 
+    wet: NDArray[np.float32]
     smooth: NDArray[np.float32]
     normal: NDArray[np.float32]
     cosine: NDArray[np.float32]
@@ -87,8 +89,9 @@ def water_surface(
 ) -> WaterSurface:
     """Return the share of smooth water and the normals of its surface.
 
-    The texture's peaks are normally distributed about the mean texture depth, and the water level varies about the
-    film depth. The smooth share is the probability that a peak is below the water level; it rises with the film.
+    A deep film is level, and deeper by as much as the road is low; a thin one flows together and is deeper by as large
+    a part of itself. The texture's peaks are normally distributed about the mean texture depth. The smooth share is the
+    probability that a peak is below the water; it rises with the film.
 
     Parameters
     ----------
@@ -104,16 +107,17 @@ def water_surface(
     """
     p = parameters
     surface = WaterSurface(
+        wet=new_picture(view.depth),
         smooth=new_picture(view.depth),
         normal=new_picture(view.depth, 3),
         cosine=new_picture(view.depth),
     )
     _water(
         view.depth, view.rays, view.normal, view.road, view.mirrors, view.T_world_camera[:3, 3], float(view.K[1, 1]),
-        film_depth_mm, compute_wetness(film_depth_mm, p), texture_depth_mm, p.texture_spread_mm,
+        film_depth_mm, p.wetting_mm, texture_depth_mm, p.texture_spread_mm,
         p.unevenness_mm, p.unevenness.coarsest_m, p.unevenness.octaves, p.unevenness.roughness,
         p.ripple_slope, p.ripple_m, np.uint64(stream_key(seed, "puddles")),
-        surface.smooth, surface.normal, surface.cosine,
+        surface.wet, surface.smooth, surface.normal, surface.cosine,
     )  # fmt: skip
     return surface
 
@@ -129,8 +133,15 @@ def _place_water(row, column, depth, rays, normal, eye, focal):  # type: ignore[
 
 
 @numba.njit(**INLINED)
-def _smooth_share(level, wet, texture, spread):  # type: ignore[no-untyped-def]
-    return wet * 0.5 * (1 + erf((level - texture) / (spread * sqrt(2.0))))
+def _lay_film(row, column, film, uneven, low, wetting, texture, spread, wet, smooth):  # type: ignore[no-untyped-def]
+    """Write how much of a pixel the film wets, and how much lies under its smooth surface.
+
+    A road that lies low by ``low`` standard deviations has a film deeper by that, but by no larger part of a thin one.
+    """
+    depth = film * exp(uneven * low / (film + uneven))
+    covered = 1 - exp(-depth / wetting)
+    wet[row, column] = covered
+    smooth[row, column] = covered * 0.5 * (1 + erf((depth - texture) / (spread * sqrt(2.0))))
 
 
 @numba.njit(**INLINED)
@@ -151,14 +162,14 @@ _ALONG, _ACROSS = np.uint64(1000), np.uint64(2000)
 
 @numba.njit(**LAW)
 def _water_pixel(  # type: ignore[no-untyped-def]
-    row, column, depth, rays, normal, road, mirrors, eye, focal, film, wet, texture, spread, uneven, coarsest,
-    octaves, roughness, ripple_slope, ripple, key, smooth, water, cosine,
+    row, column, depth, rays, normal, road, mirrors, eye, focal, film, wetting, texture, spread, uneven, coarsest,
+    octaves, roughness, ripple_slope, ripple, key, wet, smooth, water, cosine,
 ):  # fmt: skip
     if not road[row, column]:
         return
     x, y, size, cosine[row, column] = _place_water(row, column, depth, rays, normal, eye, focal)
-    level = film + uneven * read_field(x, y, size, coarsest, octaves, roughness, key)
-    smooth[row, column] = _smooth_share(level, wet, texture, spread)
+    low = read_field(x, y, size, coarsest, octaves, roughness, key)
+    _lay_film(row, column, film, uneven, low, wetting, texture, spread, wet, smooth)
     if mirrors[row, column]:
         along = read_field(x, y, size, ripple, RIPPLE_OCTAVES, RIPPLE_ROUGHNESS, key + _ALONG)
         across = read_field(x, y, size, ripple, RIPPLE_OCTAVES, RIPPLE_ROUGHNESS, key + _ACROSS)
@@ -168,8 +179,8 @@ def _water_pixel(  # type: ignore[no-untyped-def]
 @run_on_either(_water_pixel)
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _water(  # type: ignore[no-untyped-def]
-    depth, rays, normal, road, mirrors, eye, focal, film, wet, texture, spread, uneven, coarsest, octaves, roughness,
-    ripple_slope, ripple, key, smooth, water, cosine,
+    depth, rays, normal, road, mirrors, eye, focal, film, wetting, texture, spread, uneven, coarsest, octaves,
+    roughness, ripple_slope, ripple, key, wet, smooth, water, cosine,
 ):  # fmt: skip
     """Row after row, the waves of all its road pixels at once."""
     width = road.shape[1]
@@ -191,7 +202,7 @@ def _water(  # type: ignore[no-untyped-def]
         mirroring = 0
         for i in range(count):
             column = columns[i]
-            smooth[row, column] = _smooth_share(film + uneven * along[i], wet, texture, spread)
+            _lay_film(row, column, film, uneven, along[i], wetting, texture, spread, wet, smooth)
             if mirrors[row, column]:
                 places[0, mirroring], places[1, mirroring], size[mirroring] = (
                     places[0, i],

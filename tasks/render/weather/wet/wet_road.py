@@ -204,7 +204,8 @@ def wet_layer(
     gain += 1
     drained = soaked_share(gbuffer, road)
     _wet(
-        picture, road, drained, water.smooth, water.cosine, sharp, rough, compute_wetness(film.depth_mm, p.water),
+        picture, road, drained, water.wet, water.smooth, water.cosine, sharp, rough,
+        compute_wetness(film.depth_mm, p.water),
         p.water.ripple_slope, p.rough_slope, p.refractive_index, p.diffuse_reflectance,
         LUMINANCE / float(LUMINANCE @ sky.white), share, gain, add,
     )  # fmt: skip
@@ -274,8 +275,8 @@ ALBEDO_RANGE = (0.02, 0.9)
 
 @numba.njit(**INLINED)
 def _wet_pixel(  # type: ignore[no-untyped-def]
-    row, column, picture, road, drained, smooth, cosine, sharp, rough, wet, ripple_slope, rough_slope, index, diffuse,
-    to_albedo, on_road, gain, add,
+    row, column, picture, road, drained, wet, smooth, cosine, sharp, rough, soaking, ripple_slope, rough_slope, index,
+    diffuse, to_albedo, on_road, gain, add,
 ):  # fmt: skip
     """Mirror lobes of smooth water and of wet texture over the darkened road.
 
@@ -284,7 +285,7 @@ def _wet_pixel(  # type: ignore[no-untyped-def]
     At the road's edge a pixel is road in part.
     """
     one = np.float32(1)
-    soaked = wet if road[row, column] else wet * drained[row, column]
+    soaked = wet[row, column] if road[row, column] else soaking * drained[row, column]
     if soaked <= 0:
         return
     albedo = 0.0
@@ -297,7 +298,7 @@ def _wet_pixel(  # type: ignore[no-untyped-def]
         return
     share, steep = smooth[row, column], cosine[row, column] * cosine[row, column]
     mirror = share * fresnel_reflectance(min(1.0, sqrt(steep + ripple_slope * ripple_slope)), index)
-    sheen = (wet - share) * fresnel_reflectance(min(1.0, sqrt(steep + rough_slope * rough_slope)), index)
+    sheen = (soaked - share) * fresnel_reflectance(min(1.0, sqrt(steep + rough_slope * rough_slope)), index)
     part = on_road[row, column]
     gain[row, column, 0] = one - part * (one - np.float32((1 - mirror - sheen) * darker))
     for c in range(3):
@@ -308,14 +309,14 @@ def _wet_pixel(  # type: ignore[no-untyped-def]
 @run_on_either(_wet_pixel)
 @numba.njit(**LAW)
 def _wet(  # type: ignore[no-untyped-def]
-    picture, road, drained, smooth, cosine, sharp, rough, wet, ripple_slope, rough_slope, index, diffuse,
+    picture, road, drained, wet, smooth, cosine, sharp, rough, soaking, ripple_slope, rough_slope, index, diffuse,
     to_albedo, on_road, gain, add,
 ):  # fmt: skip
     for row in range(road.shape[0]):
         for column in range(road.shape[1]):
             _wet_pixel(
-                row, column, picture, road, drained, smooth, cosine, sharp, rough, wet, ripple_slope, rough_slope,
-                index, diffuse, to_albedo, on_road, gain, add,
+                row, column, picture, road, drained, wet, smooth, cosine, sharp, rough, soaking, ripple_slope,
+                rough_slope, index, diffuse, to_albedo, on_road, gain, add,
             )  # fmt: skip
 
 

@@ -1,6 +1,6 @@
 """Parked cars that a clip comes near: as fine as its camera resolves, in the light of the coarse ones."""
 
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from typing import Any
 
@@ -65,39 +65,68 @@ def detail_cars(
             for member in fields(Gaussians)
             if isinstance(value := getattr(gaussians, member.name), np.ndarray)
         }
-        parts.append(_make_fine(car, seed, cell, replace(gaussians, **coarse), layout))
+        parts.append(_light_fine(_make_fine(layout, seed, car, cell), replace(gaussians, **coarse)))
     if not parts:
         return gaussians
     return replace_discs(gaussians, np.concatenate(gone), parts)
 
 
-def _make_fine(car: Car, seed: int, cell: float, coarse: Gaussians, layout: StreetLayout) -> Gaussians:
-    line = integrate_course(layout)
-    body = build_parked(car, seed, cell)
+@dataclass(frozen=True, kw_only=True)
+class _FineCar:
+    """A fine car, and the coarse discs from which each of its own takes its light.
+
+    Parameters
+    ----------
+    members : of its `Gaussians`, but for those that the light decides
+    albedo, glow : float64 [N, 3] reflectance and mirrored radiance of its discs [1]
+    coarse_albedo, coarse_glow : the same of the coarse discs [1]
+    nearest : int64 [N, `_ALIKE`] coarse discs [1]
+    weight : float64 [N, `_ALIKE`] of the light of each [1]
+    """
+
+    members: dict[str, NDArray[np.generic]]
+    albedo: Floats
+    glow: Floats
+    coarse_albedo: Floats
+    coarse_glow: Floats
+    nearest: NDArray[np.int64]
+    weight: Floats
+
+
+@lru_cache(maxsize=16)
+def _make_fine(layout: StreetLayout, seed: int, car: Car, cell: float) -> _FineCar:
+    line, body = integrate_course(layout), build_parked(car, seed, cell)
     old, new = (place_body(one, car) for one in (build_parked(car, seed, COARSE), body))
-    radiance = np.maximum(coarse.sh[:, 0].astype(np.float64) * C0 + 0.5, 0)
-    light = np.maximum(radiance - old.glow, 0) / old.albedo
     places = [np.concatenate([s.centre, _NORMAL_M * s.axes[:, 2]], axis=1) for s in (old, new)]
     away, nearest = cKDTree(places[0]).query(places[1], k=_ALIKE)
     weight = 1 / (away + 0.02) ** 2
-    weight /= weight.sum(axis=1, keepdims=True)
-    lit = np.einsum("nk,nkc->nc", weight, light[nearest])
-    colour = new.albedo * lit + new.glow
     station = new.centre[:, 0]
-    out: dict[str, Any] = {
+    members: dict[str, Any] = {
         "means": line.to_world(new.centre).astype(np.float32),
         "quats_wxyz": line.to_world_quaternions(station, new.axes).astype(np.float32),
         "scales": body.gaussians.scales,
         "opacities": body.gaussians.opacities,
-        "sh": ((colour - 0.5) / C0).astype(np.float32)[:, None],
         "normals": line.to_world_directions(station, new.axes[:, 2]).astype(np.float32),
         "class_id": body.gaussians.class_id,
+        "surroundings": _count_surroundings(car.model, draw_look(car, seed)[1], cell),
     }
-    if coarse.surroundings is not None:
-        out["surroundings"] = _count_surroundings(car.model, draw_look(car, seed)[1], cell)
+    return _FineCar(
+        members=members, albedo=new.albedo, glow=new.glow, coarse_albedo=old.albedo, coarse_glow=old.glow,
+        nearest=nearest, weight=weight / weight.sum(axis=1, keepdims=True),
+    )  # fmt: skip
+
+
+def _light_fine(car: _FineCar, coarse: Gaussians) -> Gaussians:
+    """Return the fine discs in the light of the coarse ones."""
+    radiance = np.maximum(coarse.sh[:, 0].astype(np.float64) * C0 + 0.5, 0)
+    light = np.maximum(radiance - car.coarse_glow, 0) / car.coarse_albedo
+    colour = car.albedo * np.einsum("nk,nkc->nc", car.weight, light[car.nearest]) + car.glow
+    out: dict[str, Any] = car.members | {"sh": ((colour - 0.5) / C0).astype(np.float32)[:, None]}
+    if coarse.surroundings is None:
+        out["surroundings"] = None
     if coarse.light is not None:
-        shares = np.einsum("nk,nkc->nc", weight, coarse.light[nearest].astype(np.float64))
-        shares[:, 3] = new.glow.sum(axis=1) / np.maximum(colour.sum(axis=1), 1e-9)
+        shares = np.einsum("nk,nkc->nc", car.weight, coarse.light[car.nearest].astype(np.float64))
+        shares[:, 3] = car.glow.sum(axis=1) / np.maximum(colour.sum(axis=1), 1e-9)
         out["light"] = np.clip(shares, 0, 1).astype(np.float32)
     return replace(coarse, **out)
 
