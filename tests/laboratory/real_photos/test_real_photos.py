@@ -131,7 +131,7 @@ def test_real_photographs_teach_and_frames_whose_labels_are_wrong_teach_the_wron
     found = {
         (score.training, score.part): score.accuracies[0]
         for score in compare_trainings(
-            rolled, rest, {HELD_OUT: held_out, DEVELOPMENT: development}, seeds=[0], counts=[3], steps=150,
+            rolled, rest, {HELD_OUT: held_out, DEVELOPMENT: development}, seeds=[0], counts=[3], steps=60,
             say=lambda _: None,
         )
     }  # fmt: skip
