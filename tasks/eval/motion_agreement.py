@@ -15,6 +15,8 @@ Floats = NDArray[np.float64]
 TOO_LITTLE = "not judged: the pictures show too little to follow"
 COVERAGE = 2.0
 """Standard uncertainties within which 95 % of Gaussian errors lie [1] (JCGM 100:2008, 6.3.3)."""
+SURE = 5.0
+"""Standard uncertainties beyond a limit from which on an error is another motion, however little is seen [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -213,7 +215,7 @@ def _find_blindness(
         (errors.rise_rmse_m, way_std, thresholds.rise_rmse_m),
     ]
     missed = [(error, std, limit) for _, error, std, limit, _ in figures] + rig
-    if any(limit is not None and error > limit + COVERAGE * std for error, std, limit in missed):
+    if any(limit is not None and error > limit + SURE * std for error, std, limit in missed):
         return []
     return ([TOO_LITTLE] if recovered.blind else []) + [
         f"not judged: {name} is known to {std:.2g} {unit}, and its limit of {limit:.2g} {unit} needs"
