@@ -23,7 +23,7 @@ def _store_vector(planes, l, values):  # type: ignore[no-untyped-def]
     planes[l], planes[BLOCK + l], planes[2 * BLOCK + l] = values
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _add_basis_share(rgb, block, k, l, value):  # type: ignore[no-untyped-def]
     """Add the contribution of basis function k in lane l."""
     plane = SH + 3 * k
