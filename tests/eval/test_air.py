@@ -55,7 +55,7 @@ def test_a_surface_is_as_bright_without_air_at_any_range(hump_clip: Clip) -> Non
 def test_veil_that_thins_as_things_come_nearer_is_no_motion(
     hump_clip: Clip, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    frames = add_veil(hump_clip.frames, hump_clip.depth, hump_clip.K, 0.01, LIGHT)
+    frames = add_veil(hump_clip.frames, hump_clip.depth, hump_clip.K, 0.02, LIGHT)
     seen = recover_motion(hump_clip, frames)
     assert pitch_rmse_deg(seen, hump_clip) < 0.012
     assert progress_rmse(seen, hump_clip) < 0.002

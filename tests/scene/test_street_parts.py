@@ -78,7 +78,7 @@ def test_cells_are_finer_beside_an_edge() -> None:
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_asphalt_is_as_uneven_in_brightness_as_on_photographs_and_as_dark_as_measured(seed: int) -> None:
+def test_asphalt_is_uneven_in_brightness_and_as_dark_as_measured(seed: int) -> None:
     s, d = (axis.ravel() for axis in np.meshgrid(np.arange(0, 150, 0.25), np.arange(-1.6, 5.2, 0.25)))
     albedo = asphalt_albedo(LAYOUT, seed, s, d, np.full(len(s), 0.25), np.zeros((len(s), 2)))
     assert 0.2 < np.log(albedo).std() < 0.45
