@@ -1,5 +1,7 @@
 """Chaining steps into motion."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -87,6 +89,23 @@ def test_a_gap_beyond_the_limit_is_never_bridged() -> None:
 
     assert all(p.step.failure for p in place_frames(20, place))
     assert calls == list(range(1, MAX_GAP + 1))
+
+
+@pytest.mark.parametrize(("by_region", "grows"), [(None, 0.5), (1e-5, 0.5), (2e-3, 1.0)])
+def test_uncertainty_grows_as_independent_steps_or_as_lasting_errors_whichever_is_more(
+    by_region: float | None, grows: float
+) -> None:
+    poses = rig_poses(np.arange(17.0), np.zeros(17), np.zeros(17))
+    level = np.eye(4)
+    level[:3, :3] = make_mount(tilt=0.0)[:3, :3]
+    steps = exact_steps(poses @ level @ invert_pose(make_mount()), list(range(16)), 1e-6)
+    if by_region is not None:
+        twists = by_region * np.eye(6)
+        steps = [replace(one, step=replace(one.step, region_twists=twists)) for one in steps]
+    seen = integrate_motion("test", steps, level)
+    one = 1e-3 if grows == 0.5 else by_region
+    np.testing.assert_allclose(seen.pitch_std, one * np.arange(17) ** grows, rtol=1e-9)
+    np.testing.assert_allclose(seen.progress_std, one * np.arange(17) ** grows, rtol=1e-9)
 
 
 def test_propagated_uncertainty_matches_a_thousand_perturbed_chains() -> None:

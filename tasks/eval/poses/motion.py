@@ -34,8 +34,8 @@ class RecoveredMotion:
     progress : float64 [F] distance along the heading [m]
     normalised_path : float64 [F, 3] progress, lateral and heave over the clip's whole progress [1];
         NaN where the car stood
-    pitch_std : float64 [F] standard uncertainty of `pitch`, from what each region of the picture adds to it over all
-        steps; a bias that all regions share is not in it. Without regions, the steps' errors count as independent [rad]
+    pitch_std : float64 [F] standard uncertainty of `pitch`: that of independent steps, or that of errors which stay in
+        a region of the picture, whichever is larger; a bias that all regions share is not in it [rad]
     progress_std : float64 [F] the same of `progress` [m]
     inliers : int64 [F] points or pixels that carried the estimate; 0 in frame 0
     failed : bool [F]
@@ -159,7 +159,8 @@ def integrate_motion(
 
     What is wrong in one region of the picture lasts, as a verge or a front stays there for many steps. So errors are
     summed by region over the steps, and the regions, not the steps, count as independent (Liang and Zeger 1986,
-    DOI 10.1093/biomet/73.1.13).
+    DOI 10.1093/biomet/73.1.13). A few regions show too little of their spread, so the uncertainty is never below that
+    of independent steps.
 
     Parameters
     ----------
@@ -186,10 +187,8 @@ def integrate_motion(
             failures.append(f"{method}: frame {k} has no pose: {step.failure}.")
         Ad = adjoint_matrix(T_rig_camera)
         step_pose = T_rig_camera @ step.T_earlier_later @ invert_pose(T_rig_camera)
-        if step.region_twists is None:
-            step_cov, twists = Ad @ step.covariance @ Ad.T, np.zeros((1, 6))
-        else:
-            step_cov, twists = np.zeros((6, 6)), step.region_twists @ Ad.T
+        step_cov = Ad @ step.covariance @ Ad.T
+        twists = np.zeros((1, 6)) if step.region_twists is None else step.region_twists @ Ad.T
         T[k] = T[a] @ step_pose
         carry = adjoint_matrix(T[a])
         cov[k] = cov[a] + carry @ step_cov @ carry.T
@@ -199,8 +198,9 @@ def integrate_motion(
         x, y, z = frame_axes.T @ T[k, :3, 0]
         pitch[k] = np.arctan2(-z, np.hypot(x, y))
         by_rotation = frame_axes @ np.array([-y, x, 0.0])
-        pitch_var[k] = by_rotation @ cov[k, 3:, 3:] @ by_rotation
-        pitch_var[k] += np.square(by_region[k][:, 3:] @ by_rotation).sum()
+        pitch_var[k] = max(
+            by_rotation @ cov[k, 3:, 3:] @ by_rotation, np.square(by_region[k][:, 3:] @ by_rotation).sum()
+        )
 
         moved = T[k, :3, 3] - T[a, :3, 3]
         if route is None:
@@ -216,7 +216,7 @@ def integrate_motion(
         way_by_region[k] = way_by_region[a] + twists @ by_twist
 
     failed = np.isnan(pitch)
-    progress_std = np.sqrt(progress_var + [np.square(way).sum() for way in way_by_region])
+    progress_std = np.sqrt(np.maximum(progress_var, [np.square(way).sum() for way in way_by_region]))
     last = np.flatnonzero(~failed)[-1]
     moving = abs(path[last, 0]) > max(5 * progress_std[last], LEAST_PROGRESS)
     lengths = path if metric else np.full_like(path, np.nan)
