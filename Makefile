@@ -13,7 +13,7 @@ WORKERS ?= 2
 # with and without CUDA, one an index, and which of them is at hand differs; what a CUDA build needs beyond is not in the
 # list either. The last line installs these two, and muSync itself, with the setuptools of the list. A package without a
 # wheel for this platform is built from its source (whose hash is checked) with build tools that pip fetches unchecked.
-# uv takes a sixth of the time of pip, which follows where only pip's own settings name an index. Python compiles
+# uv takes a sixth of the time of pip. If it fails, as where only pip's settings name an index, pip follows. Python compiles
 # what it imports when it first does, and keeps that, whatever the shell says: to compile every file of every library
 # here takes 40 s.
 export PYTHONDONTWRITEBYTECODE :=

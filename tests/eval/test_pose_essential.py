@@ -119,9 +119,9 @@ def test_a_step_that_shows_few_depths_is_placed_by_the_known_ones(
     assert normalised_progress_rmse(seen, hump_clip) < 0.01
 
 
-def test_a_veil_that_thins_as_things_come_nearer_is_no_motion(hump_clip: Clip) -> None:
-    veiled = add_veil(hump_clip.frames, hump_clip.depth, hump_clip.K, 0.01, 0.88)
-    assert pitch_rmse_deg(recover_motion(hump_clip, veiled), hump_clip) < 0.018
+def test_a_veil_that_thins_as_things_come_nearer_is_no_motion(full_clip: Clip) -> None:
+    veiled = add_veil(full_clip.frames, full_clip.depth, full_clip.K, 0.01, 0.88)
+    assert pitch_rmse_deg(recover_motion(full_clip, veiled), full_clip) < 0.009
 
 
 def test_a_turn_that_nothing_foretells_is_followed() -> None:

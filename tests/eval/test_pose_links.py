@@ -78,10 +78,10 @@ def test_a_step_that_states_no_error_is_believed_all_but_wholly():
     )
 
 
-def test_links_hold_the_camera_only_pitch(hump_clip: Clip) -> None:
-    arguments = (hump_clip.frames, hump_clip.K, hump_clip.T_rig_camera)
+def test_links_hold_the_camera_only_pitch(full_clip: Clip) -> None:
+    arguments = (full_clip.frames, full_clip.K, full_clip.T_rig_camera)
     bare, tied = (
-        pitch_rmse_deg(recover_motion_essential(*arguments, settings=settings), hump_clip)
+        pitch_rmse_deg(recover_motion_essential(*arguments, settings=settings), full_clip)
         for settings in (EssentialSettings(link_span=NONE), EssentialSettings())
     )
     assert tied < 0.6 * bare

@@ -8,7 +8,7 @@ import pytest
 from catalogs.scenes.street import load_street_layout
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
-from tasks.scene.street.asphalt import asphalt_albedo
+from tasks.scene.street.asphalt import asphalt_albedo, paint_albedo
 from tasks.scene.street.bend import integrate_course, lay_route
 from tasks.scene.street.ground import bare_share
 from tasks.scene.street.layout import nearest_depth
@@ -77,12 +77,51 @@ def test_cells_are_finer_beside_an_edge() -> None:
     assert width.max() > 2 * width.min()
 
 
+ROAD = np.stack(np.meshgrid(np.arange(0, 150, 0.25), np.arange(-1.6, 5.2, 0.25)))
+"""Station and lateral position of the middles of a carriageway's cells [m]."""
+
+
+def asphalt(seed: int = 1, **changes: float) -> np.ndarray:
+    """Logarithm of the reflectance of asphalt without grain, a row for each lateral position."""
+    s, d = (axis.ravel() for axis in ROAD)
+    albedo = asphalt_albedo(
+        replace(LAYOUT, **changes), seed, s, d, np.full(len(s), 0.25), np.zeros((len(s), 2))
+    )
+    return np.log(albedo.mean(axis=1)).reshape(ROAD[0].shape)
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_asphalt_is_uneven_in_brightness_and_as_dark_as_measured(seed: int) -> None:
-    s, d = (axis.ravel() for axis in np.meshgrid(np.arange(0, 150, 0.25), np.arange(-1.6, 5.2, 0.25)))
-    albedo = asphalt_albedo(LAYOUT, seed, s, d, np.full(len(s), 0.25), np.zeros((len(s), 2)))
-    assert 0.2 < np.log(albedo).std() < 0.45
-    assert 0.04 < np.median(albedo) < 0.16  # LBNL Heat Island Group, Pavement Albedo
+    assert 0.2 < asphalt(seed).std() < 0.45
+    assert 0.04 < np.exp(np.median(asphalt(seed))) < 0.16  # LBNL Heat Island Group, Pavement Albedo
+
+
+@pytest.mark.parametrize(("trace", "across"), [("track_scale", 0.74), ("strip_scale", 0.0)])
+def test_wheels_and_oil_darken_their_own_part_of_a_lane(trace: str, across: float) -> None:
+    darker = (asphalt(**{trace: 0.6}) - asphalt(**{trace: 1.0})).mean(axis=1)
+    lateral = np.abs(ROAD[1][:, 0])
+    assert lateral[darker[lateral < 1.5].argmin() + np.argmax(lateral < 1.5)] == pytest.approx(
+        across, abs=0.2
+    )
+    assert darker.min() < -0.25 and darker[np.abs(lateral - 1.4) < 0.15].min() > -0.1
+
+
+def test_stretches_of_other_ages_differ_by_their_scale_lane_by_lane() -> None:
+    even, aged = (asphalt(renewal_scale=scale, wear_scale=0.0) for scale in (0.0, 0.3))
+    other = aged - even
+    own, next_lane = other[ROAD[1][:, 0] < 1.4], other[ROAD[1][:, 0] > 2.0]
+    assert 0.1 < other.std() < 0.5
+    assert own.mean(axis=0).std() > 5 * own.std(axis=0).mean()
+    assert np.abs(own.mean(axis=0) - next_lane.mean(axis=0)).mean() > 0.1
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_a_yellow_centre_line_crosses_no_zebra_and_leaves_the_edges_white(share: float) -> None:
+    layout = replace(LAYOUT, yellow_share=share)
+    s = layout.crossing_station + np.array([-5.0, 0.5 * layout.crossing_length, -5.0])
+    d = np.array([layout.lane_width / 2, layout.lane_width / 2, -layout.lane_width / 2])
+    red, _, blue = paint_albedo(layout, 1, s, d, np.zeros((3, 2))).T
+    assert (red > 2 * blue).tolist() == [share == 1.0, False, False]
 
 
 @pytest.mark.parametrize(("share", "low", "high"), [(0.0, 0.0, 0.0), (0.5, 0.4, 0.6), (1.0, 0.9, 1.0)])

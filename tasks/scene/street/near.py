@@ -38,7 +38,7 @@ def choose_cell(px: float, approach: float, focal_px: float, levels: Sequence[fl
     px : wanted size where the camera comes nearest [px]
     approach : how near it comes [m]
     focal_px : its focal length [px]
-    levels : cells, the finest first; it serves a camera that needs finer ones too [m]
+    levels : cells, the finest first, which also serves a camera that resolves more [m]
     """
     wanted = px * approach / focal_px
     return None if wanted > levels[-1] else next(level for level in levels if level >= wanted)

@@ -87,12 +87,16 @@ def test_the_film_drowns_more_of_the_road_everywhere_as_it_rises(parameters):
     assert shares[0].max() == 0
     assert np.all(np.diff(shares, axis=0) >= 0)
     assert np.all(np.diff([share[road].mean() for share in shares]) > 0)
-    assert (
-        shares[2][road].mean() < 0.25 < 0.75 < shares[4][road].mean()
-    )  # matt at 2 mm/h, a mirror at 25 mm/h
+    matt, mirror = shares[2][road].mean(), shares[4][road].mean()  # at 2 and 25 mm/h
+    assert matt < 0.25 and mirror > 0.75
     assert shares[-1][road].min() > 0.99
     assert all(share[~road].max() == 0 for share in shares)
-    assert np.all(np.diff([compute_wetness(film, parameters.kinds["rain"].film.water) for film in FILMS]) > 0)
+
+
+def test_the_film_that_wets_wets_all_but_one_in_e(parameters):
+    water = parameters.kinds["rain"].film.water
+    assert compute_wetness(0.0, water) == 0
+    assert compute_wetness(water.wetting_mm, water) == pytest.approx(1 - np.exp(-1))
 
 
 def test_reflection_grows_and_the_road_darkens_with_the_film(parameters, sky):

@@ -50,7 +50,7 @@ def compute_wetness(film_depth_mm: float, parameters: RoadWaterParameters) -> fl
     float
         Share [1].
     """
-    return 1 - exp(-film_depth_mm / parameters.wetting_mm)
+    return float(_wet_share(film_depth_mm, parameters.wetting_mm))
 
 
 def compute_struck_slope(rate_mm_h: float, parameters: RoadWaterParameters) -> float:
@@ -133,13 +133,18 @@ def _place_water(row, column, depth, rays, normal, eye, focal):  # type: ignore[
 
 
 @numba.njit(**INLINED)
+def _wet_share(depth, wetting):  # type: ignore[no-untyped-def]
+    return 1 - exp(-depth / wetting)
+
+
+@numba.njit(**INLINED)
 def _lay_film(row, column, film, uneven, low, wetting, texture, spread, wet, smooth):  # type: ignore[no-untyped-def]
     """Write how much of a pixel the film wets, and how much lies under its smooth surface.
 
     A road that lies low by ``low`` standard deviations has a film deeper by that, but by no larger part of a thin one.
     """
     depth = film * exp(uneven * low / (film + uneven))
-    covered = 1 - exp(-depth / wetting)
+    covered = _wet_share(depth, wetting)
     wet[row, column] = covered
     smooth[row, column] = covered * 0.5 * (1 + erf((depth - texture) / (spread * sqrt(2.0))))
 
