@@ -220,6 +220,7 @@ def build_panel(
     *,
     grain: Grain | None = None,
     glow: ArrayLike = 0.0,
+    fine: float = 1.0,
 ) -> Surfels:
     """Build a plain rectangle of square cells.
 
@@ -231,17 +232,22 @@ def build_panel(
     class_id : its class
     albedo, glow : [3] see `Surfels` [1]
     grain : variation of the reflectance from cell to cell; None for an even colour
+    fine : largest cell beside the rectangle's own edges over the others; below 1 they are sharp [1]
     """
     corner, u, v = (np.asarray(x, dtype=np.float64) for x in (origin, edge_u, edge_v))
-    nu, nv = (max(int(np.ceil(np.linalg.norm(edge) / cell)), 1) for edge in (u, v))
-    a, b = np.meshgrid((np.arange(nu) + 0.5) / nu, (np.arange(nv) + 0.5) / nv, indexing="ij")
-    tone = np.ones((nu, nv, 1))
+    sides = [(edge, float(np.linalg.norm(edge))) for edge in (u, v)]
+    cuts = [graded_cells((0.0, length), 0.8 * cell, fine, growth=1.5) for _, length in sides]
+    (a, wide), (b, high) = (
+        (cut[0] / length, cut[1] / length) for cut, (_, length) in zip(cuts, sides, strict=True)
+    )
+    a, b, wide, high = (x[..., None] for x in np.broadcast_arrays(a[:, None], b, wide[:, None], high))
+    tone = np.ones(a.shape)
     if grain is not None:
-        tone += grain.deviation * grain.rng.standard_normal((nu, nv, 1))
+        tone += grain.deviation * grain.rng.standard_normal(a.shape)
     return tile_surface(
-        corner + a[..., None] * u + b[..., None] * v,
-        u / nu,
-        v / nv,
+        corner + a * u + b * v,
+        wide * u,
+        high * v,
         class_id,
         np.asarray(albedo) * tone,
         glow=glow,

@@ -10,14 +10,24 @@ from tasks.scene.street.houses.openings import SIGN_BOTTOM, Part
 from tasks.scene.street.layout import PIXEL, StreetLayout, nearest_depth
 from tasks.scene.street.noise import named_generator
 from tasks.scene.street.plan import Building
-from tasks.scene.street.surfels import Surfels, build_box, build_tube, join_surfels, tile_surface
+from tasks.scene.street.surfels import (
+    Surfels,
+    build_panel,
+    build_tube,
+    graded_cells,
+    join_surfels,
+    tile_surface,
+)
 from tasks.scene.street.vegetation import build_leaves
 
 Floats = NDArray[np.float64]
 
 _AWNING_REACH, _AWNING_DROP, _VALANCE = 1.05, 0.45, 0.2
 _STRIPE = 0.4
-_BALCONY_REACH, _RAIL_HEIGHT, _BAR_GAP = 0.8, 0.95, 0.16
+_BALCONY_REACH, _SLAB, _RAIL_HEIGHT, _HANDRAIL = 0.8, 0.16, 0.95, 0.05
+_BAR_GAP, _BAR_WIDTH = 0.16, 0.028
+_FINE = 0.3
+"""Cell at an edge over the others [1]."""
 _SILL = 0.95
 _KIND = SemanticClass.BUILDING
 
@@ -108,27 +118,29 @@ def _build_awnings(
 def _build_balcony(
     house: Building, middle: float, front: float, floor: float, width: float, slab: Floats
 ) -> list[Surfels]:
-    out = -house.side * _BALCONY_REACH
-    d = sorted((front, front + out))
-    half = width / 2
-    bars = np.arange(-half, half + 0.01, _BAR_GAP)
-    height = (np.arange(4) + 0.5) / 4 * _RAIL_HEIGHT
-    s, z = np.meshgrid(middle + bars, floor + height, indexing="ij")
-    centre = np.stack([s, np.full(s.shape, front + out), z], axis=-1)
-    rail = tile_surface(
-        centre, [house.side * 0.028, 0, 0], [0, 0, _RAIL_HEIGHT / 4], _KIND, palette.METAL_DARK
-    )
-    ends = np.array([-half, half])[:, None] + np.zeros(5)
-    depth = front + out * (np.arange(5) + 0.5) / 5 + 0 * ends
-    sides = np.stack([middle + ends, depth, np.full(ends.shape, floor + _RAIL_HEIGHT / 2)], axis=-1)
-    side_bars = tile_surface(sides, [0, 0.03, 0], [0, 0, 0.6 * _RAIL_HEIGHT], _KIND, palette.METAL_DARK)
-    path = np.linspace(-half, half, 5)[:, None] * [1, 0, 0] + [middle, front + out, floor + _RAIL_HEIGHT]
-    return [
-        build_box([middle - half, d[0], floor - 0.16], [middle + half, d[1], floor], 0.35, _KIND, slab),
-        rail,
-        side_bars,
-        build_tube(path, 0.028, 4, _KIND, palette.METAL_DARK),
-    ]
+    """Build a slab as it is seen from below, and on its three free sides bars with a handrail."""
+    side, up = float(house.side), np.array([0, 0, 1.0])
+    wide, deep = np.array([side * width, 0, 0]), np.array([0, -side * _BALCONY_REACH, 0])
+    thick = _SLAB * up
+    wall = np.array([middle, front, floor]) - wide / 2
+    cell = {"cell": 0.36, "class_id": _KIND, "fine": _FINE}
+    height, size, _ = graded_cells((0.0, _RAIL_HEIGHT), _RAIL_HEIGHT / 3, _FINE, growth=1.5)
+    parts = [build_panel(wall - thick, wide, deep, albedo=0.6 * slab, **cell)]
+    for corner, run in ((wall, deep), (wall + deep, wide), (wall + deep + wide, -deep)):
+        length = float(np.linalg.norm(run))
+        share = np.arange(0, length, _BAR_GAP)[:, None, None] / length
+        bars = tile_surface(
+            corner + share * run + height[:, None] * up,
+            _BAR_WIDTH / length * run,
+            size[:, None] * up,
+            _KIND,
+            palette.METAL_DARK,
+        )
+        handrail = build_panel(
+            corner + _RAIL_HEIGHT * up, run, _HANDRAIL * up, albedo=palette.METAL_DARK, **cell
+        )
+        parts += [build_panel(corner - thick, run, thick, albedo=slab, **cell), bars, handrail]
+    return parts
 
 
 def _build_flower_box(
