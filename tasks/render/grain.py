@@ -35,6 +35,8 @@ _TILE = 256
 _LAST = _TILE - 1
 _TEXELS_A_WAVE = 3.0
 _PIXELS_A_WAVE = 2.0
+_SAMPLES_A_WAVE = 3.0
+_TEXELS, _RESOLVED, _SAMPLES = _TEXELS_A_WAVE / WAVES, WAVES / _PIXELS_A_WAVE, _SAMPLES_A_WAVE / WAVES
 _WALL_FACING = 0.25
 """Sine of the angle under which walls along a street are seen: flatter ones show no grain within this share [1]."""
 _UPRIGHT = np.arange(256) == SemanticClass.BUILDING
@@ -88,21 +90,23 @@ def _modulate_pixel(i, j, rgb, depth, class_id, pose, K, noise):  # type: ignore
     wide = z / K[0, 0]
     if _UPRIGHT[kind]:
         u, v, along_u, along_v = 0.8 * x + 0.6 * y, up, 0.0, 0.0
-        samples, pixel = np.int64(1), wide / _WALL_FACING
+        length, pixel = 0.0, wide / _WALL_FACING
     else:
         steep = max(abs(dz), 1e-3)
         facing = steep / sqrt(dx * dx + dy * dy + steep * steep)
         # by how much a pixel is longer on the surface than it is wide, the squares' difference
         u, v, along_u, along_v = x, y + up, wide * dx / steep, wide * dy / steep
-        # between the pixel's width and its length on the surface; samples lie as far apart
+        length = 2 * wide / facing
+        # between the pixel's width and its length on the surface
         pixel = wide / sqrt(facing)
-        samples = np.int64(ceil(2 / sqrt(facing)))
-    total = 0.0
+    total, resolved = 0.0, 1 / pixel
     for k in range(len(WAVES)):
-        share = min(WAVES[k] / pixel / _PIXELS_A_WAVE - 1, 1.0)
+        share = min(_RESOLVED[k] * resolved - 1, 1.0)
         if share > 0:
-            texels = _TEXELS_A_WAVE / WAVES[k]
-            total += share * _blur_along(noise, u, v, along_u, along_v, samples, texels)
+            samples = max(ceil(length * min(resolved, _SAMPLES[k])), 1)
+            total += share * _blur_along(
+                noise, _TEXELS[k] * u, _TEXELS[k] * v, _TEXELS[k] * along_u, _TEXELS[k] * along_v, samples
+            )
     gain = np.float32(max(1 + deviation * total, 0.3))
     for channel in range(3):
         rgb[i, j, channel] *= gain
@@ -117,20 +121,19 @@ def _modulate(rgb, depth, class_id, pose, K, noise):  # type: ignore[no-untyped-
 
 
 @numba.njit(**LAW)
-def _blur_along(noise, u, v, along_u, along_v, samples, texels):  # type: ignore[no-untyped-def]
-    """Mean of the noise at a place, over a length to either side, weighted by a triangle [1]."""
-    total, weights = 0.0, 0.0
+def _blur_along(noise, u, v, along_u, along_v, samples):  # type: ignore[no-untyped-def]
+    """Mean of the noise at a texel, over a way to either side, weighted by a triangle [1]."""
+    total, weights, step = 0.0, 0.0, 1 / samples
     for n in range(samples):
-        t = (2 * n + 1) / samples - 1
-        a, b = (u + t * along_u) * texels, (v + t * along_v) * texels
+        t = (2 * n + 1) * step - 1
+        a, b = u + t * along_u, v + t * along_v
         r, c = floor(a), floor(b)
-        ta, tb = a - r, b - c
+        ta, tb = np.float32(a - r), np.float32(b - c)
         r0, c0 = int(r) & _LAST, int(c) & _LAST
         r1, c1 = (r0 + 1) & _LAST, (c0 + 1) & _LAST
+        left = noise[r0, c0] + ta * (noise[r1, c0] - noise[r0, c0])
+        right = noise[r0, c1] + ta * (noise[r1, c1] - noise[r0, c1])
         weight = 1 - abs(t)
         weights += weight
-        total += weight * (
-            (1 - ta) * ((1 - tb) * noise[r0, c0] + tb * noise[r0, c1])
-            + ta * ((1 - tb) * noise[r1, c0] + tb * noise[r1, c1])
-        )
+        total += weight * (left + tb * (right - left))
     return total / weights
