@@ -121,7 +121,7 @@ def test_only_the_road_gets_wet(parameters, sky):
     assert np.abs(recompose_layers(picture, [layer])[~other] - picture[~other]).min() > 0
 
 
-def test_pavement_and_earth_are_darkened_and_do_not_mirror(parameters, sky):
+def test_earth_is_darkened_and_pavement_mirrors_as_the_road_does(parameters, sky):
     """By Lekner and Dorf at their own reflectance; walls, which face no rain, and cars stay as they are."""
     picture, gbuffer = flat_gbuffer(VIEW)
     film = RoadFilm(
@@ -130,8 +130,13 @@ def test_pavement_and_earth_are_darkened_and_do_not_mirror(parameters, sky):
     light = LightOnRoad(environment=CLOUDY, sky=sky, extinction=0.0)
     beside = (gbuffer.class_id == SemanticClass.ROAD) & (np.arange(160) > 100)
     inner = cv2.erode(beside.astype(np.uint8), np.ones((5, 5))) > 0
+    paved = replace(gbuffer, class_id=np.where(beside, np.uint8(SemanticClass.SIDEWALK), gbuffer.class_id))
+    road, pavement = (
+        wet_layer(picture, one, VIEW, pixel_rays(VIEW), film, light) for one in (gbuffer, paved)
+    )
+    assert pavement.add[inner].min() > 0
+    assert np.array_equal(pavement.add, road.add)
     for kind, soaks in (
-        (SemanticClass.SIDEWALK, True),
         (SemanticClass.TERRAIN, True),
         (SemanticClass.VEHICLE, False),
     ):

@@ -1,6 +1,6 @@
-"""The wet road: darker under its film, and a mirror where the film lies over the texture.
+"""The wet road and pavement: darker under a film, and a mirror where the film lies over the texture.
 
-Pavement and earth beside it drain: water fills their pores, so that they are darker, but no film stands on them.
+Kerbs and earth drain: water fills their pores, so that they are darker, but no film stands on them.
 
 Refraction moves the texture below by under a tenth of a pixel at 480x320: it is drawn where it is asked for.
 """
@@ -173,7 +173,7 @@ def wet_layer(
     p, sky = film.parameters, light.sky
     focal_px = float(shutter.K[1, 1])
     xp = find_namespace(picture)
-    road, share = soften_mask(find_classes(gbuffer.class_id, ROAD_CLASSES) & (gbuffer.alpha > 0.5))
+    road, share = soften_mask(find_classes(gbuffer.class_id, PAVED_CLASSES) & (gbuffer.alpha > 0.5))
     road &= xp.isfinite(gbuffer.depth)  # a single pixel of sky between those of a road mirrors nothing
     window = 2 * round(p.normal_window * shutter.height / 2) + 1
     # a slope s along the line of sight turns the mirrored ray by 2 s: a lobe is as high as its slopes, and
@@ -262,8 +262,10 @@ def soaked_share(gbuffer: GBuffer, road: NDArray[np.bool_]) -> NDArray[np.float3
 
 EDGE_WINDOW = 0.014
 """Width of the window in which most pixels decide whether one is road, by picture height [1]."""
-DRAINED_CLASSES = (SemanticClass.SIDEWALK, SemanticClass.KERB, SemanticClass.TERRAIN)
-"""Rough ground with pores that water runs off."""
+PAVED_CLASSES = (*ROAD_CLASSES, SemanticClass.SIDEWALK)
+"""Ground on which a film stands."""
+DRAINED_CLASSES = (SemanticClass.KERB, SemanticClass.TERRAIN)
+"""Ground that water runs off, or into."""
 LEAST_REACH = 4
 """Rows to either side over which mirrored light is averaged, from which on a pixel leaves its own light out where the
 pixel above it has some [px]."""
