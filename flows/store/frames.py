@@ -142,8 +142,8 @@ def _encode_shard(array: Path, pictures: np.ndarray) -> Iterator[bytes]:
     (sharding,) = json.loads((array / METADATA).read_bytes())["codecs"]
     codec = sharding["configuration"]["codecs"][1]["configuration"]
     settings = codec["cname"].encode(), codec["clevel"], blosc.SHUFFLE, codec["blocksize"], codec["typesize"]
-    fill_value = _choose_fill_value(EVERY_ARRAY[array.name].dtype)
-    stored = [not np.array_equal(picture, np.full_like(picture, fill_value), True) for picture in pictures]
+    is_blank = np.isnan if pictures.dtype.kind == "f" else np.logical_not
+    stored = [not is_blank(picture).all() for picture in pictures]
     index, offset = np.full((len(pictures), 2), _NO_CHUNK, "<u8"), 0
     for k, picture in enumerate(pictures):
         if stored[k] or not any(stored):

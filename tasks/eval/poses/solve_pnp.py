@@ -125,8 +125,15 @@ def _sum_by_region(
     return np.concatenate([pixel_twists.T, np.linalg.solve(H, depth_sums.T).T])
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _settle_pose(points, pixels, T, K, rules, size, weight):  # type: ignore[no-untyped-def]
+def _settle_pose(
+    points: Floats,
+    pixels: Floats,
+    T: Floats,
+    K: Floats,
+    rules: tuple[float, ...],
+    size: Floats,
+    weight: Floats,
+) -> tuple[int, float, Floats]:
     """Move T [4, 4] to the pose of least error, and fill size and weight of each residual at its last step.
 
     Returns
@@ -144,10 +151,9 @@ def _settle_pose(points, pixels, T, K, rules, size, weight):  # type: ignore[no-
         if ahead < min_inliers:
             break
         # the median length of a 2-D Gaussian error is 1.1774 of its standard deviation
-        scale = max(np.median(size[size < np.inf]) / 1.1774, noise_floor)
-        for k in range(len(size)):
-            share = min(size[k], 1e9) / (TUKEY * scale)
-            weight[k] = max(1 - share * share, 0.0) ** 2
+        scale = max(float(np.median(size[size < np.inf])) / 1.1774, noise_floor)
+        share = np.minimum(size, 1e9) / (TUKEY * scale)
+        weight[:] = np.maximum(1 - share * share, 0.0) ** 2
         H, gradient = _sum_normal_equations(points, pixels, T, K, depth_share, weight)
         if not _solve_symmetric(H, gradient, twist):
             return ahead, 0.0, H

@@ -17,7 +17,7 @@ from tasks.render.weather.coverage_field import sum_waves
 from tasks.render.weather.random_streams import stream_key, unit_number
 from tasks.render.weather.skies import Daylight
 
-OCTAVES = 6
+OCTAVES = np.int64(6)
 LEAST_UP = 0.06
 """Sine of the height that the ceiling does not go below: the earth is round [1]."""
 

@@ -219,7 +219,6 @@ def build_panel(
     albedo: ArrayLike,
     *,
     grain: Grain | None = None,
-    glow: ArrayLike = 0.0,
     fine: float = 1.0,
 ) -> Surfels:
     """Build a plain rectangle of square cells.
@@ -230,7 +229,7 @@ def build_panel(
     edge_u, edge_v : [3] its sides; their cross product points outward [m]
     cell : largest cell [m]
     class_id : its class
-    albedo, glow : [3] see `Surfels` [1]
+    albedo : [3] see `Surfels` [1]
     grain : variation of the reflectance from cell to cell; None for an even colour
     fine : largest cell beside the rectangle's own edges over the others; below 1 they are sharp [1]
     """
@@ -250,7 +249,6 @@ def build_panel(
         high * v,
         class_id,
         np.asarray(albedo) * tone,
-        glow=glow,
     )
 
 

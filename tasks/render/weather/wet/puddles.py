@@ -160,7 +160,7 @@ def _tilt_water(row, column, normal, slope, along, across, water):  # type: igno
     water[row, column, 2] = wz / length
 
 
-RIPPLE_OCTAVES, RIPPLE_ROUGHNESS = 2, 0.6
+RIPPLE_OCTAVES, RIPPLE_ROUGHNESS = np.int64(2), 0.6
 _ALONG, _ACROSS = np.uint64(1000), np.uint64(2000)
 """What the keys of the ripples' two slopes have over that of the level."""
 
@@ -193,7 +193,7 @@ def _water(  # type: ignore[no-untyped-def]
     places, turned = np.empty((2, width)), np.empty((2, width))
     size, along, across = np.empty(width), np.empty(width), np.empty(width)
     for row in range(road.shape[0]):
-        count = 0
+        count = np.int64(0)  # of one type: Numba compiles what it calls once for each
         for column in range(width):
             if not road[row, column]:
                 continue
@@ -204,7 +204,7 @@ def _water(  # type: ignore[no-untyped-def]
             count += 1
         _copy_places(count, places, turned)
         sum_waves(count, turned, size, coarsest, octaves, roughness, key, along)
-        mirroring = 0
+        mirroring = np.int64(0)
         for i in range(count):
             column = columns[i]
             _lay_film(row, column, film, uneven, along[i], wetting, texture, spread, wet, smooth)

@@ -26,8 +26,8 @@ _AWNING_REACH, _AWNING_DROP, _VALANCE = 1.05, 0.45, 0.2
 _STRIPE = 0.4
 _BALCONY_REACH, _SLAB, _RAIL_HEIGHT, _HANDRAIL = 0.8, 0.16, 0.95, 0.05
 _BAR_GAP, _BAR_WIDTH = 0.16, 0.028
-_FINE = 0.3
-"""Cell at an edge over the others [1]."""
+_PLATE, _FINE = 0.36, 0.3
+"""Cell of a balcony's plates [m], and the largest beside their edges over that [1]."""
 _SILL = 0.95
 _KIND = SemanticClass.BUILDING
 
@@ -123,9 +123,12 @@ def _build_balcony(
     wide, deep = np.array([side * width, 0, 0]), np.array([0, -side * _BALCONY_REACH, 0])
     thick = _SLAB * up
     wall = np.array([middle, front, floor]) - wide / 2
-    cell = {"cell": 0.36, "class_id": _KIND, "fine": _FINE}
     height, size, _ = graded_cells((0.0, _RAIL_HEIGHT), _RAIL_HEIGHT / 3, _FINE, growth=1.5)
-    parts = [build_panel(wall - thick, wide, deep, albedo=0.6 * slab, **cell)]
+
+    def panel(corner: Floats, edge_u: Floats, edge_v: Floats, albedo: Floats) -> Surfels:
+        return build_panel(corner, edge_u, edge_v, _PLATE, _KIND, albedo, fine=_FINE)
+
+    parts = [panel(wall - thick, wide, deep, 0.6 * slab)]
     for corner, run in ((wall, deep), (wall + deep, wide), (wall + deep + wide, -deep)):
         length = float(np.linalg.norm(run))
         share = np.arange(0, length, _BAR_GAP)[:, None, None] / length
@@ -136,10 +139,8 @@ def _build_balcony(
             _KIND,
             palette.METAL_DARK,
         )
-        handrail = build_panel(
-            corner + _RAIL_HEIGHT * up, run, _HANDRAIL * up, albedo=palette.METAL_DARK, **cell
-        )
-        parts += [build_panel(corner - thick, run, thick, albedo=slab, **cell), bars, handrail]
+        handrail = panel(corner + _RAIL_HEIGHT * up, run, _HANDRAIL * up, palette.METAL_DARK)
+        parts += [panel(corner - thick, run, thick, slab), bars, handrail]
     return parts
 
 
