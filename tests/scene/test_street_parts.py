@@ -11,12 +11,21 @@ from tasks.errors import InputError
 from tasks.scene.street.asphalt import asphalt_albedo, paint_albedo
 from tasks.scene.street.bend import integrate_course, lay_route
 from tasks.scene.street.ground import bare_share
+from tasks.scene.street.houses.adornments import _build_balcony
 from tasks.scene.street.layout import nearest_depth
 from tasks.scene.street.light import Casters, share_light, sky_share, sun_direction
 from tasks.scene.street.noise import fractal_noise, named_generator
 from tasks.scene.street.plan import plan_street
 from tasks.scene.street.sky import draw_panorama
-from tasks.scene.street.surfels import Surfels, build_box, build_panel, build_tube, graded_cells
+from tasks.scene.street.surfels import (
+    OVERLAP,
+    Surfels,
+    build_box,
+    build_panel,
+    build_tube,
+    graded_cells,
+    join_surfels,
+)
 
 LAYOUT = load_street_layout()
 OPEN = Casters(
@@ -128,6 +137,31 @@ def test_a_yellow_centre_line_crosses_no_zebra_and_leaves_the_edges_white(share:
 def test_ground_lies_bare_by_its_share(share: float, low: float, high: float) -> None:
     s, away = (axis.ravel() for axis in np.meshgrid(np.arange(0, 300, 3.0), np.arange(3, 60, 3.0)))
     assert low <= bare_share(replace(LAYOUT, bare_share=share), 1, s, away).mean() <= high
+
+
+def test_a_panel_keeps_its_area_and_ends_in_finer_cells_where_that_is_asked_for() -> None:
+    plain, sharp = (
+        build_panel([0, 0, 0], [8, 0, 0], [0, 0, 6], 1.0, SemanticClass.BUILDING, np.ones(3), fine=fine)
+        for fine in (1.0, 0.25)
+    )
+    assert len(plain) == 48
+    beside_end = sharp.centre[:, 0] < 0.25
+    assert beside_end.any()
+    assert sharp.scale[beside_end, 0].max() < 0.3 * plain.scale[0, 0]
+    for panel in (plain, sharp):
+        assert (panel.scale / OVERLAP).prod(axis=1).sum() == pytest.approx(48)
+
+
+def test_a_balcony_ends_at_its_slab_and_its_slab_has_an_underside() -> None:
+    """Seen to three standard deviations, the bars stay within a hand's breadth of slab and handrail."""
+    house = replace(plan_street(LAYOUT, 1).buildings[0], side=1, start=0.0)
+    parts = _build_balcony(house, 4.0, 6.0, 5.0, 2.0, np.ones(3))
+    standing = [part for part in parts if abs(part.axes[0, 2, 2]) < 0.5]
+    bars = join_surfels([part for part in standing if part.scale[0, 0] < 0.03])
+    assert np.abs(bars.centre[:, 2] - 5.475).max() + 3 * bars.scale[:, 1].min() < 0.475 + 0.2
+    (underside,) = [part for part in parts if part.axes[0, 2, 2] < -0.99]
+    assert underside.centre[:, 2] == pytest.approx(5.0 - 0.16)
+    assert underside.centre[:, 1].max() < 6.0
 
 
 def test_box_and_tube_face_outward() -> None:
