@@ -1,6 +1,8 @@
 """A clip's frames, one after the other, from rig poses to finished pictures in their weather."""
 
+import ctypes
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -105,7 +107,8 @@ def render_clip(
     prepared = backend.prepare_gaussians(weathered)
     route, environment, daylight = scene.route, scene.environment, scene.daylight
     display_encoded = scene.gaussians.display_encoded
-    del scene, weathered  # memory: frames need none of their Gaussians
+    del scene, weathered  # frames need none of their Gaussians
+    _return_freed_memory()
     velocity = np.gradient(T_world_camera[:, :3, 3], 1 / motion.frame_rate_hz, axis=0)
     shows_sky = display_encoded or not weather.replaces_sky
     # labels, the paper's composition and its film, a lens, a shutter and a sensor's noise are the processor's
@@ -183,6 +186,12 @@ def render_clip(
         clip["flow"], occluded = _label_flow(clip, motion.bodies, camera, field, T_world_camera, T_world_rows)
         clip["marks"] |= occluded
     return clip
+
+
+def _return_freed_memory() -> None:
+    """Give the system what arrays that are gone have held: glibc keeps it (malloc_trim(3)), others have no such call."""
+    with suppress(AttributeError, TypeError):
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def _label_flow(
