@@ -189,7 +189,7 @@ def render_clip(
 
 
 def _return_freed_memory() -> None:
-    """Give the system what arrays that are gone have held: glibc keeps it (malloc_trim(3)), others have no such call."""
+    """Give the system what arrays that are gone have held: glibc keeps it, other libraries have no such call."""
     with suppress(AttributeError, TypeError):
         ctypes.CDLL(None).malloc_trim(0)
 
