@@ -10,7 +10,7 @@ from tasks.scene.street.houses.openings import SIGN_BOTTOM, Part
 from tasks.scene.street.layout import PIXEL, StreetLayout, nearest_depth
 from tasks.scene.street.noise import named_generator
 from tasks.scene.street.plan import Building
-from tasks.scene.street.surfels import Surfels, build_box, build_tube, join_surfels, tile_surface
+from tasks.scene.street.surfels import Surfels, build_panel, build_tube, join_surfels, tile_surface
 from tasks.scene.street.vegetation import build_leaves
 
 Floats = NDArray[np.float64]
@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 _AWNING_REACH, _AWNING_DROP, _VALANCE = 1.05, 0.45, 0.2
 _STRIPE = 0.4
 _BALCONY_REACH, _RAIL_HEIGHT, _BAR_GAP = 0.8, 0.95, 0.16
-_SILL = 0.95
+_SILL, _SLAB = 0.95, 0.16
 _KIND = SemanticClass.BUILDING
 
 
@@ -108,26 +108,25 @@ def _build_awnings(
 def _build_balcony(
     house: Building, middle: float, front: float, floor: float, width: float, slab: Floats
 ) -> list[Surfels]:
-    out = -house.side * _BALCONY_REACH
-    d = sorted((front, front + out))
-    half = width / 2
-    bars = np.arange(-half, half + 0.01, _BAR_GAP)
-    height = (np.arange(4) + 0.5) / 4 * _RAIL_HEIGHT
-    s, z = np.meshgrid(middle + bars, floor + height, indexing="ij")
-    centre = np.stack([s, np.full(s.shape, front + out), z], axis=-1)
-    rail = tile_surface(
-        centre, [house.side * 0.028, 0, 0], [0, 0, _RAIL_HEIGHT / 4], _KIND, palette.METAL_DARK
-    )
-    ends = np.array([-half, half])[:, None] + np.zeros(5)
-    depth = front + out * (np.arange(5) + 0.5) / 5 + 0 * ends
-    sides = np.stack([middle + ends, depth, np.full(ends.shape, floor + _RAIL_HEIGHT / 2)], axis=-1)
-    side_bars = tile_surface(sides, [0, 0.03, 0], [0, 0, 0.6 * _RAIL_HEIGHT], _KIND, palette.METAL_DARK)
+    out, half = -house.side * _BALCONY_REACH, width / 2
+    bars, reach = np.arange(-half, half + 0.01, _BAR_GAP), out * (np.arange(5) + 0.5) / 5
+    tall = _RAIL_HEIGHT * np.array([0.08, 0.21, 0.42, 0.21, 0.08])[:, None] * [0, 0, 1]
+    rows = np.cumsum(tall, axis=0) - tall / 2 + [middle, front, floor]
+    rails = [
+        tile_surface(np.array(foot)[:, None] + rows, across, tall, _KIND, palette.METAL_DARK)
+        for foot, across in (
+            ([[bar, out, 0] for bar in bars], [house.side * 0.028, 0, 0]),
+            ([[end, away, 0] for end in (-half, half) for away in reach], [0, 0.03, 0]),
+        )
+    ]
     path = np.linspace(-half, half, 5)[:, None] * [1, 0, 0] + [middle, front + out, floor + _RAIL_HEIGHT]
+    side = house.side * width
+    corner = [middle - house.side * half, front + out, floor - _SLAB]
     return [
-        build_box([middle - half, d[0], floor - 0.16], [middle + half, d[1], floor], 0.35, _KIND, slab),
-        rail,
-        side_bars,
+        *rails,
         build_tube(path, 0.028, 4, _KIND, palette.METAL_DARK),
+        build_panel(corner, [side, 0, 0], [0, 0, _SLAB], 0.1, _KIND, slab),
+        build_panel(corner, [0, -out, 0], [side, 0, 0], 0.2, _KIND, slab),
     ]
 
 
