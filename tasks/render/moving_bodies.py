@@ -180,10 +180,9 @@ def _colour_cloud(cloud: Gaussians, radiance: Floats, display_encoded: bool) -> 
 def _mirror_from(moving: MovingBody, T_world_camera: Floats) -> Floats:
     """Return what a body's lacquer and glass mirror [N, 3], as the camera sees it in the middle of the clip [1]."""
     middle = len(T_world_camera) // 2
-    pose, own = moving.T_world_body[middle], moving.body.body
+    pose = moving.T_world_body[middle]
     eye = (T_world_camera[middle, :3, 3] - pose[:3, 3]) @ pose[:3, :3]
-    place, normal = own.gaussians.means.astype(np.float64), own.gaussians.normals.astype(np.float64)
-    return mirror_surroundings(place, normal, own.gloss, eye)
+    return mirror_surroundings(moving.body.body, eye)
 
 
 def _stand(cloud: Gaussians, T_world_body: Floats) -> Gaussians:

@@ -1,12 +1,15 @@
 """Rigid bodies of road users: of the size asked for, on the ground, closed, painted and the same each time."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tasks.conventions import SemanticClass
 from tasks.scene.bodies import KINDS, VEHICLES, build_body
-from tasks.scene.bodies.vehicles import FINISHES, Part
+from tasks.scene.bodies.vehicles import FINISHES, SHAPES, Part
 from tasks.scene.gaussians import check_gaussians
+from tasks.scene.street.cars.parked import mirror_surroundings
 
 COARSE = 0.09
 
@@ -53,6 +56,20 @@ def test_discs_face_outward_and_lamps_and_plates_are_where_they_belong() -> None
         own = (np.abs(body.albedo - FINISHES[part].albedo) < 1e-9).all(axis=1)
         assert ((means[own, 0] > 0) == front).all()
         assert (means[own, 1] > 0.3).any() and (means[own, 1] < -0.3).any()
+
+
+def test_wheel_arches_are_dark_and_glass_mirrors_as_the_eye_faces_it() -> None:
+    body, shape = build_body("saloon", cell=COARSE), SHAPES["saloon"]
+    means, normals = body.gaussians.means, body.gaussians.normals
+    hubs = (np.array(shape.axles) - 0.5) * body.size[0]
+    away = np.hypot(means[:, :1] - hubs, means[:, 2:] - shape.wheel).min(axis=1) - shape.wheel
+    assert (body.albedo[np.abs(away - 0.04) < 0.03] < 0.025).all()
+    pane = np.flatnonzero((body.gloss == FINISHES[Part.GLASS].gloss) & (normals[:, 1] > 0.9))[0]
+    for angle, least, most in ((0.0, 0.038, 0.042), (80.0, 0.3, 0.5)):
+        way = np.array([np.sin(np.radians(angle)), 0.0, 0.0]) + np.cos(np.radians(angle)) * normals[pane]
+        seen = [mirror_surroundings(replace(body, gloss=gloss), means[pane] + 5 * way)[pane]
+                for gloss in (body.gloss, np.ones_like(body.gloss))]  # fmt: skip
+        assert (least < 0.55 * seen[0] / seen[1]).all() and (0.55 * seen[0] / seen[1] < most).all()
 
 
 def test_the_same_arguments_give_the_same_bytes_and_the_seed_only_the_plates() -> None:

@@ -9,7 +9,7 @@ from catalogs.scenes.street import load_street_layout
 from tasks.conventions import SemanticClass
 from tasks.errors import InputError
 from tasks.scene.street.bend import integrate_course
-from tasks.scene.street.cars.parked import build_cars
+from tasks.scene.street.cars.parked import list_cars
 from tasks.scene.street.furniture import build_furniture
 from tasks.scene.street.objects import KINDS, list_objects, own_gaussians
 from tasks.scene.street.plan import plan_street
@@ -22,7 +22,7 @@ CLASS = {"car": SemanticClass.VEHICLE, "bin": SemanticClass.OTHER, "letter box":
 def test_every_gaussian_of_an_object_lies_in_its_box_and_has_its_class() -> None:
     plan, line = plan_street(SHORT, 7), integrate_course(SHORT)
     objects, owners, classes = list_objects(SHORT, 7)
-    built = [build_cars(SHORT, plan.cars, 7), build_furniture(SHORT, plan, 7)]
+    built = [*list_cars(plan.cars, 7), build_furniture(SHORT, plan, 7)]
     points = np.concatenate([line.to_world(surfels.centre) for surfels in built])
     assert len(points) == len(owners) and {thing.kind for thing in objects} == set(KINDS)
     for number, thing in enumerate(objects, start=1):

@@ -6,7 +6,7 @@ from tasks.scene.gaussians import Gaussians
 from tasks.scene.scene import Scene, mix_daylight
 from tasks.scene.street.bend import Course, integrate_course, lay_route
 from tasks.scene.street.boundaries import build_boundaries
-from tasks.scene.street.cars.parked import build_cars, car_boxes, car_footprints
+from tasks.scene.street.cars.parked import car_boxes, car_footprints, list_cars
 from tasks.scene.street.furniture import build_furniture, post_boxes
 from tasks.scene.street.ground import build_ground
 from tasks.scene.street.houses.adornments import awning_boxes, build_adornments
@@ -56,7 +56,7 @@ def build_street(layout: StreetLayout, seed: int) -> Scene:
             build_adornments(layout, plan.buildings, seed),
             build_gardens(layout, plan.buildings, seed),
             build_trees(layout, plan.trees, seed),
-            build_cars(layout, plan.cars, seed),
+            *list_cars(plan.cars, seed),
             build_furniture(layout, plan, seed),
         ]
     )

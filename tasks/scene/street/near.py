@@ -15,8 +15,8 @@ _IN_VIEW = 0.8
 """Cosine of the angle from the camera's axis up to which a point counts as in view [1]."""
 
 
-def measure_approach(point: Floats, T_world_camera: Floats) -> float:
-    """Return how near a camera comes to a point that it has in view; infinite where it never has [m].
+def measure_approach(point: Floats, T_world_camera: Floats) -> tuple[float, int]:
+    """Return how near a camera comes to a point that it has in view, infinite where it never has [m], and the pose.
 
     Parameters
     ----------
@@ -26,8 +26,8 @@ def measure_approach(point: Floats, T_world_camera: Floats) -> float:
     away = point - T_world_camera[:, :3, 3]
     ahead = np.einsum("fk,fk->f", away, T_world_camera[:, :3, 2])
     distance = np.linalg.norm(away, axis=1)
-    seen = ahead > _IN_VIEW * distance
-    return float(distance[seen].min()) if seen.any() else float("inf")
+    seen = np.where(ahead > _IN_VIEW * distance, distance, np.inf)
+    return float(seen.min()), int(seen.argmin())
 
 
 def choose_cell(px: float, approach: float, focal_px: float, levels: Sequence[float]) -> float | None:

@@ -56,7 +56,7 @@ def list_objects(
     """
     line, plan = integrate_course(layout), plan_street(layout, seed)
     cars = [("car", car.facing, surfels)
-            for car, surfels in zip(plan.cars, list_cars(layout, plan.cars, seed), strict=True)]  # fmt: skip
+            for car, surfels in zip(plan.cars, list_cars(plan.cars, seed), strict=True)]  # fmt: skip
     furniture = [(kind, 1, surfels) for kind, surfels in list_furniture(layout, plan, seed)]
     built = [*cars, *furniture]
     objects = tuple(

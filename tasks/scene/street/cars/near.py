@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from tasks.scene.bodies.body import Body
 from tasks.scene.bodies.vehicles import build_vehicle
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.spherical_harmonics import C0
 from tasks.scene.street.bend import integrate_course
-from tasks.scene.street.cars.parked import COARSE, build_parked, draw_look, place_body
+from tasks.scene.street.cars.parked import COARSE, build_parked, draw_look, mirror_surroundings, place_body
 from tasks.scene.street.layout import StreetLayout
 from tasks.scene.street.near import choose_cell, measure_approach, replace_discs
 from tasks.scene.street.objects import list_objects, own_gaussians
@@ -54,8 +55,9 @@ def detail_cars(
     line = integrate_course(layout)
     gone, parts = [], []
     for number, car in enumerate(cars, start=1):
-        middle = line.to_world(np.array([[car.station, car.lateral, 0.7]]))[0]
-        cell = choose_cell(CELL_PX, measure_approach(middle, T_world_camera), focal_px, LEVELS)
+        foot = line.to_world(np.array([[car.station, car.lateral, 0.0]]))[0]
+        distance, nearest = measure_approach(foot + np.array([0.0, 0.0, 0.7]), T_world_camera)
+        cell = choose_cell(CELL_PX, distance, focal_px, LEVELS)
         if cell is None:
             continue
         rows = first + np.flatnonzero(owners == number)
@@ -65,7 +67,9 @@ def detail_cars(
             for member in fields(Gaussians)
             if isinstance(value := getattr(gaussians, member.name), np.ndarray)
         }
-        parts.append(_light_fine(_make_fine(layout, seed, car, cell), replace(gaussians, **coarse)))
+        axes = line.to_world_directions(np.full(3, car.station), np.diag([car.facing, car.facing, 1.0]))
+        eye = (axes * (T_world_camera[nearest, :3, 3] - foot)).sum(axis=1)
+        parts.append(_light_fine(_make_fine(layout, seed, car, cell), replace(gaussians, **coarse), eye))
     if not parts:
         return gaussians
     return replace_discs(gaussians, np.concatenate(gone), parts)
@@ -78,15 +82,14 @@ class _FineCar:
     Parameters
     ----------
     members : of its `Gaussians`, but for those that the light decides
-    albedo, glow : float64 [N, 3] reflectance and mirrored radiance of its discs [1]
-    coarse_albedo, coarse_glow : the same of the coarse discs [1]
+    body : in its own axes
+    coarse_albedo, coarse_glow : float64 [M, 3] reflectance and mirrored radiance of the coarse discs [1]
     nearest : int64 [N, `_ALIKE`] coarse discs [1]
     weight : float64 [N, `_ALIKE`] of the light of each [1]
     """
 
     members: dict[str, NDArray[np.generic]]
-    albedo: Floats
-    glow: Floats
+    body: Body
     coarse_albedo: Floats
     coarse_glow: Floats
     nearest: NDArray[np.int64]
@@ -111,22 +114,23 @@ def _make_fine(layout: StreetLayout, seed: int, car: Car, cell: float) -> _FineC
         "surroundings": _count_surroundings(car.model, draw_look(car, seed)[1], cell),
     }
     return _FineCar(
-        members=members, albedo=new.albedo, glow=new.glow, coarse_albedo=old.albedo, coarse_glow=old.glow,
+        members=members, body=body, coarse_albedo=old.albedo, coarse_glow=old.glow,
         nearest=nearest, weight=weight / weight.sum(axis=1, keepdims=True),
     )  # fmt: skip
 
 
-def _light_fine(car: _FineCar, coarse: Gaussians) -> Gaussians:
-    """Return the fine discs in the light of the coarse ones."""
+def _light_fine(car: _FineCar, coarse: Gaussians, eye: Floats) -> Gaussians:
+    """Return the fine discs in the light of the coarse ones, and what they mirror to an eye in the body's axes [m]."""
+    glow = mirror_surroundings(car.body, eye)
     radiance = np.maximum(coarse.sh[:, 0].astype(np.float64) * C0 + 0.5, 0)
     light = np.maximum(radiance - car.coarse_glow, 0) / car.coarse_albedo
-    colour = car.albedo * np.einsum("nk,nkc->nc", car.weight, light[car.nearest]) + car.glow
+    colour = car.body.albedo * np.einsum("nk,nkc->nc", car.weight, light[car.nearest]) + glow
     out: dict[str, Any] = car.members | {"sh": ((colour - 0.5) / C0).astype(np.float32)[:, None]}
     if coarse.surroundings is None:
         out["surroundings"] = None
     if coarse.light is not None:
         shares = np.einsum("nk,nkc->nc", car.weight, coarse.light[car.nearest].astype(np.float64))
-        shares[:, 3] = car.glow.sum(axis=1) / np.maximum(colour.sum(axis=1), 1e-9)
+        shares[:, 3] = glow.sum(axis=1) / np.maximum(colour.sum(axis=1), 1e-9)
         out["light"] = np.clip(shares, 0, 1).astype(np.float32)
     return replace(coarse, **out)
 

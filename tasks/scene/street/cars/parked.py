@@ -8,10 +8,10 @@ from tasks.scene.bodies.body import Body
 from tasks.scene.bodies.solids import tangents
 from tasks.scene.bodies.vehicles import SHAPES, build_vehicle
 from tasks.scene.street import palette
-from tasks.scene.street.layout import EYE_HEIGHT, StreetLayout
+from tasks.scene.street.layout import EYE_HEIGHT
 from tasks.scene.street.noise import named_generator
 from tasks.scene.street.plan import Car
-from tasks.scene.street.surfels import Surfels, join_surfels
+from tasks.scene.street.surfels import Surfels
 
 Floats = NDArray[np.float64]
 
@@ -26,28 +26,15 @@ _SKY, _HOUSES, _ROAD = (
     np.array([0.16, 0.15, 0.14]),
     np.array([0.13, 0.13, 0.125]),
 )
-_RIDGE, _RIDGE_WAVES = (0.42, 0.11, 0.06), (2, 5, 11)
-"""Upward part of the direction to the mirrored ridges: mean, variation and width of the edge; its waves a turn [1]."""
+_RIDGE, _RIDGE_WAVES = (0.75, 0.08, 0.06), (2, 5, 11)
+"""Height of the mirrored houses by their distance, its variation, and width of their edge; its waves a turn [1]."""
 
 
-def build_cars(layout: StreetLayout, parked: tuple[Car, ...], seed: int) -> Surfels:
-    """Build the surfels of all parked cars, class vehicle.
-
-    Parameters
-    ----------
-    layout : dimensions
-    parked : the cars
-    seed : the street's seed [1]
-    """
-    return join_surfels(list_cars(layout, parked, seed))
-
-
-def list_cars(layout: StreetLayout, parked: tuple[Car, ...], seed: int) -> list[Surfels]:
-    """Build the surfels of each parked car.
+def list_cars(parked: tuple[Car, ...], seed: int) -> list[Surfels]:
+    """Build the surfels of each parked car, class vehicle.
 
     Parameters
     ----------
-    layout : dimensions
     parked : the cars
     seed : the street's seed [1]
     """
@@ -96,7 +83,7 @@ def place_body(body: Body, car: Car) -> Surfels:
         axes=np.stack([*tangents(normal), normal], axis=1) * turn,
         scale=body.gaussians.scales[:, :2].astype(np.float64),
         albedo=body.albedo,
-        glow=mirror_surroundings(centre, normal, body.gloss, eye),
+        glow=mirror_surroundings(body, eye),
         openness=body.openness,
         opacity=body.gaussians.opacities.astype(np.float64),
         class_id=np.full(len(centre), SemanticClass.VEHICLE, dtype=np.uint8),
@@ -127,18 +114,25 @@ def car_footprints(parked: tuple[Car, ...]) -> Floats:
     return np.array(rectangles).reshape(-1, 2, 2)
 
 
-def mirror_surroundings(centre: Floats, normal: Floats, gloss: Floats, eye: Floats) -> Floats:
-    """Return the radiance [N, 3] mirrored towards the eye, after Schlick (1994), doi:10.1111/1467-8659.1330233.
+def mirror_surroundings(body: Body, eye: Floats) -> Floats:
+    """Return the radiance [N, 3] that a body mirrors, after Schlick (1994), doi:10.1111/1467-8659.1330233.
 
-    It is that of sky, of houses below a ridge that rises and falls around, and of the road.
+    It is that of sky, of houses along the road, and of the road itself.
+
+    Parameters
+    ----------
+    body : in its own axes
+    eye : float64 [3] to which it is mirrored, in the same axes [m]
     """
-    view = eye - centre
+    normal, gloss = body.gaussians.normals.astype(np.float64), body.gloss
+    view = eye - body.gaussians.means
     view /= np.linalg.norm(view, axis=1, keepdims=True)
     cosine = np.clip((normal * view).sum(axis=1), 0.0, 1.0)
     along = 2 * cosine[:, None] * normal - view
     up, turn = along[:, 2:], np.arctan2(along[:, 1:2], along[:, :1])
     share = gloss + (1 - gloss) * (1 - cosine) ** 5 * (gloss > 0)
-    ridge = _RIDGE[0] + _RIDGE[1] * sum(np.sin(k * turn + k * k) / np.sqrt(k) for k in _RIDGE_WAVES)
+    waves = sum(np.sin(k * turn + k * k) / np.sqrt(k) for k in _RIDGE_WAVES)
+    ridge = np.sin(np.arctan(np.maximum(_RIDGE[0] * np.abs(np.sin(turn)) + _RIDGE[1] * waves, 0.02)))
     sky = np.clip((up - ridge) / _RIDGE[2] + 0.5, 0.0, 1.0)
     road = np.clip(-up / 0.1 + 0.5, 0.0, 1.0)
     fronts = _HOUSES * (1 + 0.5 * np.sign(np.sin(19 * turn)) * np.clip(4 * up * (1 - up / ridge), 0, 1))

@@ -20,7 +20,7 @@ from tasks.scene.street.houses.openings import (
 from tasks.scene.street.layout import EYE_HEIGHT, PIXEL, StreetLayout, nearest_depth
 from tasks.scene.street.noise import named_generator
 from tasks.scene.street.plan import Building
-from tasks.scene.street.surfels import Surfels, graded_cells, join_surfels, tile_surface
+from tasks.scene.street.surfels import Surfels, build_panel, graded_cells, join_surfels, tile_surface
 
 Floats = NDArray[np.float64]
 
@@ -37,6 +37,8 @@ _FINE_GROWTH = 0.5
 """Width of a cell by its distance from the nearest edge of a fine front; three hundredths of its disc pass that [1]."""
 _RECESS = np.array([0.0, -0.03, 0.10, 0.14, -0.06, -0.08, -0.04])
 """Distance of each part behind the wall's surface [m]."""
+_BEHIND = 1.0
+"""Distance of a fine front's back behind the wall's surface [m]."""
 _REVEAL, _REVEAL_CELLS = (-0.03, 0.16), 4
 """Distance behind the wall's surface at which a reveal begins and ends [m], and cells between [1]."""
 
@@ -85,7 +87,17 @@ def build_facades(
     )
     if edges is None or None in edges.values():
         return fronts
-    return join_surfels([fronts, _build_reveals(cells, looks, front, side)])
+    backs = [_back_front(layout, buildings[index], looks[index]) for index in edges]
+    return join_surfels([fronts, _build_reveals(cells, looks, front, side), *backs])
+
+
+def _back_front(layout: StreetLayout, house: Building, look: Look) -> Surfels:
+    """Close a house behind its front: between two columns of cells a twentieth of the light passes."""
+    front = layout.front_position(house.side) + house.side * (house.setback + _BEHIND)
+    rise = house.eaves_height(layout) - layout.kerb_height
+    origin = [house.start + house.width * (house.side < 0), front, layout.kerb_height]
+    across, wall = [house.side * house.width, 0, 0], look.colours[Part.WALL]
+    return build_panel(origin, across, [0, 0, rise], 0.5, SemanticClass.BUILDING, wall)
 
 
 def _build_reveals(cells: FrontCells, looks: list[Look], front: Floats, side: Floats) -> Surfels:
@@ -169,7 +181,7 @@ def _cut_bays(
     whole = [(Strip(0.0, columns), Strip(0.0, rows))]
     grids = []
     for columns_of, rows_of in whole if edge is None else _part_front(columns, rows):
-        x, width, across = _cut_strip(columns_of, cell[0], fine[0])
+        x, width, across = _cut_strip(columns_of, cell[0], fine[0], house.bay)
         y, height, up = _cut_strip(rows_of, cell[1], fine[1])
         b, i, j = np.meshgrid(bay, np.arange(len(x)), np.arange(len(y)), indexing="ij")
         grids.append(
@@ -221,16 +233,21 @@ def _split_pattern(pattern: Pattern) -> list[Strip]:
     return strips
 
 
-def _cut_strip(strip: Strip, cell: float, edge: float | None) -> tuple[Floats, Floats, NDArray[np.int64]]:
+def _cut_strip(
+    strip: Strip, cell: float, edge: float | None, bay: float = np.inf
+) -> tuple[Floats, Floats, NDArray[np.int64]]:
     """Return middle [m], width [m] and part of the cells along one side of a grid: walls are cut finely at their ends,
-    and panes and boards too where an ``edge`` says how finely."""
+    and panes and boards too where an ``edge`` says how finely; where the next ``bay`` [m] begins a wall has no end."""
     kinds = np.array([part for _, part in strip.parts])
     breaks = strip.begin + np.cumsum([0.0, *(size for size, _ in strip.parts)])
     if edge is None:
         even = np.isin(kinds, (Part.GLASS, Part.SIGN, Part.PLINTH))
         middle, width, interval = graded_cells(breaks, cell, np.where(even, 1.0, 0.36))
     else:
+        if strip.edged and bay < np.inf and kinds[0] == Part.WALL:
+            breaks += np.diff(breaks) * ([-1, 0] if strip.begin == 0 else [0, 1])
         middle, width, interval = graded_cells(
             breaks, cell, edge / cell if strip.edged else 1.0, _FINE_GROWTH
         )
-    return middle, width, kinds[interval]
+    own = (middle > 0) & (middle < bay)
+    return middle[own], width[own], kinds[interval[own]]

@@ -61,7 +61,7 @@ def _approach_front(house: Building, layout: StreetLayout, T_world_camera: Float
     station = np.linspace(house.start, house.start + house.width, 4)
     front = np.full(4, layout.front_position(house.side) + house.side * house.setback)
     foot = integrate_course(layout).to_world(np.column_stack([station, front, np.full(4, EYE_HEIGHT)]))
-    return min(measure_approach(point, T_world_camera) for point in foot)
+    return min(measure_approach(point, T_world_camera)[0] for point in foot)
 
 
 @lru_cache(maxsize=4)
