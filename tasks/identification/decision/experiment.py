@@ -70,7 +70,7 @@ def plan_next_experiment(
             model, theta, slots=slots
         )
         planned.append((plan, model, whiten_channels(change, rho, sigma, model.sampled)))
-    best = ("", -1.0)
+    best = ("", evidence.rules.least_expected_d2)
     # what the nuisances take away makes a distance smaller only: the largest come first, and the rest are not taken
     for plan, model, change in sorted(planned, key=lambda run: -float(run[2] @ run[2])):
         if float(change @ change) <= best[1]:
@@ -85,6 +85,4 @@ def plan_next_experiment(
         distance = float(change @ change - q @ q - shared @ np.linalg.solve(session, shared))
         if distance > best[1]:
             best = (plan, distance)
-    if best[1] < evidence.rules.least_expected_d2:
-        return None
-    return Experiment(between=between, plan=best[0], expected_d2=best[1])
+    return Experiment(between=between, plan=best[0], expected_d2=best[1]) if best[0] else None

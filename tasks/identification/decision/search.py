@@ -146,7 +146,7 @@ def find_explanations(
     singles = search_explanations(grams, most=1, width=1, spread=False, forms=False)
     first = _refine_first(singles, state, null, rules)
     if first is not None:
-        state = _settle_scales(_move_to(first, state, null))
+        state = _settle_scales(_move_to(first, state))
     # the shape of a form does not follow from a run or two
     for forms in (False, True) if len(models) >= FEWEST else (False,):
         state, grams, found = _settle_explanation(state, null, columns, rules, forms=forms)
@@ -157,25 +157,19 @@ def find_explanations(
 
 def _refine_first(
     found: list[Explanation], state: _SearchState, null: Fit, rules: DecisionRules
-) -> Explanation | None:
-    """Return the single candidate that explains most through the simulation, of those that seem to; None without one.
+) -> Fit | None:
+    """Return the fit of the single candidate that explains most, of those that seem to; None without one.
 
     A linear estimate of a delay, or of what decides when an anti-lock brake acts, is a hint.
     """
     hopeful = [e for e in found if e.members and e.log_odds > 0.0][:REFINED]
-    fits = [
-        fit_hypotheses(
-            state.evidence.train, make_hypotheses(e, state.evidence),
-            widen_session(e, state.evidence.session_sigma), session=null.session, iterations=STEPS,
-        )
-        for e in hopeful
-    ]  # fmt: skip
+    fits = [_fit_explanation(e, state, null) for e in hopeful]
     gains = [
         0.5 * (null.objective - f.objective) + sum(m.log_prior for m in e.members)
         for f, e in zip(fits, hopeful, strict=True)
     ]
     # the odds of what is fitted are less than its gain
-    return hopeful[int(np.argmax(gains))] if max(gains, default=0.0) > log(rules.named_odds) else None
+    return fits[int(np.argmax(gains))] if max(gains, default=0.0) > log(rules.named_odds) else None
 
 
 def _settle_explanation(
@@ -200,7 +194,7 @@ def _settle_explanation(
             break
         if forms and here is not None and not _is_worth_it(found[0], here, grams, rules):
             break
-        moved = _move_to(named, state, null)
+        moved = _move_to(_fit_explanation(named, state, null), state)
         lost = _compute_cost(moved.fitted, named) - _compute_cost(
             state.fitted, named if here is None else here
         )
@@ -338,11 +332,16 @@ def widen_session(explanation: Explanation, sigma: NDArray[np.float64]) -> NDArr
     return wide
 
 
-def _move_to(explanation: Explanation, state: _SearchState, null: Fit) -> _SearchState:
-    """Return the runs about the fit of an explanation."""
-    parts = make_hypotheses(explanation, state.evidence, state.fitted)
-    sigma = widen_session(explanation, state.evidence.session_sigma)
-    fitted = fit_hypotheses(state.evidence.train, parts, sigma, session=null.session, iterations=STEPS)
+def _fit_explanation(explanation: Explanation, state: _SearchState, null: Fit) -> Fit:
+    """Return the fit of an explanation through the simulation, from the fit without candidates on."""
+    return fit_hypotheses(
+        state.evidence.train, make_hypotheses(explanation, state.evidence, state.fitted),
+        widen_session(explanation, state.evidence.session_sigma), session=null.session, iterations=STEPS,
+    )  # fmt: skip
+
+
+def _move_to(fitted: Fit, state: _SearchState) -> _SearchState:
+    """Return the runs about a fit."""
     evidence = differentiate_at(state.evidence, fitted)
     return replace(state, evidence=evidence, fitted=_refit(evidence, fitted), refuted=False)
 

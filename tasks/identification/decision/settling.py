@@ -45,6 +45,8 @@ def fit_named(finding: Finding, opened: OpenExplanation) -> Fit:
     finding : the runs and what was fitted to them
     opened : the explanation
     """
+    if not opened.named and finding.fitted is finding.null:
+        return finding.null
     kept = keep_members(opened.explanation, opened.named)
     evidence, parts = finding.evidence, make_hypotheses(kept, finding.evidence, finding.fitted)
     sigma = widen_session(kept, evidence.session_sigma)
