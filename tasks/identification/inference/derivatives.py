@@ -29,6 +29,8 @@ STEPS = (5e-4, 0.02)
 """Smallest and largest step of a number of the file: a car that stops sooner stands where another brakes [1]."""
 KNOT_STEP = (30.0, 0.01, 30.0)
 """Step of a knot at each disturbed port [N, 1, N m]."""
+HAT = np.array([0.0, 1.0, 0.0])
+"""A disturbance that is 1 at one knot [1]."""
 
 
 def differentiate_run(
@@ -66,24 +68,18 @@ def differentiate_run(
     dt = model.run.interval
     knots = tuple(int(np.ceil(model.samples * dt / spacing)) + 1 for spacing in KNOT_SPACING)
     hats = [
-        Slot(
-            port=port,
-            variable="time",
-            origin=(k - 1) * spacing,
-            spacing=spacing,
-            values=np.array([0.0, step, 0.0]),
-        )
+        Slot(port=port, variable="time", origin=(k - 1) * spacing, spacing=spacing, values=step * HAT)
         for port, spacing, step, count in zip(DISTURBED, KNOT_SPACING, KNOT_STEP, knots, strict=True)
         for k in range(count)
     ]
     firsts = [min(max(int(hat.origin / dt), 0), model.samples - 1) for hat in hats]
-    columns += list(compute_slot_quotients(point, hats, firsts))
+    own = np.concatenate((columns, compute_slot_quotients(point, hats, firsts)))
     steps = np.clip(0.5 * np.array(tolerances.file_numbers), *STEPS)
     session = [
         compute_quotient(point, _shift_parameter(base, i, step), step)
         for i, step in zip(SESSION_INDEX, steps, strict=True)
     ]
-    nuisance = whiten_channels(np.stack(columns, axis=-1), rho, sigma, model.sampled)
+    nuisance = whiten_channels(np.moveaxis(own, 0, -1), rho, sigma, model.sampled)
     evidence = RunEvidence(
         model=model,
         rho=rho,
@@ -91,7 +87,7 @@ def differentiate_run(
         nuisance=nuisance,
         knots=knots,
         information=nuisance.T @ nuisance,
-        session=whiten_channels(np.stack(session, axis=-1), rho, sigma, model.sampled),
+        session=whiten_channels(np.moveaxis(np.array(session), 0, -1), rho, sigma, model.sampled),
         library=np.zeros((len(nuisance), 1)),
         others=np.zeros((len(nuisance), 1)),
         factor=np.empty(0),
@@ -135,7 +131,7 @@ def differentiate_by_library(
             else compute_quotient(point, _shift_parameter(theta, leading.index, leading.step), leading.step)
         )
     columns, more = (
-        whiten_channels(np.stack(part, axis=-1), run.rho, run.sigma, run.model.sampled)
+        whiten_channels(np.moveaxis(np.array(part), 0, -1), run.rho, run.sigma, run.model.sampled)
         for part in (library, others or [np.zeros_like(library[0])])
     )
     return replace(run, library=columns, others=more)

@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cholesky, solve_triangular
+from scipy.linalg import cholesky
+from scipy.linalg.lapack import dtrtrs
 
 from tasks.campaign.campaign import CHANNELS, FILE_NUMBERS, Tolerances
 from tasks.identification.inference.disturbance import (
@@ -141,7 +142,7 @@ class RunEvidence:
         ----------
         projected : float64 [D] a residual's `project_on_nuisances`
         """
-        return solve_triangular(self.factor, projected, lower=True, trans="T", check_finite=False)
+        return np.asarray(dtrtrs(self.factor, projected, lower=1, trans=1)[0])
 
     def project_on_nuisances(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return factor^-1 nuisance' x, the part of x that the nuisances can explain, float64 [D] or [D, P].
@@ -159,7 +160,7 @@ class RunEvidence:
         ----------
         product : float64 [D] or [D, P] nuisance' x
         """
-        return solve_triangular(self.factor, product, lower=True, check_finite=False)
+        return np.asarray(dtrtrs(self.factor, product, lower=1)[0])
 
 
 def move_by_offsets(
@@ -197,10 +198,7 @@ def set_disturbance_prior(
     precision = compute_prior_precision(evidence.knots, tolerances, disturbance)[0]
     factor = cholesky(evidence.information + precision, lower=True, check_finite=False)
     changed = replace(evidence, factor=factor)
-    return replace(
-        changed,
-        session_q=changed.project_on_nuisances(changed.session),
-    )
+    return replace(changed, session_q=changed.project_on_nuisances(changed.session))
 
 
 @dataclass(frozen=True, kw_only=True)

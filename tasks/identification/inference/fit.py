@@ -81,16 +81,13 @@ class Fit:
 
 @dataclass(frozen=True, kw_only=True)
 class _State:
-    """Where a fit stands: parameters, session, the runs linearised there, and their misfit with the session's prior.
-
-    Once parameters and offsets had to move one after the other (not ``together``), the next steps do so too.
-    """
+    """Where a fit stands: parameters, session, the runs linearised there, their misfit with the session's prior."""
 
     values: NDArray[np.float64]
     session: NDArray[np.float64]
     points: tuple[LinearisedRun, ...]
     misfit: float
-    together: bool = True
+    together: bool = True  # False once parameters and offsets had to move one after the other
 
 
 def fit_hypotheses(
@@ -246,8 +243,7 @@ def _step_along(
         )
         points = linearise_at(evidence, parts, x, s, own)
         if _compute_total_misfit(points, prior, s) < here.misfit:
-            if not together:
-                points = move_linearisation_points(evidence, parts, x, s, points)
+            points = points if together else move_linearisation_points(evidence, parts, x, s, points)
             misfit = _compute_total_misfit(points, prior, s)
             return _State(values=x, session=s, points=points, misfit=misfit, together=together)
         if foreseen < 0.1:

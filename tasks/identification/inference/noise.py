@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from tasks.campaign.campaign import BRAKING_PRESSURE, CHANNELS, Campaign, Run
@@ -194,17 +195,21 @@ def whiten_channels(
     -------
     float64 [7 N] or [7 N, P]; 0 where a channel has no sample
     """
-    if sampled is None:
-        shape = (1, -1) + (1,) * (x.ndim - 2)
-        r, s = rho.reshape(shape), sigma.reshape(shape)
-        white = np.concatenate((x[:1] / s, (x[1:] - r * x[:-1]) / (s * np.sqrt(1.0 - r**2))))
-    else:
-        white = np.zeros_like(x)
-        for c in range(len(rho)):
-            own = x[sampled[:, c], c]
-            driven = (own[1:] - rho[c] * own[:-1]) / (sigma[c] * np.sqrt(1.0 - rho[c] ** 2))
-            white[sampled[:, c], c] = np.concatenate((own[:1] / sigma[c], driven))
+    known = np.ones(x.shape[:2], dtype=bool) if sampled is None else sampled
+    white = _whiten_samples(x.reshape(*x.shape[:2], -1), known, rho, sigma)
     return white.reshape((-1, *x.shape[2:]))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _whiten_samples(x, sampled, rho, sigma):  # type: ignore[no-untyped-def]
+    white = np.zeros(x.shape)
+    for c in range(x.shape[1]):
+        rows, driven = np.flatnonzero(sampled[:, c]), sigma[c] * np.sqrt(1.0 - rho[c] ** 2)
+        for i in range(len(rows)):
+            now, before = x[rows[i], c], x[rows[i - 1], c]
+            for k in range(x.shape[2]):
+                white[rows[i], c, k] = (now[k] - rho[c] * before[k]) / driven if i else now[k] / sigma[c]
+    return white
 
 
 def unwhiten_channels(

@@ -114,7 +114,8 @@ def compute_slot_quotients(point: Point, hats: Sequence[Slot], firsts: Sequence[
     model, car = point.model, point.car
     grown = [form.slot for form in car.vehicle.forms]
     forms = [*grown, *compute_grade_force(model.run, car.vehicle), *point.slots]
-    motion = np.empty((len(hats), model.samples, len(SENSED)))
+    # what follows works on one column after the other
+    motion = np.moveaxis(np.empty((len(SENSED), len(hats), model.samples)), 0, -1)
     motion[:] = point.simulated.history[:, SENSED]
     _integrate_branches(
         point.simulated.states,
