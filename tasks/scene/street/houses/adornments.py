@@ -14,7 +14,6 @@ from tasks.scene.street.surfels import (
     Surfels,
     build_panel,
     build_tube,
-    graded_cells,
     join_surfels,
     tile_surface,
 )
@@ -26,7 +25,9 @@ _AWNING_REACH, _AWNING_DROP, _VALANCE = 1.05, 0.45, 0.2
 _STRIPE = 0.4
 _BALCONY_REACH, _SLAB, _RAIL_HEIGHT, _HANDRAIL = 0.8, 0.16, 0.95, 0.05
 _BAR_GAP, _BAR_WIDTH = 0.16, 0.028
-_PLATE, _FINE = 0.36, 0.3
+_BAR_CELLS = np.array([0.06, 0.14, 0.3, 0.3, 0.14, 0.06])
+"""Cells of a bar by its height: the last are short, so that it ends where it does [1]."""
+_PLATE, _FINE = 0.5, 0.25
 """Cell of a balcony's plates [m], and the largest beside their edges over that [1]."""
 _SILL = 0.95
 _KIND = SemanticClass.BUILDING
@@ -123,7 +124,8 @@ def _build_balcony(
     wide, deep = np.array([side * width, 0, 0]), np.array([0, -side * _BALCONY_REACH, 0])
     thick = _SLAB * up
     wall = np.array([middle, front, floor]) - wide / 2
-    height, size, _ = graded_cells((0.0, _RAIL_HEIGHT), _RAIL_HEIGHT / 3, _FINE, growth=1.5)
+    size = _RAIL_HEIGHT * _BAR_CELLS
+    height = np.cumsum(size) - size / 2
 
     def panel(corner: Floats, edge_u: Floats, edge_v: Floats, albedo: Floats) -> Surfels:
         return build_panel(corner, edge_u, edge_v, _PLATE, _KIND, albedo, fine=_FINE)
