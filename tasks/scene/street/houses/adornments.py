@@ -109,7 +109,7 @@ def _build_balcony(
     house: Building, middle: float, front: float, floor: float, width: float, slab: Floats
 ) -> list[Surfels]:
     out, half = -house.side * _BALCONY_REACH, width / 2
-    bars, reach = np.arange(-half, half + 0.01, _BAR_GAP), out * (np.arange(5) + 0.5) / 5
+    bars, reach = np.arange(-half, half + 0.01, _BAR_GAP), out * (np.arange(4) + 0.5) / 4
     tall = _RAIL_HEIGHT * np.array([0.08, 0.21, 0.42, 0.21, 0.08])[:, None] * [0, 0, 1]
     rows = np.cumsum(tall, axis=0) - tall / 2 + [middle, front, floor]
     rails = [
@@ -125,8 +125,8 @@ def _build_balcony(
     return [
         *rails,
         build_tube(path, 0.028, 4, _KIND, palette.METAL_DARK),
-        build_panel(corner, [side, 0, 0], [0, 0, _SLAB], 0.1, _KIND, slab),
-        build_panel(corner, [0, -out, 0], [side, 0, 0], 0.2, _KIND, slab),
+        build_panel(corner, [side, 0, 0], [0, 0, _SLAB], 0.12, _KIND, slab),
+        build_panel(corner, [0, -out, 0], [side, 0, 0], 0.3, _KIND, slab),
     ]
 
 
