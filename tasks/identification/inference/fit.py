@@ -81,13 +81,12 @@ class Fit:
 
 @dataclass(frozen=True, kw_only=True)
 class _State:
-    """Where a fit stands: parameters, session, the runs linearised there, their misfit with the session's prior."""
+    """Where a fit stands: parameters, session, the runs linearised there, and their misfit with the session's prior."""
 
     values: NDArray[np.float64]
     session: NDArray[np.float64]
     points: tuple[LinearisedRun, ...]
     misfit: float
-    together: bool = True  # False once parameters and offsets had to move one after the other
 
 
 def fit_hypotheses(
@@ -233,7 +232,7 @@ def _step_along(
         for run, point, (_, q) in zip(evidence, here.points, slopes, strict=True)
     )
     for share, together in TRIALS:
-        if (share * (2.0 - share) * foreseen < SETTLED and share < 1.0) or together > here.together:
+        if share * (2.0 - share) * foreseen < SETTLED and share < 1.0:
             continue
         there = np.clip(np.concatenate((here.values, here.session)) + share * move, *bounds)
         x, s = there[:k], there[k:]
@@ -243,9 +242,9 @@ def _step_along(
         )
         points = linearise_at(evidence, parts, x, s, own)
         if _compute_total_misfit(points, prior, s) < here.misfit:
-            points = points if together else move_linearisation_points(evidence, parts, x, s, points)
-            misfit = _compute_total_misfit(points, prior, s)
-            return _State(values=x, session=s, points=points, misfit=misfit, together=together)
+            if not together:
+                points = move_linearisation_points(evidence, parts, x, s, points)
+            return _State(values=x, session=s, points=points, misfit=_compute_total_misfit(points, prior, s))
         if foreseen < 0.1:
             break
     return None
