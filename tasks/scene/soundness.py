@@ -45,7 +45,7 @@ def measure_soundness(scene: Scene) -> dict[str, float]:
     ``road_coverage`` of the tracks and ``road_height``, the largest height of a cell's road above the route or below
     it [m]; ``in_the_way``, the largest area of discs in 2 m of the car's space [m2]; ``afloat``, the share of discs
     with no neighbours; ``width`` of the carriageway [m]; ``tightest_radius`` [m]; ``steepest_grade`` [1];
-    ``vehicle_height``, NaN without vehicles [m]; ``route_length`` [m].
+    ``vehicle_height`` beside the route, NaN without vehicles [m]; ``route_length`` [m].
     """
     cloud, route = scene.gaussians, scene.route
     points = cloud.means.astype(np.float64)
@@ -67,7 +67,8 @@ def measure_soundness(scene: Scene) -> dict[str, float]:
     inside = on_route & (np.abs(lateral) < half) & (height > low) & (height < high)
     in_the_way = np.bincount(cell[inside], area[inside], minlength=1)
     _, curvature = sample_curvature(route)
-    vehicles = cloud.class_id == SemanticClass.VEHICLE
+    # beyond its end the route's line says nothing of the ground
+    vehicles = (cloud.class_id == SemanticClass.VEHICLE) & on_route
     return {
         "road_coverage": float(np.min(held)),
         "road_height": float(np.max(np.abs(heights), initial=0.0)) if heights else float("nan"),

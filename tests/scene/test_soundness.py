@@ -7,7 +7,7 @@ import pytest
 
 from catalogs.scenes import write_scene
 from flows.making.scene_views import check_scene, check_scenes, compare_streets, show_scenes
-from tasks.conventions import ROAD_CLASSES
+from tasks.conventions import ROAD_CLASSES, SemanticClass
 from tasks.errors import InputError
 from tasks.scene.gaussians import Gaussians
 from tasks.scene.scene import Scene
@@ -60,6 +60,16 @@ def test_each_fault_is_told(street):
     assert any("check the scale" in fault for fault in faults_of(replace(street, carriageway_left=80.0)))
     (told,) = find_faults(measure_soundness(street), -1.0)
     assert told.startswith("the grade must be at most")
+
+
+@pytest.mark.parametrize(("beyond", "told"), [(0.0, True), (40.0, False)])
+def test_vehicles_have_a_height_beside_the_route_and_none_beyond_its_end(street, beyond, told):
+    road, x = np.isin(street.gaussians.class_id, ROAD_CLASSES), street.gaussians.means[:, 0]
+    cars = ~road & (np.abs(x - 20) < 1)
+    classes = np.where(cars, np.uint8(SemanticClass.VEHICLE), street.gaussians.class_id)
+    parked = replace(street, gaussians=replace(street.gaussians, class_id=classes))
+    reach = beyond + street.route.length * (beyond > 0)
+    assert any("vehicles are" in fault for fault in faults_of(move(parked, cars, (reach, 0, 8.0)))) == told
 
 
 def test_a_hole_in_the_picture_of_the_road_is_told(street):
