@@ -36,6 +36,7 @@ _LAST = _TILE - 1
 _TEXELS_A_WAVE = 3.0
 _PIXELS_A_WAVE = 2.0
 _SAMPLES_A_WAVE = 3.0
+"""Samples of a wave over the length that a pixel covers: two are the least that show it [1]."""
 _TEXELS, _RESOLVED, _SAMPLES = _TEXELS_A_WAVE / WAVES, WAVES / _PIXELS_A_WAVE, _SAMPLES_A_WAVE / WAVES
 _WALL_FACING = 0.25
 """Sine of the angle under which walls along a street are seen: flatter ones show no grain within this share [1]."""

@@ -140,15 +140,15 @@ def test_ground_lies_bare_by_its_share(share: float, low: float, high: float) ->
 
 
 def test_a_panel_keeps_its_area_and_ends_in_finer_cells_where_that_is_asked_for() -> None:
-    plain, sharp = (
-        build_panel([0, 0, 0], [8, 0, 0], [0, 0, 6], 1.0, SemanticClass.BUILDING, np.ones(3), fine=fine)
-        for fine in (1.0, 0.25)
+    plain, fine = (
+        build_panel([0, 0, 0], [8, 0, 0], [0, 0, 6], 1.0, SemanticClass.BUILDING, np.ones(3), sharp=sharp)
+        for sharp in (False, True)
     )
     assert len(plain) == 48
-    beside_end = sharp.centre[:, 0] < 0.25
+    beside_end = fine.centre[:, 0] < 0.25
     assert beside_end.any()
-    assert sharp.scale[beside_end, 0].max() < 0.3 * plain.scale[0, 0]
-    for panel in (plain, sharp):
+    assert fine.scale[beside_end, 0].max() < 0.3 * plain.scale[0, 0]
+    for panel in (plain, fine):
         assert (panel.scale / OVERLAP).prod(axis=1).sum() == pytest.approx(48)
 
 

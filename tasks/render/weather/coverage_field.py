@@ -141,10 +141,10 @@ def sum_waves(count, places, footprint, coarsest, octaves, roughness, key, out):
 
     Parameters
     ----------
-    count : number of places [1]
+    count : number of places, int64 [1]
     places : float64 [2, N] world coordinates x and y, which are overwritten [m]
     footprint : float64 [N] width of what looks at each place [m]
-    coarsest, octaves, roughness : as in `FieldParameters`
+    coarsest, octaves, roughness : as in `FieldParameters`; octaves as int64, because Numba compiles literals one by one
     key : uint64 of the field's stream [1]
     out : float64 [N], written [1]
     """

@@ -13,6 +13,8 @@ OVERLAP = 0.74
 """Standard deviation over cell size: below 0.7 the sky shows through, above 0.8 the picture becomes blurred."""
 OPACITY = 0.985
 """Peak opacity: nearly opaque splats that close a pixel early leave up to a tenth of its light."""
+_SHARP = 0.25
+"""Largest cell beside a sharp edge of a panel over the others [1]."""
 THICKNESS = 0.002
 """Standard deviation along the normal [m]."""
 
@@ -219,7 +221,7 @@ def build_panel(
     albedo: ArrayLike,
     *,
     grain: Grain | None = None,
-    fine: float = 1.0,
+    sharp: bool = False,
 ) -> Surfels:
     """Build a plain rectangle of square cells.
 
@@ -231,11 +233,13 @@ def build_panel(
     class_id : its class
     albedo : [3] see `Surfels` [1]
     grain : variation of the reflectance from cell to cell; None for an even colour
-    fine : largest cell beside the rectangle's own edges over the others; below 1 they are sharp [1]
+    sharp : the rectangle's own edges are sharp, by finer cells beside them
     """
     corner, u, v = (np.asarray(x, dtype=np.float64) for x in (origin, edge_u, edge_v))
     sides = [(edge, float(np.linalg.norm(edge))) for edge in (u, v)]
-    cuts = [graded_cells((0.0, length), 0.8 * cell, fine, growth=1.5) for _, length in sides]
+    cuts = [
+        graded_cells((0.0, length), 0.8 * cell, _SHARP if sharp else 1.0, growth=1.5) for _, length in sides
+    ]
     (a, wide), (b, high) = (
         (cut[0] / length, cut[1] / length) for cut, (_, length) in zip(cuts, sides, strict=True)
     )

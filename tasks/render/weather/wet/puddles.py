@@ -193,7 +193,7 @@ def _water(  # type: ignore[no-untyped-def]
     places, turned = np.empty((2, width)), np.empty((2, width))
     size, along, across = np.empty(width), np.empty(width), np.empty(width)
     for row in range(road.shape[0]):
-        count = np.int64(0)  # of one type: Numba compiles what it calls once for each
+        count = np.int64(0)
         for column in range(width):
             if not road[row, column]:
                 continue

@@ -27,8 +27,8 @@ _BALCONY_REACH, _SLAB, _RAIL_HEIGHT, _HANDRAIL = 0.8, 0.16, 0.95, 0.05
 _BAR_GAP, _BAR_WIDTH = 0.16, 0.028
 _BAR_CELLS = np.array([0.06, 0.14, 0.3, 0.3, 0.14, 0.06])
 """Cells of a bar by its height: the last are short, so that it ends where it does [1]."""
-_PLATE, _FINE = 0.5, 0.25
-"""Cell of a balcony's plates [m], and the largest beside their edges over that [1]."""
+_PLATE = 0.5
+"""Cell of a balcony's plates [m]."""
 _SILL = 0.95
 _KIND = SemanticClass.BUILDING
 
@@ -128,7 +128,7 @@ def _build_balcony(
     height = np.cumsum(size) - size / 2
 
     def panel(corner: Floats, edge_u: Floats, edge_v: Floats, albedo: Floats) -> Surfels:
-        return build_panel(corner, edge_u, edge_v, _PLATE, _KIND, albedo, fine=_FINE)
+        return build_panel(corner, edge_u, edge_v, _PLATE, _KIND, albedo, sharp=True)
 
     parts = [panel(wall - thick, wide, deep, 0.6 * slab)]
     for corner, run in ((wall, deep), (wall + deep, wide), (wall + deep + wide, -deep)):

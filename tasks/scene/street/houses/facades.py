@@ -87,12 +87,12 @@ def build_facades(
     )
     if edges is None or None in edges.values():
         return fronts
-    backs = [_back_front(layout, buildings[index], looks[index]) for index in edges]
+    backs = [_build_back(layout, buildings[index], looks[index]) for index in edges]
     return join_surfels([fronts, _build_reveals(cells, looks, front, side), *backs])
 
 
-def _back_front(layout: StreetLayout, house: Building, look: Look) -> Surfels:
-    """Close a house behind its front: between two columns of cells a twentieth of the light passes."""
+def _build_back(layout: StreetLayout, house: Building, look: Look) -> Surfels:
+    """Build what closes a house behind its front, through which a twentieth of the light passes."""
     front = layout.front_position(house.side) + house.side * (house.setback + _BEHIND)
     rise = house.eaves_height(layout) - layout.kerb_height
     origin = [house.start + house.width * (house.side < 0), front, layout.kerb_height]
@@ -237,7 +237,7 @@ def _cut_strip(
     strip: Strip, cell: float, edge: float | None, bay: float = np.inf
 ) -> tuple[Floats, Floats, NDArray[np.int64]]:
     """Return middle [m], width [m] and part of the cells along one side of a grid: walls are cut finely at their ends,
-    and panes and boards too where an ``edge`` says how finely; where the next ``bay`` [m] begins a wall has no end."""
+    and panes and boards too where an ``edge`` says how finely. A wall goes on where the next ``bay`` [m] begins."""
     kinds = np.array([part for _, part in strip.parts])
     breaks = strip.begin + np.cumsum([0.0, *(size for size, _ in strip.parts)])
     if edge is None:

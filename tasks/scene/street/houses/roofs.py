@@ -18,8 +18,6 @@ DEPTH = 10.0
 """Depth of the houses, from front to back [m]."""
 _CELL = 6.0
 """Cell of a roof where it is seen closest [px]."""
-_FINE = 0.25
-"""Cell at an edge against the sky over the others [1]."""
 _PITCH = {"flat": (0.0, 0.0), "pitched": (2.6, 3.4), "mansard": (0.9, 2.6)}
 """Run back from the eaves and rise of the roof's front slope [m]."""
 
@@ -74,50 +72,36 @@ def _close_house(layout: StreetLayout, house: Building, seed: int) -> list[Surfe
     if house.roof == "flat":
         parts.append(
             build_panel(
-                corner_point(0.1, eaves + 0.1),
-                along,
-                parapet,
-                cell,
-                kind,
-                wall,
-                grain=Grain(rng, look.grain),
+                corner_point(0.1, eaves + 0.1), along, parapet, cell, kind, wall, grain=Grain(rng, look.grain)
             )
         )
     else:
         slope = np.array([0, out * run, rise])
         parts.append(
             build_panel(
-                corner_point(0.0, eaves + 0.2),
-                along,
-                slope,
-                cell,
-                kind,
-                tile,
-                grain=Grain(rng, 0.09),
+                corner_point(0.0, eaves + 0.2), along, slope, cell, kind, tile, grain=Grain(rng, 0.09)
             )
         )
     ends = ((house.start, -1.0), (house.start + house.width, 1.0))
     for (end, outward), neighbour in zip(ends, house.beside, strict=True):
         blank = {"cell": 1.6 * cell, "class_id": kind, "albedo": 0.8 * wall, "grain": Grain(rng, 0.03)}
-        fine = _FINE if outward < 0 else 1.0  # only that end faces the traffic
+        blank["sharp"] = outward < 0  # only that end faces the traffic
         # where two fronts are not aligned, some centimetres of the end wall are visible
         near, far = sorted((front, front + out * 0.35), reverse=outward < 0)
         parts.append(
-            build_panel([end, near, 0.0], [0, far - near, 0], [0, 0, eaves], **blank | {"cell": cell})
+            build_panel(
+                [end, near, 0.0], [0, far - near, 0], [0, 0, eaves], **blank | {"cell": cell, "sharp": False}
+            )
         )
         near, far = sorted((front, front + out * DEPTH), reverse=outward < 0)
         if neighbour < eaves:
             low = max(neighbour - 0.3, 0.0)
             parts.append(
-                build_panel(
-                    [end, near, low], [0, far - near, 0], [0, 0, eaves + 0.2 - low], **blank, fine=fine
-                )
+                build_panel([end, near, low], [0, far - near, 0], [0, 0, eaves + 0.2 - low], **blank)
             )
         if house.roof != "flat":
             near, far = sorted((front + out * 0.6 * run, front + out * 0.6 * DEPTH), reverse=outward < 0)
-            parts.append(
-                build_panel([end, near, eaves], [0, far - near, 0], [0, 0, 0.7 * rise], **blank, fine=fine)
-            )
+            parts.append(build_panel([end, near, eaves], [0, far - near, 0], [0, 0, 0.7 * rise], **blank))
             foot = np.array([end - 0.8 * outward, front + out * (run + 0.4), eaves + 0.8 * rise])
             half = np.array([0.3, 0.5, 0.0])
             brick = palette.BRICK[rng.integers(len(palette.BRICK))]
